@@ -1,0 +1,23 @@
+"""What the bridge raises. Bad bytes from outside never raise: they are counted and dropped."""
+
+from __future__ import annotations
+
+
+class BridgeError(Exception):
+    """Base of every error of ``mavlink_bridge``."""
+
+
+class EncodeError(BridgeError):
+    """A value does not fit its MAVLink field: a programming error or a NaN that must not leave the process."""
+
+
+class LogError(BridgeError):
+    """A tlog cannot be opened or holds no MAVLink at all."""
+
+
+class ScheduleError(BridgeError):
+    """A period or phase that is not a whole number of base ticks."""
+
+
+class PlanWireError(BridgeError):
+    """A plan that does not fit into 128 bytes, or bytes that are not a plan."""

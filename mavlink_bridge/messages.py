@@ -1,0 +1,234 @@
+"""The values that outrider exchanges: one frozen tuple per MAVLink message, SI units, the message's own frame.
+
+Angles are radians, distances metres, latitudes and longitudes degrees (float64, so that the degE7 step of 1.1 cm is
+kept), times integer µs. Positions stay local NED or geodetic as the message is: ``frames`` alone converts.
+``None`` stands for a field that the sender marked unknown. Tuples rather than dataclasses: they are made thousands of
+times a second and a tuple costs a third as much.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+Vector = tuple[float, float, float]
+
+
+class Source(NamedTuple):
+    """Who sent a message: MAVLink system and component id (both 0…255)."""
+
+    system: int
+    component: int
+
+
+class Heartbeat(NamedTuple):
+    """HEARTBEAT (0)."""
+
+    source: Source
+    type: int
+    autopilot: int
+    base_mode: int
+    custom_mode: int
+    system_status: int
+
+
+class SysStatus(NamedTuple):
+    """SYS_STATUS (1): sensor bit masks, battery. ``battery_remaining`` in 0…1 or None."""
+
+    source: Source
+    present: int
+    enabled: int
+    health: int
+    battery_voltage: float | None
+    battery_remaining: float | None
+
+
+class SystemTime(NamedTuple):
+    """SYSTEM_TIME (2): Unix time and time since boot, µs."""
+
+    source: Source
+    unix_time: int
+    time_boot: int
+
+
+class Ping(NamedTuple):
+    """PING (4)."""
+
+    source: Source
+    time: int
+    sequence: int
+    target_system: int
+    target_component: int
+
+
+class Attitude(NamedTuple):
+    """ATTITUDE (30): FRD body against local NED; Euler angles (rad) and body rates (rad/s)."""
+
+    source: Source
+    time_boot: int
+    roll: float
+    pitch: float
+    yaw: float
+    body_rates: Vector
+
+
+class LocalPosition(NamedTuple):
+    """LOCAL_POSITION_NED (32): relative to the sender's *own* origin; never compare two vehicles'."""
+
+    source: Source
+    time_boot: int
+    position_ned: Vector
+    velocity_ned: Vector
+
+
+class GlobalPosition(NamedTuple):
+    """GLOBAL_POSITION_INT (33). ``altitude`` above mean sea level, ``relative_altitude`` above home, yaw clockwise
+    from north in rad or None."""
+
+    source: Source
+    time_boot: int
+    latitude: float
+    longitude: float
+    altitude: float
+    relative_altitude: float
+    velocity_ned: Vector
+    yaw: float | None
+
+
+class GpsGlobalOrigin(NamedTuple):
+    """GPS_GLOBAL_ORIGIN (49): where the sender's local frame has its zero."""
+
+    source: Source
+    latitude: float
+    longitude: float
+    altitude: float
+    time: int
+
+
+class CommandInt(NamedTuple):
+    """COMMAND_INT (75). ``x``, ``y`` are the raw int32 (degE7 in global frames)."""
+
+    source: Source
+    target_system: int
+    target_component: int
+    frame: int
+    command: int
+    params: tuple[float, float, float, float]
+    x: int
+    y: int
+    z: float
+
+
+class CommandLong(NamedTuple):
+    """COMMAND_LONG (76): seven parameters as sent."""
+
+    source: Source
+    target_system: int
+    target_component: int
+    command: int
+    confirmation: int
+    params: tuple[float, float, float, float, float, float, float]
+
+
+class CommandAck(NamedTuple):
+    """COMMAND_ACK (77)."""
+
+    source: Source
+    command: int
+    result: int
+    progress: int
+    result_param2: int
+    target_system: int
+    target_component: int
+
+
+class SetpointLocal(NamedTuple):
+    """SET_POSITION_TARGET_LOCAL_NED (84): as sent, ignored fields included (they may hold NaN)."""
+
+    source: Source
+    time_boot: int
+    target_system: int
+    target_component: int
+    frame: int
+    type_mask: int
+    position: Vector
+    velocity: Vector
+    acceleration: Vector
+    yaw: float
+    yaw_rate: float
+
+
+class PositionTarget(NamedTuple):
+    """POSITION_TARGET_LOCAL_NED (85): the autopilot's echo of what it follows."""
+
+    source: Source
+    time_boot: int
+    frame: int
+    type_mask: int
+    position: Vector
+    velocity: Vector
+    acceleration: Vector
+    yaw: float
+    yaw_rate: float
+
+
+class Timesync(NamedTuple):
+    """TIMESYNC (111): ``tc1`` and ``ts1`` in ns, as the message says; tc1 = 0 is a request."""
+
+    source: Source
+    tc1: int
+    ts1: int
+
+
+class EkfStatus(NamedTuple):
+    """EKF_STATUS_REPORT (193, ardupilotmega): bit mask of ESTIMATOR flags."""
+
+    source: Source
+    flags: int
+
+
+class ExtendedSysState(NamedTuple):
+    """EXTENDED_SYS_STATE (245): ``landed_state`` is MAV_LANDED_STATE."""
+
+    source: Source
+    vtol_state: int
+    landed_state: int
+
+
+class StatusText(NamedTuple):
+    """STATUSTEXT (253): ``text`` at most 50 characters here; longer texts are split by the encoder."""
+
+    source: Source
+    severity: int
+    text: str
+
+
+class Tunnel(NamedTuple):
+    """TUNNEL (385): up to 128 bytes of ``payload_type``."""
+
+    source: Source
+    target_system: int
+    target_component: int
+    payload_type: int
+    payload: bytes
+
+
+Message = (
+    Heartbeat
+    | SysStatus
+    | SystemTime
+    | Ping
+    | Attitude
+    | LocalPosition
+    | GlobalPosition
+    | GpsGlobalOrigin
+    | CommandInt
+    | CommandLong
+    | CommandAck
+    | SetpointLocal
+    | PositionTarget
+    | Timesync
+    | EkfStatus
+    | ExtendedSysState
+    | StatusText
+    | Tunnel
+)
