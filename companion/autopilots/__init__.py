@@ -1,0 +1,38 @@
+"""What PX4 and ArduPilot want differently: modes, the order of take-off, and which set-point fields they take."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+from mavlink_bridge.messages import Heartbeat
+
+
+class Step(Enum):
+    """One stage on the way into the air; which order is the autopilot's."""
+
+    MODE = "guided mode"
+    ARM = "arm"
+    TAKEOFF = "take-off"
+
+
+class Profile(NamedTuple):
+    """An autopilot's ways. ``mode_params`` are p1…p3 of DO_SET_MODE; ``setpoint_mask`` is the type_mask to send.
+
+    ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer. ``streams_first``: set-points must flow before
+    the mode is granted. ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level, not above home.
+    """
+
+    name: str
+    autopilot: int
+    steps: tuple[Step, ...]
+    mode_params: tuple[float, float, float]
+    guided_custom_mode: int
+    setpoint_mask: int
+    streams_first: bool
+    takeoff_absolute: bool
+
+
+def is_guided(profile: Profile, heartbeat: Heartbeat) -> bool:
+    """Whether our set-points steer this vehicle."""
+    return heartbeat.custom_mode == profile.guided_custom_mode

@@ -1,0 +1,16 @@
+"""PX4: arm, take off in AUTO to an altitude above mean sea level, stream set-points, then OFFBOARD."""
+
+from __future__ import annotations
+
+from companion.autopilots import Profile, Step
+
+PX4 = Profile(
+    name="PX4",
+    autopilot=12,
+    steps=(Step.ARM, Step.TAKEOFF, Step.MODE),
+    mode_params=(1.0, 6.0, 0.0),
+    guided_custom_mode=6 << 16,
+    setpoint_mask=0,
+    streams_first=True,
+    takeoff_absolute=True,
+)

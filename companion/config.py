@@ -1,0 +1,176 @@
+"""The companion's settings: frozen, checked at load, passed explicitly. SI units, fleet-local ENU, times in µs.
+
+Defaults are the paper's where it gives a number; where it is silent the value that we settled on stands here with its
+reason, and `config/companions/*.yaml` may say otherwise.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Positive = Annotated[float, Field(gt=0.0, le=1e4)]
+Micros = Annotated[int, Field(gt=0, le=10_000_000, multiple_of=4)]
+Triple = tuple[float, float, float]
+Bounds = tuple[
+    Annotated[float, Field(gt=0.0, le=100.0)],
+    Annotated[float, Field(gt=0.0, le=100.0)],
+    Annotated[float, Field(gt=0.0, le=100.0)],
+]
+
+
+class Settings(BaseModel):
+    """Base: an unknown key is an error, and nothing changes after load."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class HorizonConfig(Settings):
+    """N steps of dt; N + 1 inputs u(0)…u(N)."""
+
+    steps: int = Field(15, ge=2, le=15, description="N; at most 15, so that a plan fits one TUNNEL message")
+    dt_us: Micros = Field(100_000, le=262_140, description="prediction step, µs; not the replan period")
+
+
+class CostConfig(Settings):
+    """Ω_t and Ω_i. Only their ratios matter. Not given in the paper: `docs` of the scenario files say how chosen."""
+
+    omega_t_position: Positive = 100.0
+    omega_t_velocity: Positive = 20.0
+    omega_i: Positive = 0.5
+
+
+class LimitsConfig(Settings):
+    """What the planner may ask for. ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it."""
+
+    u_max: Bounds = (2.0, 2.0, 2.0)
+    v_max: Bounds = (5.0, 5.0, 5.0)
+    a_total: float = Field(7.0, gt=0.0, le=30.0, description="m/s²; the firefly at 35° of tilt has 6.9")
+    box_min: Triple = (-20.0, -20.0, 3.0)
+    box_max: Triple = (20.0, 20.0, 10.0)
+
+    @model_validator(mode="after")
+    def _box(self) -> LimitsConfig:
+        if any(low >= high for low, high in zip(self.box_min, self.box_max, strict=True)):
+            raise ValueError("box_min must lie below box_max on every axis")
+        if self.a_total < max(self.u_max):
+            raise ValueError("a_total must be at least the largest u_max")
+        return self
+
+
+class FieldConfig(Settings):
+    """The repulsive field, eq. (8)."""
+
+    gain: Positive = Field(10.0, description="K; the paper gives none")
+    d_min: Positive = Field(0.5, description="m, between centres: the field is clamped there")
+    d_safe: Positive = Field(3.0, description="m, between centres: the field begins there")
+    braking: Positive | None = Field(
+        4.0, description="m/s², relative deceleration to count on when closing; null is the paper's bare field"
+    )
+
+    @model_validator(mode="after")
+    def _order(self) -> FieldConfig:
+        if self.d_safe <= self.d_min:
+            raise ValueError("d_safe must be larger than d_min")
+        return self
+
+
+class TangentialConfig(Settings):
+    """The tangential band, Sec. III-C.3."""
+
+    k_tang: Positive = 2.0
+    d_band: Positive = Field(1.0, description="m beyond d_safe; more than v_max·dt + u_max·dt²/2")
+    reach_s: float = Field(0.5, ge=0.0, le=5.0, description="the band grows by this times the closing speed")
+    d_full: Positive = Field(1.0, description="m, between centres: the force is at its full there")
+    omega_scale: float = Field(0.1, gt=0.0, le=1.0, description="Ω_t,min / Ω_t,max inside the band")
+    force_max: Positive = Field(3.0, description="m/s²; above u_max, or the input cancels it")
+    turning_sense: Literal["own", "right", "left"] = Field(
+        "own", description="'own': by approach, as the paper; otherwise one sense for all vehicles"
+    )
+
+
+class SurfaceConfig(Settings):
+    """The circle around the target."""
+
+    radius: float = Field(4.0, ge=0.0, le=100.0)
+    height: float = Field(5.0, ge=-50.0, le=100.0, description="m above the target")
+
+
+class TrackConfig(Settings):
+    """A filterpy track of one sender."""
+
+    sigma_position: Positive = Field(0.02, description="m")
+    sigma_velocity: Positive = Field(0.05, description="m/s")
+    sigma_acceleration: Positive = Field(2.0, description="m/s², of the constant-velocity model")
+    delay_us: int = Field(20_000, ge=0, le=2_000_000, description="assumed age of a message when it arrives")
+    extrapolate_us: Micros = Field(1_000_000, description="no track is carried further than this")
+    jump: Positive = Field(3.0, description="m; an innovation beyond it needs a second witness")
+    velocity_up: bool = Field(False, description="the sender's vz is positive up, contrary to MAVLink")
+
+
+class HeadingConfig(Settings):
+    """What yaw may be asked of the vehicle, and how eagerly."""
+
+    rate_max: Positive = Field(3.0, description="rad/s")
+    acceleration_max: Positive = Field(2.0, description="rad/s²; the firefly's yaw torque gives 2.5")
+    effort: Positive = Field(1e-4, description="s⁴, weight of (yaw acceleration)² against (yaw error)²")
+    blind: Positive = Field(0.1, description="m, horizontally: nearer than this no bearing counts")
+
+
+class GuardConfig(Settings):
+    """Age limits of what a plan stands on, µs."""
+
+    own_stale_us: Micros = 500_000
+    hold_us: Micros = Field(500_000, description="a plan is held for so long after the last good one")
+    target_stale_us: Micros = 3_000_000
+    neighbour_stale_us: Micros = 2_000_000
+    plan_stale_us: Micros = Field(500_000, description="a shared horizon older than this is not used")
+    tube: Positive = Field(1.0, description="m of tracking error at which the plan is anchored anew")
+
+
+class RatesConfig(Settings):
+    """Periods of what the companion does, µs."""
+
+    replan_us: Micros = 10_000
+    setpoint_us: Micros = 20_000
+    state_us: Micros = 100_000
+    plan_us: Micros = 100_000
+
+
+class CompanionConfig(Settings):
+    """Everything one companion needs beside its links."""
+
+    task: Literal["escort", "goto"] = "escort"
+    methods: tuple[Literal["baseline", "tangential"], ...] = ("tangential",)
+    planar: bool = False
+    neighbour_prediction: Literal["held", "velocity"] = Field(
+        "held", description="without a shared horizon: the paper holds the n = 0 position; 'velocity' moves it on"
+    )
+    setpoint_lead_us: int = Field(10_000, ge=0, le=1_600_000, description="look-ahead of the set-point")
+    own: TrackConfig = TrackConfig(delay_us=5_000, sigma_acceleration=10.0)
+    neighbour: TrackConfig = TrackConfig()
+    target: TrackConfig = TrackConfig(sigma_position=0.5, sigma_velocity=0.3, sigma_acceleration=2.0, jump=8.0)
+    target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
+    target_d_safe: float | None = Field(None, gt=0.0, le=100.0)
+    horizon: HorizonConfig = HorizonConfig()
+    cost: CostConfig = CostConfig()
+    limits: LimitsConfig = LimitsConfig()
+    field: FieldConfig = FieldConfig()
+    tangential: TangentialConfig = TangentialConfig()
+    surface: SurfaceConfig = SurfaceConfig()
+    heading: HeadingConfig = HeadingConfig()
+    guard: GuardConfig = GuardConfig()
+    rates: RatesConfig = RatesConfig()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> CompanionConfig:
+        dt = self.horizon.dt_us * 1e-6
+        least = max(self.limits.v_max[:2]) * dt + max(self.limits.u_max[:2]) * dt**2 / 2
+        if self.tangential.d_band <= least:
+            raise ValueError(f"tangential.d_band must exceed v_max·dt + u_max·dt²/2 = {least:.2f} m")
+        if self.tangential.force_max <= max(self.limits.u_max):
+            raise ValueError("tangential.force_max must exceed u_max, or the input cancels it")
+        if (self.target_d_min is None) != (self.target_d_safe is None):
+            raise ValueError("target_d_min and target_d_safe come together")
+        return self

@@ -1,0 +1,81 @@
+"""What flies when planning does not: the held plan for a bounded time, then a brake to hover. Nothing is held for ever."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+
+from companion.config import CompanionConfig
+from companion.horizon import Horizon, Motion, roll_out
+
+
+class Holding(Enum):
+    """What the vehicle is flying, and why."""
+
+    FRESH = "fresh plan"
+    HELD = "held plan"
+    BRAKING = "brake and hover"
+
+
+class Guard:
+    """Owns the horizon that is flown. ``held`` counts replans that kept the old one, ``failures`` those by the solver."""
+
+    def __init__(self, config: CompanionConfig) -> None:
+        self._config = config
+        self._fresh_at = 0
+        self.horizon: Horizon | None = None
+        self.state = Holding.FRESH
+        self.held = 0
+        self.failures = 0
+        self.anchored_anew = 0
+
+    def start(self, now: int, motion: Motion) -> None:
+        """Fly from this state on: a hover there until the first plan."""
+        self.horizon = brake(now, motion, self._config)
+        self._fresh_at = now
+        self.state = Holding.FRESH
+
+    def accept(self, now: int, horizon: Horizon) -> None:
+        """A good plan."""
+        self.horizon = horizon
+        self._fresh_at = now
+        self.state = Holding.FRESH
+
+    def hold(self, now: int, *, solver: bool) -> None:
+        """No good plan: keep the old one while it is young enough, then brake from where it has got to."""
+        self.held += 1
+        self.failures += solver
+        if self.horizon is None or self.state is Holding.BRAKING:
+            return
+        self.state = Holding.HELD
+        if now - self._fresh_at > self._config.guard.hold_us:
+            self.horizon = brake(now, self.horizon.at(now), self._config)
+            self.state = Holding.BRAKING
+
+    def anchor(self, now: int, position: Motion) -> Motion:
+        """The state to plan from: the flown horizon's, unless the vehicle has left the tube around it.
+
+        Planning from the plan keeps the set-point continuous and lets the autopilot reject wind; out of the tube the
+        plan starts anew at the measured state.
+        """
+        if self.horizon is None:
+            return position
+        reference = self.horizon.at(now)
+        off = reference.position - position.position
+        if float(off @ off) > self._config.guard.tube**2:
+            self.anchored_anew += 1
+            return position
+        return reference
+
+
+def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
+    """Straight to rest within the horizon, at u_max or as hard as that takes; then hover. (N + 1 segments.)"""
+    n = config.horizon.steps + 1
+    h = config.horizon.dt_us * 1e-6
+    speed = float(np.sqrt(motion.velocity @ motion.velocity))
+    rate = max(min(config.limits.u_max), speed / ((n - 1) * h))
+    speeds = np.maximum(0.0, speed - rate * h * np.arange(n + 1))
+    direction = motion.velocity / speed if speed > 1e-9 else np.zeros(3)
+    accelerations = np.diff(speeds)[:, None] / h * direction
+    return roll_out(now, config.horizon.dt_us, motion.position, motion.velocity, accelerations)

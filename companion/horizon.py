@@ -1,0 +1,134 @@
+"""A trajectory on equidistant knots with piecewise constant acceleration: what a plan is, own or a neighbour's.
+
+Time is integer µs on the companion's clock, positions are fleet-local ENU in metres. Before the first knot and after the
+last one the motion goes on at constant velocity, so that a horizon of 1.6 s that is 0.1 s old still covers 1.6 s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Motion(NamedTuple):
+    """Position (3,), velocity (3,), acceleration (3,): fleet-local ENU, SI."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class Horizon(NamedTuple):
+    """Knots 0…n of a trajectory, ``knots`` (n + 1, 9): position, velocity, acceleration of the segment that follows.
+
+    The acceleration of the last knot is zero: beyond the end the velocity is kept.
+    """
+
+    epoch: int
+    dt: int
+    knots: Array
+
+    @property
+    def end(self) -> int:
+        """Time of the last knot, µs."""
+        return self.epoch + self.dt * (len(self.knots) - 1)
+
+    def at(self, time: int) -> Motion:
+        """The motion at ``time``; the exact quadratic of the segment, not an interpolation."""
+        last = len(self.knots) - 1
+        index = min(max((time - self.epoch) // self.dt, 0), last)
+        s = (time - self.epoch - index * self.dt) * 1e-6
+        knot = self.knots[index]
+        p, v, a = knot[0:3], knot[3:6], knot[6:9]
+        if s < 0.0:
+            a = _ZERO
+        return Motion(p + s * (v + (0.5 * s) * a), v + s * a, a)
+
+    def positions(self, start: int, steps: int, dt: int) -> Array:
+        """Positions (steps, 3) at ``start + n·dt``, n = 0…steps − 1, from the first knot on."""
+        elapsed = (start - self.epoch) + dt * _COUNT[:steps]
+        index = np.minimum(elapsed // self.dt, len(self.knots) - 1)
+        s = ((elapsed - index * self.dt) * 1e-6)[:, None]
+        chosen = self.knots[index]
+        result: Array = chosen[:, 0:3] + s * (chosen[:, 3:6] + (0.5 * s) * chosen[:, 6:9])
+        return result
+
+
+_ZERO = np.zeros(3)
+_ZERO.flags.writeable = False
+_COUNT = np.arange(64)
+
+
+def roll_out(epoch: int, dt: int, position: Array, velocity: Array, accelerations: Array) -> Horizon:
+    """The horizon that follows from a state and accelerations (n, 3): the A and B of the paper, eq. (5)."""
+    n = len(accelerations)
+    h = dt * 1e-6
+    knots = np.zeros((n + 1, 9))
+    knots[:n, 6:9] = accelerations
+    knots[0, 3:6] = velocity
+    np.cumsum(accelerations, axis=0, out=knots[1:, 3:6])
+    knots[1:, 3:6] *= h
+    knots[1:, 3:6] += velocity
+    steps = knots[:n, 3:6] + (0.5 * h) * accelerations
+    knots[0, 0:3] = position
+    np.cumsum(steps, axis=0, out=knots[1:, 0:3])
+    knots[1:, 0:3] *= h
+    knots[1:, 0:3] += position
+    return Horizon(epoch, dt, knots)
+
+
+class HorizonTable:
+    """The latest horizon of each of many senders, sampled together: ``steps`` positions at ``dt`` (µs) from any time.
+
+    Aligned by time, not by index: the original implementation shared horizons without time stamps and never noticed
+    their age.
+    """
+
+    def __init__(self, steps: int, dt: int) -> None:
+        self._steps = steps
+        self._dt = dt
+        self._rows: dict[int, int] = {}
+        self._epochs = np.zeros(0, dtype=np.int64)
+        self._dts = np.zeros(0, dtype=np.int64)
+        self._lasts = np.zeros(0, dtype=np.int64)
+        self._knots = np.zeros((0, 1, 9))
+        self._ahead = dt * np.arange(steps)
+
+    def put(self, sender: int, horizon: Horizon) -> None:
+        """Take a horizon unless a later one of the same sender is known."""
+        row = self._rows.get(sender)
+        length = len(horizon.knots)
+        if row is None:
+            row = self._rows[sender] = len(self._rows)
+            self._epochs = np.append(self._epochs, 0)
+            self._dts = np.append(self._dts, 1)
+            self._lasts = np.append(self._lasts, 0)
+            self._knots = np.concatenate([self._knots, np.zeros((1, self._knots.shape[1], 9))])
+        elif horizon.epoch < self._epochs[row]:
+            return
+        if length > self._knots.shape[1]:
+            longer = np.zeros((len(self._rows), length, 9))
+            longer[:, : self._knots.shape[1]] = self._knots
+            self._knots = longer
+        self._knots[row, :length] = horizon.knots
+        self._epochs[row], self._dts[row], self._lasts[row] = horizon.epoch, horizon.dt, length - 1
+
+    def positions(self, senders: Sequence[int], start: int, oldest: int) -> tuple[Array, NDArray[np.bool_]]:
+        """Positions (M, steps, 3) of ``senders`` at ``start + n·dt``, and which of them are not made before ``oldest``
+        (µs); the rows of the others mean nothing."""
+        if not self._rows:
+            return np.zeros((len(senders), self._steps, 3)), np.zeros(len(senders), dtype=np.bool_)
+        rows = np.array([self._rows.get(sender, -1) for sender in senders])
+        epochs, dts = self._epochs[rows], self._dts[rows]
+        known: NDArray[np.bool_] = (rows >= 0) & (epochs >= oldest)
+        elapsed = (start - epochs)[:, None] + self._ahead
+        index = np.minimum(np.maximum(elapsed // dts[:, None], 0), self._lasts[rows][:, None])
+        s = ((elapsed - index * dts[:, None]) * 1e-6)[:, :, None]
+        chosen = self._knots[rows[:, None], index]
+        result: Array = chosen[:, :, 0:3] + s * (chosen[:, :, 3:6] + (0.5 * s) * chosen[:, :, 6:9])
+        return result, known

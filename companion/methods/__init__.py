@@ -1,0 +1,39 @@
+"""Ways out of the field's local minima (Sec. III-C): interchangeable strategies that see a scene and add influence."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+from companion.forces import Obstacles
+from companion.horizon import Array
+
+
+class Scene(NamedTuple):
+    """What one plan is made from: own state and prediction, target and obstacles, fleet-local ENU, SI.
+
+    ``prediction`` (N + 1, 3) is the previous plan at n = 0…N from now; ``gradient`` the last ∇J (3,), zero at first.
+    """
+
+    position: Array
+    velocity: Array
+    prediction: Array
+    destination: Array
+    destination_velocity: Array
+    target: Array
+    obstacles: Obstacles
+    gradient: Array
+
+
+class Influence(NamedTuple):
+    """What a method changes: the field f (N + 1, 3), and the factor on Ω_t."""
+
+    force: Array
+    omega_scale: float
+
+
+class Method(Protocol):
+    """One strategy; it may remember (latches), and belongs to one vehicle."""
+
+    def influence(self, scene: Scene, influence: Influence) -> Influence:
+        """The influence with this method's share added."""
+        ...

@@ -1,0 +1,95 @@
+"""Tangential band (Sec. III-C.3): inside a band around an obstacle a force about its centre acts, and Ω_t is lowered.
+
+F_tang(0) = k_tang ‖∇J‖ α̂,  α̂ ⊥ α, the same for the whole horizon.
+
+Settled against the text. The gradient is its norm divided by Ω_t. The band reaches from the obstacle to d_safe + d_band
+and further for one that comes fast (``reach_s`` times the closing speed): turning aside takes time, not distance. The
+force grows from zero at the band's edge, quickly up to u_max − the input cancels so much of it − and then up to
+``force_max`` at ``d_full``. It acts only about obstacles that lie ahead, fading out at 30° from abeam, so that the band is
+left once the obstacle is passed. The sense is latched per obstacle for as long as the encounter lasts, otherwise it
+chatters when the bearing crosses zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.config import TangentialConfig
+from companion.forces import Obstacles
+from companion.horizon import Array
+from companion.methods import Influence, Scene
+
+_ABEAM = 0.5
+"""Cosine of the bearing off the bow at which the force is whole; it vanishes abeam."""
+_QUICK = 10.0
+"""How much faster the force grows up to u_max than beyond."""
+_NEAR = 1e-6
+
+
+class Tangential:
+    """The band around every obstacle; latches one turning sense per obstacle id."""
+
+    def __init__(self, config: TangentialConfig, u_max: float, dt: float) -> None:
+        self._config = config
+        self._u_max = u_max
+        self._dt = dt
+        self._sense: dict[int, float] = {}
+
+    def influence(self, scene: Scene, influence: Influence) -> Influence:
+        """Adds F_tang of every obstacle whose band holds the vehicle and that lies ahead."""
+        obstacles = scene.obstacles
+        if not obstacles.ids:
+            self._sense.clear()
+            return influence
+        away = scene.position - obstacles.positions[:, 0]
+        flat = np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2) + _NEAR
+        weight = self._weights(scene, away)
+        self._release(obstacles, weight)
+        sense = self._senses(obstacles, weight, away, scene.destination - scene.position)
+        # α̂ = ± ẑ × α, horizontal: passing never costs height.
+        share = weight * sense / flat
+        total = np.array([-(share @ away[:, 1]), share @ away[:, 0], 0.0])
+        norm = float(np.sqrt(total @ total))
+        if norm < _NEAR:
+            return influence
+        whole = min(norm, 1.0)
+        config, u_max = self._config, self._u_max
+        strength = min(
+            config.k_tang * float(np.sqrt(scene.gradient @ scene.gradient)),
+            u_max * min(1.0, _QUICK * whole) + (config.force_max - u_max) * whole,
+        )
+        return Influence(influence.force + total * (strength / norm), config.omega_scale)
+
+    def _weights(self, scene: Scene, away: Array) -> Array:
+        """How much each obstacle's band acts, (M,) in 0…1."""
+        config, obstacles = self._config, scene.obstacles
+        distance = np.sqrt(np.einsum("ji,ji->j", away, away)) + _NEAR
+        moving = (obstacles.positions[:, 1] - obstacles.positions[:, 0]) / self._dt
+        closing = np.maximum(0.0, -np.einsum("ji,ji->j", away, scene.velocity - moving) / distance)
+        edge = obstacles.d_safe + config.d_band + config.reach_s * closing
+        depth = np.clip((edge - distance) / (edge - config.d_full), 0.0, 1.0)
+        to_go = scene.destination - scene.position
+        ahead = -(away @ to_go) / (distance * (np.sqrt(to_go @ to_go) + _NEAR))
+        weights: Array = depth * np.clip(ahead / _ABEAM, 0.0, 1.0)
+        return weights
+
+    def _release(self, obstacles: Obstacles, weight: Array) -> None:
+        for name in set(self._sense).difference(
+            name for name, w in zip(obstacles.ids, weight, strict=True) if w > 0.0
+        ):
+            del self._sense[name]
+
+    def _senses(self, obstacles: Obstacles, weight: Array, away: Array, to_go: Array) -> Array:
+        """Per obstacle +1: counter-clockwise about it as seen from above (it stays on the left), −1: clockwise."""
+        config = self._config
+        if config.turning_sense != "own":
+            return np.full(len(weight), 1.0 if config.turning_sense == "right" else -1.0)
+        senses = np.zeros(len(weight))
+        for j in np.flatnonzero(weight > 0.0):
+            name = obstacles.ids[j]
+            if name not in self._sense:
+                # An obstacle to the left of the course is left on the left.
+                left = to_go[1] * away[j, 0] - to_go[0] * away[j, 1]
+                self._sense[name] = 1.0 if left >= 0.0 else -1.0
+            senses[j] = self._sense[name]
+        return senses

@@ -1,0 +1,93 @@
+"""The other vehicles as the swarm link tells of them: a track each, and the horizon each has shared.
+
+A neighbour that shares no horizon, or whose horizon is old or no longer where the neighbour is, is taken at its n = 0
+position for the whole horizon (Sec. IV-A), or carried on at constant velocity if so configured.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.config import CompanionConfig
+from companion.forces import Obstacles
+from companion.horizon import HorizonTable, roll_out
+from companion.tracks import Track
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.frames import FleetFrame, ned_to_enu
+from mavlink_bridge.messages import GlobalPosition, Tunnel
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
+
+_STRAYED = 1.0
+"""A neighbour further than this (m) from its own plan is not where it says: its track counts."""
+
+
+class Neighbours:
+    """Everything heard on the swarm link, by system id."""
+
+    def __init__(self, config: CompanionConfig, system: int, fleet: FleetFrame) -> None:
+        self._config = config
+        self._system = system
+        self._fleet = fleet
+        self._tracks: dict[int, Track] = {}
+        self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
+        self.refused_plans = 0
+
+    def hear_position(self, now: int, message: GlobalPosition) -> None:
+        """A neighbour's GLOBAL_POSITION_INT; the own echo is ignored."""
+        system = message.source.system
+        if system == self._system:
+            return
+        if system not in self._tracks:
+            self._tracks[system] = Track(self._config.neighbour)
+        position = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
+        self._tracks[system].measure(now, position, ned_to_enu(message.velocity_ned))
+
+    def hear_plan(self, now: int, message: Tunnel) -> None:
+        """A neighbour's horizon in a TUNNEL. One in another fleet frame, or from the future, is refused."""
+        system = message.source.system
+        if system == self._system or message.payload_type != PAYLOAD_TYPE:
+            return
+        try:
+            plan = unpack(message.payload)
+        except PlanWireError:
+            self.refused_plans += 1
+            return
+        if plan.origin != self._fleet.fingerprint or plan.epoch > now + plan.dt or not plan.accelerations:
+            self.refused_plans += 1
+            return
+        self._table.put(
+            system,
+            roll_out(plan.epoch, plan.dt, plan.position_m, plan.velocity_m_s, plan.accelerations_m_s2),
+        )
+
+    def obstacles(self, now: int) -> Obstacles:
+        """All neighbours aligned with ``now + n·dt``, n = 0…N; those unheard of for too long are left out."""
+        config = self._config
+        states = {system: track.at(now) for system, track in self._tracks.items()}
+        known = [
+            (system, state)
+            for system, state in states.items()
+            if state is not None and state.age <= config.guard.neighbour_stale_us
+        ]
+        steps = config.horizon.steps + 1
+        if not known:
+            return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
+        ids = tuple(system for system, _ in known)
+        here = np.array([state.position for _, state in known])
+        positions, trusted = self._table.positions(ids, now, now - config.guard.plan_stale_us)
+        off = positions[:, 0] - here
+        trusted &= np.einsum("ji,ji->j", off, off) <= _STRAYED**2
+        if not trusted.all():
+            lost = ~trusted
+            positions[lost] = here[lost][:, None]
+            if config.neighbour_prediction == "velocity":
+                velocity = np.array([state.velocity for _, state in known])[lost]
+                ahead = 1e-6 * config.horizon.dt_us * np.arange(steps)
+                positions[lost] += ahead[:, None] * velocity[:, None]
+        field, count = config.field, len(ids)
+        return Obstacles(ids, positions, np.full(count, field.d_min), np.full(count, field.d_safe))
+
+    def ages(self, now: int) -> dict[int, int]:
+        """Age (µs) of every neighbour's track."""
+        states = {system: track.at(now) for system, track in self._tracks.items()}
+        return {system: state.age for system, state in states.items() if state is not None}

@@ -1,0 +1,248 @@
+"""The companion computer: receive → world → plan → guard → set-point → bytes. No socket, no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.config import CompanionConfig
+from companion.errors import SolverError
+from companion.guard import Guard
+from companion.heading import Heading
+from companion.horizon import Array, Horizon, Motion
+from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
+from companion.planner import Aim, Plan, Planner
+from companion.setpoint import setpoint
+from companion.sharing import Sharing
+from companion.surface import circle
+from companion.world import View, World
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source
+from mavlink_bridge.node import Datagram
+
+COMPONENT = 195
+"""MAV_COMP_ID_PATHPLANNER."""
+DO_REPOSITION = 192
+ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
+_WANTED = {
+    "autopilot": {0, 1, 30, 32, 49, 77, 245, 253},
+    "swarm": {33, 385},
+    "target": {33},
+    "ground": {75, 76},
+}
+_ZERO = np.zeros(3)
+_ZERO.flags.writeable = False
+
+
+class Tally(NamedTuple):
+    """What a companion counted so far; ``plan_ns`` holds one stopwatch reading per plan."""
+
+    plans: int
+    relaxed: int
+    solver_failures: int
+    held: int
+    anchored_anew: int
+    plan_ns: tuple[int, ...]
+
+
+class Companion:
+    """One vehicle's companion, a ``Node``. Links: ``autopilot``, ``swarm``, ``target``, ``ground``.
+
+    ``stopwatch`` (ns) only measures how long planning takes; nothing depends on it.
+    """
+
+    def __init__(
+        self,
+        config: CompanionConfig,
+        system: int,
+        target_system: int,
+        fleet: FleetFrame,
+        stopwatch: Callable[[], int],
+    ) -> None:
+        self.config = config
+        self.name = f"companion-{system}"
+        self._source = Source(system, COMPONENT)
+        self._fleet = fleet
+        self._stopwatch = stopwatch
+        self.world = World(config, system, target_system, fleet)
+        self.planner = Planner(config)
+        self.guard = Guard(config)
+        self.pilot = Pilot(config, self._source, fleet.altitude)
+        self._sharing = Sharing(config, self._source, fleet)
+        self._codecs = {link: Codec(_filter(link, system, target_system)) for link in _WANTED}
+        self.plan: Plan | None = None
+        self._goal: Array | None = None
+        self._heading = Heading(config.heading, config.horizon)
+        self._boot: int | None = None
+        self._next_plan = self._next_setpoint = 0
+        self._plans = self._relaxed = 0
+        self._plan_ns: list[int] = []
+
+    @property
+    def tally(self) -> Tally:
+        """Counters for the summary."""
+        guard = self.guard
+        return Tally(
+            self._plans, self._relaxed, guard.failures, guard.held, guard.anchored_anew, tuple(self._plan_ns)
+        )
+
+    @property
+    def bad_frames(self) -> int:
+        """Frames that no link's codec could make sense of."""
+        return sum(codec.counters.bad for codec in self._codecs.values())
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Handle what arrived and do what is due at ``now`` (µs)."""
+        if self._boot is None:
+            self._boot = self._next_plan = self._next_setpoint = now
+        answers = self._receive(now, inbox)
+        view = self.world.at(now)
+        commands = self.pilot.step(now, view)
+        self._fly(now, view)
+        setpoints = self._setpoints(now, view)
+        shared = self._sharing.due(now, view, self.guard.horizon if self._airborne else None)
+        return self._encode(
+            autopilot=[*commands, *setpoints, *shared.autopilot], swarm=shared.swarm, ground=answers
+        )
+
+    @property
+    def _airborne(self) -> bool:
+        return self.pilot.phase is Phase.ESCORT or self.pilot.streaming
+
+    def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
+        answers: list[Message] = []
+        for link, data in inbox:
+            for message in self._codecs[link].feed(data):
+                if link == "ground":
+                    answers += self._obey(message)
+                    continue
+                if link == "autopilot":
+                    self.pilot.hear(message)
+                self.world.hear(now, link, message)
+        return answers
+
+    def _obey(self, message: Message) -> list[Message]:
+        """Operator's commands: NAV_TAKEOFF is the go, DO_REPOSITION the goal, NAV_LAND the end."""
+        if not isinstance(message, CommandInt | CommandLong):
+            return []
+        if (message.target_system, message.target_component) != self._source:
+            return []
+        if isinstance(message, CommandInt) and message.command == DO_REPOSITION:
+            self._goal = self._fleet.to_enu(message.x * 1e-7, message.y * 1e-7, message.z)
+            taken = True
+        elif isinstance(message, CommandLong) and message.command == NAV_TAKEOFF:
+            taken = self.pilot.go(message.params[6])
+        elif isinstance(message, CommandLong) and message.command == NAV_LAND:
+            taken = self.pilot.land()
+        else:
+            return [self._ack(message, UNSUPPORTED)]
+        return [self._ack(message, ACCEPTED if taken else DENIED)]
+
+    def _ack(self, message: CommandInt | CommandLong, result: int) -> CommandAck:
+        return CommandAck(self._source, message.command, result, 0, 0, *message.source)
+
+    def _fly(self, now: int, view: View) -> None:
+        """Plan when due; start from the measured state each time the vehicle becomes ours."""
+        if not self._airborne or view.own is None or view.local is None:
+            self.guard.horizon = None
+            return
+        measured = Motion(view.own.position, view.own.velocity, _ZERO)
+        if self.guard.horizon is None:
+            self._heading.reset(0.0 if view.yaw is None else view.yaw)
+            self._goal = view.own.position if self._goal is None else self._goal
+            self.guard.start(now, measured)
+        if now < self._next_plan:
+            return
+        self._next_plan += self.config.rates.replan_us * (
+            1 + (now - self._next_plan) // self.config.rates.replan_us
+        )
+        if view.own.age > self.config.guard.own_stale_us:
+            self.guard.hold(now, solver=False)
+            return
+        self._plan(now, view, measured)
+
+    def _plan(self, now: int, view: View, measured: Motion) -> None:
+        aim = self._aim(now, view, measured)
+        if aim is None:
+            self.guard.hold(now, solver=False)
+            return
+        horizon, config = self.guard.horizon, self.config.horizon
+        state = self.guard.anchor(now, measured)
+        started = self._stopwatch()
+        try:
+            obstacles = self.world.obstacles(now, view)
+            prediction = (
+                np.broadcast_to(state.position, (config.steps + 1, 3))
+                if horizon is None
+                else horizon.positions(now, config.steps + 1, config.dt_us)
+            )
+            self.plan = self.planner.plan(now, state.position, state.velocity, prediction, aim, obstacles)
+        except SolverError:
+            self.guard.hold(now, solver=True)
+            return
+        finally:
+            self._plan_ns.append(self._stopwatch() - started)
+        self._plans += 1
+        self._relaxed += self.plan.relaxed
+        self.guard.accept(now, self.plan.horizon)
+        self._face(now, view, self.plan.horizon)
+
+    def _face(self, now: int, view: View, horizon: Horizon) -> None:
+        """Plan the yaw along the horizon; a companion that plans nothing keeps its yaw."""
+        if view.target is None:
+            return
+        ahead = 1e-6 * horizon.dt * np.arange(1, len(horizon.knots))
+        targets = view.target.position + ahead[:, None] * view.target.velocity
+        self._heading.plan(now, horizon.knots[1:, 0:3], targets)
+
+    def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:
+        """Where to: the own goal, or the surface around the target where it will be at the end of the horizon."""
+        config, target = self.config, view.target
+        stale = target is None or target.age > config.guard.target_stale_us
+        if config.task == "goto":
+            goal = measured.position if self._goal is None else self._goal
+            return Aim(goal, _ZERO, goal if target is None else target.position)
+        if target is None or stale:
+            return None
+        ahead = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
+        at_end = target.position + ahead * target.velocity
+        destination = circle(at_end, measured.position, config.surface.radius, config.surface.height)
+        return Aim(destination, target.velocity, target.position)
+
+    def _setpoints(self, now: int, view: View) -> list[Message]:
+        if now < self._next_setpoint:
+            return []
+        period = self.config.rates.setpoint_us
+        self._next_setpoint += period * (1 + (now - self._next_setpoint) // period)
+        horizon, profile = self.guard.horizon, self.pilot.profile
+        if not self.pilot.streaming or horizon is None or profile is None or view.local is None:
+            return []
+        time = now + self.config.setpoint_lead_us
+        since_boot = now - (now if self._boot is None else self._boot)
+        yaw = self._heading.at(time)
+        return [
+            setpoint(time, since_boot, horizon, yaw, view.local, self._source, profile.setpoint_mask)
+        ]
+
+    def _encode(self, **links: list[Message]) -> list[Datagram]:
+        out = []
+        for link, messages in links.items():
+            if messages:
+                codec = self._codecs[link]
+                out.append(Datagram(link, b"".join(codec.encode(message) for message in messages)))
+        return out
+
+
+def _filter(link: str, system: int, target: int) -> Callable[[int, int, int], bool]:
+    """Header filter of a link: the messages wanted there, from whom they may come."""
+    wanted = _WANTED[link]
+    if link == "autopilot":
+        return lambda identifier, sender, _component: identifier in wanted and sender == system
+    if link == "target":
+        return lambda identifier, sender, _component: identifier in wanted and sender == target
+    if link == "swarm":
+        return lambda identifier, sender, _component: identifier in wanted and sender != system
+    return lambda identifier, _sender, _component: identifier in wanted

@@ -1,0 +1,205 @@
+"""The way into the air and back: connect → arm → take-off → escort → land, by MAVLink commands, each until acknowledged.
+
+Nothing starts without an operator's go (a NAV_TAKEOFF addressed to the companion), and while the autopilot is not in the
+mode in which our set-points steer, none are sent.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from companion.autopilots import Profile, Step, is_guided
+from companion.autopilots.ardupilot import ARDUPILOT
+from companion.autopilots.px4 import PX4
+from companion.config import CompanionConfig
+from companion.world import View
+from mavlink_bridge.messages import (
+    CommandAck,
+    CommandLong,
+    Heartbeat,
+    Message,
+    Source,
+    SysStatus,
+)
+
+DO_SET_MODE, ARM_DISARM, NAV_TAKEOFF, NAV_LAND = 176, 400, 22, 21
+REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
+ACCEPTED, IN_PROGRESS = 0, 5
+ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
+_RETRY = 500_000
+_NAN = float("nan")
+_NEEDED = {32: 20_000, 30: 20_000, 1: 1_000_000, 245: 500_000}
+"""Message id → interval (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS, EXTENDED_SYS_STATE."""
+
+_Call = tuple[int, tuple[float, ...]]
+
+
+class Phase(Enum):
+    """Where the flight is."""
+
+    CONNECT = "connect"
+    PREPARE = "prepare"
+    ESCORT = "escort"
+    LAND = "land"
+    DONE = "done"
+
+
+class Pilot:
+    """One vehicle's flight, as a state machine over what has been heard. It sends commands, never set-points.
+
+    ``origin_altitude``: of the fleet frame's zero, m above mean sea level.
+    """
+
+    def __init__(self, config: CompanionConfig, own: Source, origin_altitude: float) -> None:
+        self._config = config
+        self._own = own
+        self._origin_altitude = origin_altitude
+        self.phase = Phase.CONNECT
+        self.profile: Profile | None = None
+        self.waiting_for = "a heartbeat of the autopilot"
+        self.refusals: list[str] = []
+        self._heartbeat: Heartbeat | None = None
+        self._status: SysStatus | None = None
+        self._height: float | None = None
+        self._ground = 0.0
+        self._step = 0
+        self._acknowledged: set[_Call] = set()
+        self._sent: dict[_Call, int] = {}
+
+    @property
+    def guided(self) -> bool:
+        """Whether the autopilot follows our set-points now."""
+        return (
+            self.profile is not None
+            and self._heartbeat is not None
+            and bool(self._heartbeat.base_mode & ARMED)
+            and is_guided(self.profile, self._heartbeat)
+        )
+
+    @property
+    def streaming(self) -> bool:
+        """Whether set-points are to be sent."""
+        if self.phase is Phase.ESCORT:
+            return self.guided
+        return (
+            self.phase is Phase.PREPARE
+            and self.profile is not None
+            and self.profile.streams_first
+            and self.profile.steps[self._step] is Step.MODE
+        )
+
+    def hear(self, message: Message) -> None:
+        """A message of the own autopilot."""
+        if isinstance(message, Heartbeat):
+            if message.autopilot != INVALID:
+                self._heartbeat = message
+                self.profile = {p.autopilot: p for p in (ARDUPILOT, PX4)}.get(message.autopilot)
+        elif isinstance(message, SysStatus):
+            self._status = message
+        elif isinstance(message, CommandAck):
+            for call in self._sent:
+                if call[0] == message.command:
+                    if message.result in (ACCEPTED, IN_PROGRESS):
+                        self._acknowledged.add(call)
+                    else:
+                        self.refusals.append(f"command {message.command}: result {message.result}")
+
+    def go(self, height: float) -> bool:
+        """The operator's go: climb to ``height`` metres above the start. Whether it is taken."""
+        if self.phase not in (Phase.CONNECT, Phase.PREPARE) or not 0.5 <= height <= 120.0:
+            return self.phase is Phase.ESCORT
+        self._height = height
+        return True
+
+    def land(self) -> bool:
+        """The operator's order to land where the vehicle is."""
+        if self.phase is Phase.CONNECT:
+            return False
+        if self.phase is not Phase.DONE:
+            self.phase = Phase.LAND
+        return True
+
+    def step(self, now: int, view: View) -> list[Message]:
+        """Commands to send now."""
+        if self.phase is Phase.CONNECT:
+            return self._connect(now, view)
+        if self.phase is Phase.PREPARE:
+            return self._prepare(now, view)
+        if self.phase is Phase.LAND:
+            if self._heartbeat is not None and not self._heartbeat.base_mode & ARMED:
+                self.phase = Phase.DONE
+                return []
+            return self._call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
+        return []
+
+    def _connect(self, now: int, view: View) -> list[Message]:
+        calls: list[Message] = []
+        self.waiting_for = self._missing(view)
+        if self._heartbeat is not None:
+            for identifier, interval in _NEEDED.items():
+                calls += self._call(
+                    now, SET_MESSAGE_INTERVAL, (identifier, interval, 0.0, 0.0, 0.0, 0.0, 0.0)
+                )
+            if view.local is None:
+                calls += self._call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        if not self.waiting_for and view.own is not None and view.local is not None:
+            self._ground = float(view.own.position[2])
+            self.phase = Phase.PREPARE
+        return calls
+
+    def _missing(self, view: View) -> str:
+        if self._heartbeat is None:
+            return "a heartbeat of the autopilot"
+        if self.profile is None:
+            return f"an autopilot that is known (ArduPilot 3, PX4 12; this is {self._heartbeat.autopilot})"
+        if view.local is None:
+            return "GPS_GLOBAL_ORIGIN"
+        if view.own is None or view.own.age > self._config.guard.own_stale_us:
+            return "LOCAL_POSITION_NED"
+        if view.yaw is None:
+            return "ATTITUDE"
+        if self._status is None or not self._status.health & PREARM_OK:
+            return "the autopilot's pre-arm checks"
+        if self._height is None:
+            return "the operator's go"
+        return ""
+
+    def _prepare(self, now: int, view: View) -> list[Message]:
+        profile, beat, height = self.profile, self._heartbeat, self._height
+        if profile is None or beat is None or height is None or view.own is None:
+            return []
+        if self._step >= len(profile.steps):
+            self.phase = Phase.ESCORT
+            return []
+        step = profile.steps[self._step]
+        if step is Step.MODE:
+            done = is_guided(profile, beat)
+            call = self._call(now, DO_SET_MODE, (*profile.mode_params, 0.0, 0.0, 0.0, 0.0))
+        elif step is Step.ARM:
+            done = bool(beat.base_mode & ARMED)
+            call = self._call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        else:
+            climbed = float(view.own.position[2]) - self._ground
+            done = abs(climbed - height) < 0.3 and float(abs(view.own.velocity).max()) < 0.3
+            above_sea = self._origin_altitude + self._ground + height
+            altitude = above_sea if profile.takeoff_absolute else height
+            call = self._call(now, NAV_TAKEOFF, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude))
+        if done:
+            self._step += 1
+            self._forget()
+            return []
+        self.waiting_for = step.value
+        return call
+
+    def _forget(self) -> None:
+        self._sent.clear()
+        self._acknowledged.clear()
+
+    def _call(self, now: int, command: int, params: tuple[float, ...]) -> list[Message]:
+        """The command, unless it was acknowledged or sent less than half a second ago."""
+        key = (command, tuple(p for p in params if p == p))
+        if key in self._acknowledged or now - self._sent.get(key, -_RETRY) < _RETRY:
+            return []
+        self._sent[key] = now
+        p1, p2, p3, p4, p5, p6, p7 = params
+        return [CommandLong(self._own, self._own.system, 1, command, 0, (p1, p2, p3, p4, p5, p6, p7))]

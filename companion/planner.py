@@ -1,0 +1,92 @@
+"""Destination → forces → QP → plan: Algorithm 1 of the paper, on one screen."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.config import CompanionConfig
+from companion.dqmpc import Dqmpc, Problem
+from companion.forces import Obstacles, limit, repulsion
+from companion.horizon import Array, Horizon, roll_out
+from companion.methods import Influence, Method, Scene
+from companion.methods.tangential import Tangential
+
+
+class Aim(NamedTuple):
+    """Where to: destination x̌ (3,), terminal velocity (3,), and the target to face (3,); fleet-local ENU."""
+
+    destination: Array
+    velocity: Array
+    target: Array
+
+
+class Plan(NamedTuple):
+    """A solved plan, with what it was made from. ``gradient`` is ∇J (3,), normalised by Ω_t."""
+
+    horizon: Horizon
+    aim: Aim
+    force: Array
+    gradient: Array
+    omega_scale: float
+    relaxed: int
+    problem: Problem
+
+
+class Planner:
+    """Plans for one vehicle; remembers its gradient and what its methods latch."""
+
+    def __init__(self, config: CompanionConfig) -> None:
+        self.config = config
+        self.dqmpc = Dqmpc(config.horizon, config.cost, config.limits)
+        self._methods = build(config)
+        self._gradient: Array = np.zeros(3)
+
+    def plan(self, now: int, position: Array, velocity: Array, prediction: Array, aim: Aim, obstacles: Obstacles) -> Plan:
+        """One plan from the state at ``now`` (µs). ``prediction`` (N + 1, 3): the previous plan at n = 0…N.
+
+        SolverError when there is no solution: the caller holds what it has.
+        """
+        scene = Scene(
+            position, velocity, prediction, aim.destination, aim.velocity, aim.target, obstacles, self._gradient
+        )
+        influence = self._influence(scene)
+        problem = self.dqmpc.problem(
+            position, velocity, influence.force, aim.destination, aim.velocity, influence.omega_scale
+        )
+        solution = self.dqmpc.solve(problem, influence.omega_scale)
+        horizon = roll_out(now, self.config.horizon.dt_us, position, velocity, solution.acceleration)
+        end = horizon.knots[-1]
+        self._gradient = self.dqmpc.gradient(
+            solution.acceleration, end[0:3], end[3:6], aim.destination, aim.velocity
+        )
+        return Plan(
+            horizon, aim, influence.force, self._gradient, influence.omega_scale, solution.relaxed, problem
+        )
+
+    def _influence(self, scene: Scene) -> Influence:
+        config = self.config
+        a_total = config.limits.a_total
+        field = repulsion(
+            scene.prediction, scene.obstacles, config.field.gain, a_total, config.field.braking, self.dqmpc.dt
+        )
+        influence = Influence(field, 1.0)
+        for method in self._methods:
+            influence = method.influence(scene, influence)
+        force = influence.force
+        if config.planar:
+            force = force * _FLAT
+        return influence._replace(force=limit(force, a_total))
+
+
+_FLAT = np.array([1.0, 1.0, 0.0])
+
+
+def build(config: CompanionConfig) -> list[Method]:
+    """The strategies that the configuration names, in its order; ``baseline`` adds nothing."""
+    methods: list[Method] = []
+    for name in config.methods:
+        if name == "tangential":
+            methods.append(Tangential(config.tangential, max(config.limits.u_max), config.horizon.dt_us * 1e-6))
+    return methods

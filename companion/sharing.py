@@ -1,0 +1,95 @@
+"""What the others need to know: own GLOBAL_POSITION_INT and horizon on the swarm link, a heartbeat on both links.
+
+The position is always sent besides the horizon: any MAVLink listener understands it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from companion.config import CompanionConfig
+from companion.horizon import Horizon
+from companion.world import View
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.frames import FleetFrame, enu_to_ned, yaw_to_ned
+from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, Source, Tunnel
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
+
+ONBOARD_CONTROLLER, AUTOPILOT_INVALID, ACTIVE = 18, 8, 4
+_SECOND = 1_000_000
+
+
+class Shared(NamedTuple):
+    """Messages by link."""
+
+    autopilot: list[Message]
+    swarm: list[Message]
+
+
+class Sharing:
+    """Sends each kind at its own period, on its own schedule."""
+
+    def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
+        self._config = config
+        self._own = own
+        self._fleet = fleet
+        self._boot: int | None = None
+        self._next = [0, 0, 0]
+
+    def due(self, now: int, view: View, horizon: Horizon | None) -> Shared:
+        """What is due at ``now`` (µs). Without a flown ``horizon`` none is shared."""
+        if self._boot is None:
+            self._boot = now
+            self._next = [now, now, now]
+        rates = self._config.rates
+        shared = Shared([], [])
+        if self._passes(0, now, _SECOND):
+            beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+            shared.autopilot.append(beat)
+            shared.swarm.append(beat)
+        if self._passes(1, now, rates.state_us) and view.own is not None:
+            shared.swarm.append(self._position(now - self._boot, view))
+        if self._passes(2, now, rates.plan_us) and horizon is not None:
+            plan = self._plan(horizon)
+            if plan is not None:
+                shared.swarm.append(plan)
+        return shared
+
+    def _passes(self, kind: int, now: int, period: int) -> bool:
+        if now < self._next[kind]:
+            return False
+        self._next[kind] += period * (1 + (now - self._next[kind]) // period)
+        return True
+
+    def _position(self, since_boot: int, view: View) -> GlobalPosition:
+        if view.own is None:
+            raise ValueError("no own state to share")
+        latitude, longitude, altitude = self._fleet.to_geodetic(view.own.position)
+        north, east, down = enu_to_ned(view.own.velocity)
+        yaw = None if view.yaw is None else yaw_to_ned(view.yaw)
+        return GlobalPosition(
+            self._own,
+            since_boot,
+            latitude,
+            longitude,
+            altitude,
+            float(view.own.position[2]),
+            (float(north), float(east), float(down)),
+            yaw,
+        )
+
+    def _plan(self, horizon: Horizon) -> Tunnel | None:
+        """None for a horizon that does not fit the wire: neighbours then see the position alone."""
+        knots = horizon.knots
+        try:
+            plan = quantise(
+                horizon.epoch,
+                horizon.dt,
+                knots[0, 0:3],
+                knots[0, 3:6],
+                knots[:-1, 6:9],
+                self._fleet.fingerprint,
+            )
+        except PlanWireError:
+            return None
+        return Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan))

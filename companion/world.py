@@ -1,0 +1,108 @@
+"""The world picture, from MAVLink alone: own vehicle, neighbours, target, each with its age, in the fleet frame."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.config import CompanionConfig
+from companion.forces import Obstacles
+from companion.horizon import Array
+from companion.neighbours import Neighbours
+from companion.tracks import State, Track
+from mavlink_bridge.frames import FleetFrame, LocalFrame, ned_to_enu
+from mavlink_bridge.messages import (
+    Attitude,
+    GlobalPosition,
+    GpsGlobalOrigin,
+    LocalPosition,
+    Message,
+    Tunnel,
+)
+
+
+class View(NamedTuple):
+    """The picture at one time: fleet-local ENU, SI; None where nothing has been heard yet.
+
+    ``yaw`` is ENU (counter-clockwise from east).
+    """
+
+    own: State | None
+    yaw: float | None
+    target: State | None
+    local: LocalFrame | None
+
+
+class World:
+    """Gathers messages by link; answers with a view at any later time."""
+
+    def __init__(self, config: CompanionConfig, system: int, target_system: int, fleet: FleetFrame) -> None:
+        self.config = config
+        self.fleet = fleet
+        self.neighbours = Neighbours(config, system, fleet)
+        self._system = system
+        self._target_system = target_system
+        self._own = Track(config.own)
+        self._target = Track(config.target)
+        self._local: LocalFrame | None = None
+        self._origin: tuple[float, float, float] | None = None
+        self._yaw: float | None = None
+
+    def hear(self, now: int, link: str, message: Message) -> None:
+        """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
+        if link == "autopilot":
+            if message.source.system == self._system:
+                self._hear_own(now, message)
+        elif link == "swarm":
+            if isinstance(message, GlobalPosition):
+                self.neighbours.hear_position(now, message)
+            elif isinstance(message, Tunnel):
+                self.neighbours.hear_plan(now, message)
+        elif link == "target" and isinstance(message, GlobalPosition):
+            self._hear_target(now, message)
+
+    def at(self, now: int) -> View:
+        """The view at ``now`` (µs)."""
+        return View(self._own.at(now), self._yaw, self._target.at(now), self._local)
+
+    def obstacles(self, now: int, view: View) -> Obstacles:
+        """Neighbours, and the target where it is one, aligned with ``now + n·dt``."""
+        obstacles = self.neighbours.obstacles(now)
+        config = self.config
+        if view.target is None or config.target_d_min is None or config.target_d_safe is None:
+            return obstacles
+        ahead = 1e-6 * config.horizon.dt_us * np.arange(config.horizon.steps + 1)
+        moving = view.target.position + ahead[:, None] * view.target.velocity
+        return Obstacles(
+            (*obstacles.ids, self._target_system),
+            np.concatenate([obstacles.positions, moving[None]]),
+            np.append(obstacles.d_min, config.target_d_min),
+            np.append(obstacles.d_safe, config.target_d_safe),
+        )
+
+    def _hear_own(self, now: int, message: Message) -> None:
+        if isinstance(message, LocalPosition):
+            if self._local is not None:
+                self._own.measure(
+                    now,
+                    self._local.position_to_fleet(message.position_ned),
+                    self._local.velocity_to_fleet(message.velocity_ned),
+                )
+        elif isinstance(message, Attitude):
+            if self._local is not None:
+                self._yaw = self._local.yaw_to_fleet(message.yaw)
+        elif isinstance(message, GpsGlobalOrigin):
+            origin = (message.latitude, message.longitude, message.altitude)
+            if origin != self._origin:
+                self._origin = origin
+                self._local = self.fleet.local(*origin)
+
+    def _hear_target(self, now: int, message: GlobalPosition) -> None:
+        if message.source.system != self._target_system:
+            return
+        position = self.fleet.to_enu(message.latitude, message.longitude, message.altitude)
+        velocity: Array = ned_to_enu(message.velocity_ned)
+        if self.config.target.velocity_up:
+            velocity[2] = -velocity[2]
+        self._target.measure(now, position, velocity)

@@ -1,0 +1,121 @@
+"""Bytes to messages and back, without I/O. Bytes from outside never raise; what is dropped is counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from mavlink_bridge.converters import BY_ID, BY_TYPE, Converter
+from mavlink_bridge.errors import EncodeError
+from mavlink_bridge.fields import TEXT_LENGTH, text_chunks
+from mavlink_bridge.framing import Framer, frame_v1, frame_v2
+from mavlink_bridge.messages import Message, Source, StatusText
+
+Accept = Callable[[int, int, int], bool]
+
+
+class Counters(NamedTuple):
+    """What became of the bytes fed so far.
+
+    ``good``: frames that became messages; ``filtered``: sound frames that nobody asked for, or of a message
+    not in the table;
+    ``bad``: false starts, broken checksums, values that make no sense; ``unknown``: message ids that the
+    dialect lacks;
+    ``skipped_bytes``: bytes that belong to no frame.
+    """
+
+    good: int
+    bad: int
+    unknown: int
+    filtered: int
+    skipped_bytes: int
+
+
+class Codec:
+    """One direction each of one link. ``accept(message_id, system, component)`` is asked after the checksum
+    and before the payload is decoded; None accepts everything. Signatures are carried over, not checked."""
+
+    def __init__(self, accept: Accept | None = None) -> None:
+        self._accept = accept
+        self._framer = Framer()
+        self._good = 0
+        self._bad = 0
+        self._filtered = 0
+        self._sequences: dict[Source, int] = {}
+
+    @property
+    def counters(self) -> Counters:
+        """The counts of everything fed so far."""
+        framer = self._framer
+        return Counters(
+            self._good, self._bad + framer.bad, framer.unknown, self._filtered, framer.skipped_bytes
+        )
+
+    @property
+    def pending_bytes(self) -> int:
+        """Bytes of a frame that is not complete yet (at most 280)."""
+        return self._framer.pending_bytes
+
+    def feed(self, data: bytes) -> list[Message]:
+        """The messages that ``data`` completes, in order; a partial frame waits. Never raises.
+
+        A NaN or infinity drops a state message (counted as bad) and is kept in what is commanded or echoed,
+        where it may mean *ignored*: CommandInt, CommandLong, SetpointLocal, PositionTarget.
+        """
+        accept = self._accept
+        found: list[Message] = []
+        for frame in self._framer.feed(data):
+            row = BY_ID.get(frame.message_id)
+            if row is None or (
+                accept is not None and not accept(frame.message_id, frame.system, frame.component)
+            ):
+                self._filtered += 1
+                continue
+            message = row.parse(Source(frame.system, frame.component), frame.payload)
+            if message is None:
+                self._bad += 1
+            else:
+                found.append(message)
+        self._good += len(found)
+        return found
+
+    def encode(self, message: Message) -> bytes:
+        """MAVLink 2 frames from ``message.source``: one, or several for a StatusText above 50 characters.
+
+        Raises EncodeError, naming field and value, for what does not fit or is not finite in a state message.
+        """
+        row = BY_TYPE[type(message)]
+        if isinstance(message, StatusText) and len(message.text) > TEXT_LENGTH:
+            return self._encode_long(row, message)
+        payload = row.pack(message)
+        return frame_v2(row.id, row.crc_extra, message.source, self._next(message.source), payload)
+
+    def encode_v1(self, message: Message) -> bytes:
+        """As ``encode``, in MAVLink 1: without extension fields; a StatusText is cut at 50 characters.
+
+        Raises EncodeError also for message ids above 255.
+        """
+        row = BY_TYPE[type(message)]
+        if row.id > 255:
+            raise EncodeError(f"{row.name}: message id = {row.id} does not exist in MAVLink 1")
+        payload = row.pack(message)[: row.size_v1]
+        return frame_v1(row.id, row.crc_extra, message.source, self._next(message.source), payload)
+
+    def _encode_long(self, row: Converter, message: StatusText) -> bytes:
+        # STATUSTEXT.id ties the pieces together; zero would say that there is only one.
+        text_id = self._sequences.get(message.source, 0) + 1
+        pieces = [
+            row.struct.pack(message.severity, piece, text_id, number)
+            for number, piece in enumerate(text_chunks(message.text))
+        ]
+        return b"".join(
+            frame_v2(row.id, row.crc_extra, message.source, self._next(message.source), piece)
+            for piece in pieces
+        )
+
+    def _next(self, source: Source) -> int:
+        if not (0 <= source[0] <= 255 and 0 <= source[1] <= 255):
+            raise EncodeError(f"source = {tuple(source)} is outside 0…255")
+        sequence = self._sequences.get(source, 0)
+        self._sequences[source] = (sequence + 1) & 0xFF
+        return sequence

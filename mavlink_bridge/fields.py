@@ -1,0 +1,277 @@
+"""What the fields of each message mean: tuples in MAVLink's wire order ↔ the SI values of ``messages``.
+
+degE7 ↔ degrees (float64), mm, cm/s, mV, % ↔ m, m/s, V, 0…1; cdeg ↔ rad; ms ↔ µs (the rest is lost); markers
+of *unknown* ↔ None. ``name(source, fields)`` decodes, None if the fields are absurd; ``name_fields(message)``
+encodes, or raises EncodeError. A longer module as it is a list, two short functions a message.
+"""
+
+from __future__ import annotations
+
+from math import degrees, radians, remainder, tau
+from typing import Any
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.errors import EncodeError
+
+Fields = tuple[Any, ...]
+
+UNKNOWN_U16 = 0xFFFF
+FULL_CIRCLE_CDEG = 36000
+TEXT_LENGTH = 50
+TUNNEL_LENGTH = 128
+
+
+def _degrees_e7(name: str, value: float, limit: int) -> int:
+    if abs(value) > limit:
+        raise EncodeError(f"{name} = {value} is outside ±{limit}°")
+    return round(value * 1e7)
+
+
+def heartbeat(s: m.Source, f: Fields) -> m.Heartbeat:
+    custom_mode, kind, autopilot, base_mode, status, _ = f
+    return m.Heartbeat(s, kind, autopilot, base_mode, custom_mode, status)
+
+
+def heartbeat_fields(x: m.Heartbeat) -> Fields:
+    return x.custom_mode, x.type, x.autopilot, x.base_mode, x.system_status, 3
+
+
+def sys_status(s: m.Source, f: Fields) -> m.SysStatus:
+    voltage, remaining = f[4], f[12]
+    return m.SysStatus(
+        s,
+        f[0],
+        f[1],
+        f[2],
+        None if voltage == UNKNOWN_U16 else voltage / 1e3,
+        remaining / 100 if 0 <= remaining <= 100 else None,
+    )
+
+
+def sys_status_fields(x: m.SysStatus) -> Fields:
+    voltage, remaining = UNKNOWN_U16, -1
+    if x.battery_voltage is not None:
+        voltage = round(x.battery_voltage * 1e3)
+        if voltage == UNKNOWN_U16:
+            raise EncodeError(f"SYS_STATUS: battery_voltage = {x.battery_voltage} V would read as unknown")
+    if x.battery_remaining is not None:
+        remaining = round(x.battery_remaining * 100)
+        if not 0 <= remaining <= 100:
+            raise EncodeError(f"SYS_STATUS: battery_remaining = {x.battery_remaining} is outside 0…1")
+    return x.present, x.enabled, x.health, 0, voltage, -1, 0, 0, 0, 0, 0, 0, remaining, 0, 0, 0
+
+
+def system_time(s: m.Source, f: Fields) -> m.SystemTime:
+    return m.SystemTime(s, f[0], f[1] * 1000)
+
+
+def system_time_fields(x: m.SystemTime) -> Fields:
+    return x.unix_time, x.time_boot // 1000
+
+
+def ping(s: m.Source, f: Fields) -> m.Ping:
+    return m.Ping(s, *f)
+
+
+def unchanged(x: Any) -> Fields:
+    return tuple(x[1:])
+
+
+def attitude(s: m.Source, f: Fields) -> m.Attitude:
+    time, roll, pitch, yaw, p, q, r = f
+    return m.Attitude(s, time * 1000, roll, pitch, yaw, (p, q, r))
+
+
+def attitude_fields(x: m.Attitude) -> Fields:
+    return x.time_boot // 1000, x.roll, x.pitch, x.yaw, *x.body_rates
+
+
+def local_position(s: m.Source, f: Fields) -> m.LocalPosition:
+    time, x, y, z, vx, vy, vz = f
+    return m.LocalPosition(s, time * 1000, (x, y, z), (vx, vy, vz))
+
+
+def local_position_fields(x: m.LocalPosition) -> Fields:
+    return x.time_boot // 1000, *x.position_ned, *x.velocity_ned
+
+
+def _on_globe(latitude_e7: int, longitude_e7: int) -> bool:
+    return abs(latitude_e7) <= 900_000_000 and abs(longitude_e7) <= 1_800_000_000
+
+
+def global_position(s: m.Source, f: Fields) -> m.GlobalPosition | None:
+    time, latitude, longitude, altitude, relative, vx, vy, vz, heading = f
+    if not _on_globe(latitude, longitude):
+        return None
+    return m.GlobalPosition(
+        s,
+        time * 1000,
+        latitude / 1e7,
+        longitude / 1e7,
+        altitude / 1e3,
+        relative / 1e3,
+        (vx / 1e2, vy / 1e2, vz / 1e2),
+        remainder(radians(heading / 100), tau) if heading <= FULL_CIRCLE_CDEG else None,
+    )
+
+
+def global_position_fields(x: m.GlobalPosition) -> Fields:
+    vx, vy, vz = x.velocity_ned
+    return (
+        x.time_boot // 1000,
+        _degrees_e7("latitude", x.latitude, 90),
+        _degrees_e7("longitude", x.longitude, 180),
+        round(x.altitude * 1e3),
+        round(x.relative_altitude * 1e3),
+        round(vx * 1e2),
+        round(vy * 1e2),
+        round(vz * 1e2),
+        UNKNOWN_U16 if x.yaw is None else round(degrees(x.yaw) * 100) % FULL_CIRCLE_CDEG,
+    )
+
+
+def origin(s: m.Source, f: Fields) -> m.GpsGlobalOrigin | None:
+    latitude, longitude, altitude, time = f
+    if not _on_globe(latitude, longitude):
+        return None
+    return m.GpsGlobalOrigin(s, latitude / 1e7, longitude / 1e7, altitude / 1e3, time)
+
+
+def origin_fields(x: m.GpsGlobalOrigin) -> Fields:
+    return (
+        _degrees_e7("latitude", x.latitude, 90),
+        _degrees_e7("longitude", x.longitude, 180),
+        round(x.altitude * 1e3),
+        x.time,
+    )
+
+
+def command_int(s: m.Source, f: Fields) -> m.CommandInt:
+    p1, p2, p3, p4, x, y, z, command, system, component, frame, _, _ = f
+    return m.CommandInt(s, system, component, frame, command, (p1, p2, p3, p4), x, y, z)
+
+
+def command_int_fields(x: m.CommandInt) -> Fields:
+    return (
+        *x.params,
+        x.x,
+        x.y,
+        x.z,
+        x.command,
+        x.target_system,
+        x.target_component,
+        x.frame,
+        0,
+        0,
+    )
+
+
+def command_long(s: m.Source, f: Fields) -> m.CommandLong:
+    return m.CommandLong(s, f[8], f[9], f[7], f[10], f[:7])
+
+
+def command_long_fields(x: m.CommandLong) -> Fields:
+    return *x.params, x.command, x.target_system, x.target_component, x.confirmation
+
+
+def command_ack(s: m.Source, f: Fields) -> m.CommandAck:
+    return m.CommandAck(s, *f)
+
+
+def setpoint(s: m.Source, f: Fields) -> m.SetpointLocal:
+    time, x, y, z, vx, vy, vz, ax, ay, az, yaw, yaw_rate, mask, system, component, frame = f
+    return m.SetpointLocal(
+        s,
+        time * 1000,
+        system,
+        component,
+        frame,
+        mask,
+        (x, y, z),
+        (vx, vy, vz),
+        (ax, ay, az),
+        yaw,
+        yaw_rate,
+    )
+
+
+def setpoint_fields(x: m.SetpointLocal) -> Fields:
+    return (
+        x.time_boot // 1000,
+        *x.position,
+        *x.velocity,
+        *x.acceleration,
+        x.yaw,
+        x.yaw_rate,
+        x.type_mask,
+        x.target_system,
+        x.target_component,
+        x.frame,
+    )
+
+
+def position_target(s: m.Source, f: Fields) -> m.PositionTarget:
+    time, x, y, z, vx, vy, vz, ax, ay, az, yaw, yaw_rate, mask, frame = f
+    return m.PositionTarget(s, time * 1000, frame, mask, (x, y, z), (vx, vy, vz), (ax, ay, az), yaw, yaw_rate)
+
+
+def position_target_fields(x: m.PositionTarget) -> Fields:
+    return (
+        x.time_boot // 1000,
+        *x.position,
+        *x.velocity,
+        *x.acceleration,
+        x.yaw,
+        x.yaw_rate,
+        x.type_mask,
+        x.frame,
+    )
+
+
+def timesync(s: m.Source, f: Fields) -> m.Timesync:
+    return m.Timesync(s, *f)
+
+
+def ekf_status(s: m.Source, f: Fields) -> m.EkfStatus:
+    return m.EkfStatus(s, f[5])
+
+
+def ekf_status_fields(x: m.EkfStatus) -> Fields:
+    return 0.0, 0.0, 0.0, 0.0, 0.0, x.flags, 0.0
+
+
+def extended_sys_state(s: m.Source, f: Fields) -> m.ExtendedSysState:
+    return m.ExtendedSysState(s, *f)
+
+
+def status_text(s: m.Source, f: Fields) -> m.StatusText:
+    return m.StatusText(s, f[0], f[1].split(b"\0", 1)[0].decode("utf-8", errors="replace"))
+
+
+def status_text_fields(x: m.StatusText) -> Fields:
+    return x.severity, text_bytes(x.text)[:TEXT_LENGTH], 0, 0
+
+
+def text_bytes(text: str) -> bytes:
+    """ASCII, with a question mark for any other character; no NUL, which would end the text."""
+    return text.replace("\0", " ").encode("ascii", errors="replace")
+
+
+def text_chunks(text: str) -> list[bytes]:
+    """Pieces of at most 50 bytes. The last one is shorter, as its NUL tells the receiver that the text is
+    complete; at most 255 pieces, since the number of a piece is one byte."""
+    data = text_bytes(text)[: TEXT_LENGTH * 255 - 1]
+    return [data[at : at + TEXT_LENGTH] for at in range(0, len(data) + 1, TEXT_LENGTH)]
+
+
+def tunnel(s: m.Source, f: Fields) -> m.Tunnel | None:
+    payload_type, system, component, length, payload = f
+    if length > TUNNEL_LENGTH:
+        return None
+    return m.Tunnel(s, system, component, payload_type, payload[:length])
+
+
+def tunnel_fields(x: m.Tunnel) -> Fields:
+    if len(x.payload) > TUNNEL_LENGTH:
+        raise EncodeError(f"TUNNEL: payload of {len(x.payload)} bytes is longer than {TUNNEL_LENGTH}")
+    return x.payload_type, x.target_system, x.target_component, len(x.payload), bytes(x.payload)

@@ -1,0 +1,183 @@
+"""Where MAVLink frames begin and end in a stream of bytes, and whether their checksum holds.
+
+Source: the MAVLink serialisation guide. Version 1 is ``FE len seq sys comp id payload crc``; version 2 is
+``FD len incompat compat seq sys comp id(3) payload crc [signature(13)]``, with trailing zeros of the payload
+left out. The checksum is CRC-16/MCRF4XX over all that follows the start byte, and the message's CRC_EXTRA.
+"""
+
+from __future__ import annotations
+
+import re
+from enum import Enum
+from struct import Struct
+from typing import NamedTuple
+
+from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+START_V1, START_V2 = 0xFE, 0xFD
+LONGEST_FRAME = 280  # version 2: 10 header, 255 payload, 2 checksum, 13 signature
+SIGNATURE_LENGTH = 13
+SIGNED_FLAG = 0x01
+
+STARTS = re.compile(b"[\xfd\xfe]")
+_HEADER_V1 = Struct("<6B")
+_HEADER_V2 = Struct("<7BHB")
+_CRC_EXTRA: dict[int, bytes] = {
+    number: bytes((kind.crc_extra,)) for number, kind in dialect.mavlink_map.items()
+}
+
+
+class Frame(NamedTuple):
+    """One frame as it was on the wire. ``data`` is all of it, ``payload`` as sent, trailing zeros cut off.
+
+    ``known`` is False when the dialect lacks the message id: its checksum cannot be verified.
+    ``signed`` says that 13 bytes of signature end the frame, not that they are genuine.
+    """
+
+    version: int
+    sequence: int
+    system: int
+    component: int
+    message_id: int
+    signed: bool
+    known: bool
+    payload: bytes
+    data: bytes
+
+
+class Flaw(Enum):
+    """Why there is no frame: the bytes end too early, or no frame starts here."""
+
+    PARTIAL = "partial"
+    FALSE_START = "false start"
+
+
+def frame_at(data: bytes, start: int) -> Frame | Flaw:
+    """The frame that starts at ``data[start]``. An incompatibility flag other than *signed* makes it a false
+    start, as MAVLink demands: its length cannot be known."""
+    size = len(data)
+    if start >= size:
+        return Flaw.PARTIAL
+    mark = data[start]
+    if mark == START_V2:
+        if start + 10 > size:
+            return Flaw.PARTIAL
+        _, length, flags, _, sequence, system, component, low, high = _HEADER_V2.unpack_from(data, start)
+        if flags > SIGNED_FLAG:
+            return Flaw.FALSE_START
+        version, signed, message_id = 2, flags == SIGNED_FLAG, low | high << 16
+        body = start + 10
+        end = body + length
+        stop = end + 2 + SIGNATURE_LENGTH if signed else end + 2
+    elif mark == START_V1:
+        if start + 6 > size:
+            return Flaw.PARTIAL
+        _, length, sequence, system, component, message_id = _HEADER_V1.unpack_from(data, start)
+        version, signed = 1, False
+        body = start + 6
+        end = body + length
+        stop = end + 2
+    else:
+        return Flaw.FALSE_START
+    if stop > size:
+        return Flaw.PARTIAL
+    extra = _CRC_EXTRA.get(message_id)
+    if extra is not None and mcrf4xx(data[start + 1 : end] + extra) != data[end] | data[end + 1] << 8:
+        return Flaw.FALSE_START
+    return Frame(
+        version,
+        sequence,
+        system,
+        component,
+        message_id,
+        signed,
+        extra is not None,
+        data[body:end],
+        data[start:stop],
+    )
+
+
+def claimed_length(data: bytes, start: int) -> int | None:
+    """Length that the frame at ``data[start]`` claims, verified or not; None if it claims none."""
+    mark = data[start : start + 1]
+    if mark == b"\xfd" and start + 3 <= len(data) and data[start + 2] <= SIGNED_FLAG:
+        return 12 + data[start + 1] + SIGNATURE_LENGTH * data[start + 2]
+    if mark == b"\xfe" and start + 2 <= len(data):
+        return 8 + data[start + 1]
+    return None
+
+
+def frame_v2(
+    message_id: int, crc_extra: bytes, source: tuple[int, int], sequence: int, payload: bytes
+) -> bytes:
+    """An unsigned version 2 frame; trailing zeros of ``payload`` are cut off, down to one byte."""
+    payload = payload.rstrip(b"\0") or b"\0"
+    body = _HEADER_V2.pack(
+        START_V2, len(payload), 0, 0, sequence, *source, message_id & 0xFFFF, message_id >> 16
+    )
+    body += payload
+    return body + mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")
+
+
+def frame_v1(
+    message_id: int, crc_extra: bytes, source: tuple[int, int], sequence: int, payload: bytes
+) -> bytes:
+    """A version 1 frame of ``payload``, which must be whole and without extension fields."""
+    body = _HEADER_V1.pack(START_V1, len(payload), sequence, *source, message_id) + payload
+    return body + mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")
+
+
+class Framer:
+    """Cuts a byte stream into frames, however it is chopped up; keeps fewer than 281 bytes between two calls.
+
+    After a false start the search goes on one byte later. A frame of an unknown message cannot be verified,
+    so it is skipped by its length only if another frame starts right behind it (for that one byte it waits);
+    otherwise it was a false start.
+    ``frames`` + ``unknown`` count frames, ``bad`` false starts; ``skipped_bytes`` are those of no frame.
+    """
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self.bad = 0
+        self.unknown = 0
+        self.skipped_bytes = 0
+        self._rest = b""
+
+    @property
+    def pending_bytes(self) -> int:
+        """Bytes kept for the next call."""
+        return len(self._rest)
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """The frames with a good checksum that ``data`` completes."""
+        if self._rest:
+            data = self._rest + data
+        size = len(data)
+        found: list[Frame] = []
+        at = 0
+        while at < size:
+            frame = frame_at(data, at)
+            if frame is Flaw.PARTIAL:
+                break
+            if frame is not Flaw.FALSE_START:
+                after = at + len(frame.data)
+                if frame.known:
+                    found.append(frame)
+                    at = after
+                    continue
+                if after == size:
+                    break
+                if data[after] in (START_V1, START_V2):
+                    self.unknown += 1
+                    at = after
+                    continue
+            if data[at] in (START_V1, START_V2):
+                self.bad += 1
+            following = STARTS.search(data, at + 1)
+            resume = size if following is None else following.start()
+            self.skipped_bytes += resume - at
+            at = resume
+        self._rest = data[at:]
+        self.frames += len(found)
+        return found

@@ -1,0 +1,252 @@
+"""tlog files: each frame as it was, after its time (µs, 8 bytes big endian) with the link in the low 2 bits.
+
+Logs of real flights are damaged. The reader trusts a frame when its checksum holds, steps over a record that
+does not hold when a plausible record follows where it says it ends, and otherwise searches for the next frame
+that does.
+"""
+
+from __future__ import annotations
+
+import gzip
+import zlib
+from collections.abc import Generator, Iterator
+from contextlib import closing
+from io import BufferedIOBase
+from pathlib import Path
+from struct import Struct
+from types import TracebackType
+from typing import NamedTuple, Self
+
+from mavlink_bridge.errors import LogError
+from mavlink_bridge.framing import LONGEST_FRAME, STARTS, Flaw, claimed_length, frame_at
+
+LINKS = 4
+PLAUSIBLE_JUMP = 86_400_000_000
+"""µs. A stamp next to damage is believed only within a day of the record before."""
+
+_STAMP = Struct(">Q")
+_CHUNK = 1 << 16
+# A record, the stamp after it and the start byte behind that: what has to be seen to judge a record.
+_AHEAD = 8 + LONGEST_FRAME + 8 + 1
+
+
+class Record(NamedTuple):
+    """One whole frame of a log, ``time`` in µs (a multiple of 4), ``link`` 0…3."""
+
+    time: int
+    link: int
+    frame: bytes
+
+
+class TlogReport(NamedTuple):
+    """What one pass found. ``bad``: records whose checksum failed, or stretches that are no record;
+    ``unknown``: well-placed records of messages that the dialect lacks, not handed out; ``skipped_bytes``: in
+    no good or unknown record; ``truncated``: the log ends within a record, or its compression breaks off."""
+
+    good: int
+    bad: int
+    unknown: int
+    skipped_bytes: int
+    time_steps_back: int
+    truncated: bool
+
+
+class TlogWriter:
+    """Writes a tlog, compressed if ``path`` ends in ``.gz``; a context manager. Same records, same bytes.
+
+    Raises LogError if the file cannot be made.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.records = 0
+        self.skipped_bytes = 0
+        self._gzip: gzip.GzipFile | None = None
+        try:
+            self._file = Path(path).open("wb")  # noqa: SIM115
+        except OSError as error:
+            raise LogError(f"{path}: cannot be written: {error.strerror}") from None
+        if str(path).endswith(".gz"):
+            self._gzip = gzip.GzipFile("", "wb", fileobj=self._file, mtime=0)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Finish the file; again is harmless."""
+        if self._gzip is not None:
+            self._gzip.close()
+        self._file.close()
+
+    def write(self, time_us: int, link: int, data: bytes) -> None:
+        """One record for each frame of a datagram, all at one time, whose low 2 bits give way to the link.
+
+        Bytes that are no frame are left out and counted in ``skipped_bytes``. Raises LogError for a link
+        outside 0…3 and for a time that does not fit.
+        """
+        if not (0 <= link < LINKS and 0 <= time_us < 1 << 64):
+            raise LogError(f"time {time_us} µs, link {link}: not in a tlog's range")
+        stamp = _STAMP.pack(time_us & ~3 | link)
+        target = self._file if self._gzip is None else self._gzip
+        at = 0
+        while at < len(data):
+            frame = frame_at(data, at)
+            if isinstance(frame, Flaw) or not (frame.known or _goes_on(data, at + len(frame.data))):
+                at += 1
+                self.skipped_bytes += 1
+                continue
+            target.write(stamp + frame.data)
+            self.records += 1
+            at += len(frame.data)
+
+
+def _goes_on(data: bytes, at: int) -> bool:
+    """Whether a datagram ends here or a frame begins: the only check that an unknown message allows."""
+    return at == len(data) or STARTS.match(data, at) is not None
+
+
+class TlogReader:
+    """The records of a log, in the order of the file; each iteration reads it again, in bounded memory."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._pass: _Pass | None = None
+
+    def __iter__(self) -> Generator[Record, None, None]:
+        try:
+            with self.path.open("rb") as raw:
+                compressed = raw.peek(2)[:2] == b"\x1f\x8b"
+                self._pass = _Pass(gzip.GzipFile(fileobj=raw) if compressed else raw)
+                yield from self._pass.records()
+        except OSError as error:
+            raise LogError(f"{self.path}: cannot be read: {error.strerror}") from None
+
+    @property
+    def report(self) -> TlogReport:
+        """What the latest iteration has found so far."""
+        if self._pass is None:
+            return TlogReport(0, 0, 0, 0, 0, False)
+        one = self._pass
+        return TlogReport(
+            one.good, one.bad, one.unknown, one.skipped_bytes, one.time_steps_back, one.truncated
+        )
+
+
+def read_tlog(path: Path | str) -> TlogReader:
+    """The log at ``path``, plain or gzip. Raises LogError if it is missing, unreadable or without MAVLink."""
+    reader = TlogReader(Path(path))
+    with closing(iter(reader)) as records:
+        first = next(records, None)
+    if first is None:
+        raise LogError(f"{path}: holds no MAVLink frame")
+    return reader
+
+
+class _Pass:
+    """One reading of the file: a window of bytes that slides along it, and the counts."""
+
+    def __init__(self, stream: BufferedIOBase) -> None:
+        self.good = self.bad = self.unknown = self.skipped_bytes = self.time_steps_back = 0
+        self.truncated = False
+        self._stream = stream
+        self._window = b""
+        self._at = 0
+        self._ended = False
+        self._stamp: int | None = None
+
+    def records(self) -> Iterator[Record]:
+        """Every record with a good checksum."""
+        while self._fill():
+            frame = frame_at(self._window, self._at + 8)
+            if not isinstance(frame, Flaw) and frame.known:
+                (stamp,) = _STAMP.unpack_from(self._window, self._at)
+                self._at += 8 + len(frame.data)
+                yield self._record(stamp, frame.data)
+            elif not self._step_over(sound=not isinstance(frame, Flaw)):
+                record = self._search(cut=frame is Flaw.PARTIAL)
+                if record is not None:
+                    yield record
+
+    def _fill(self) -> bool:
+        """Have in the window all that is needed to judge the record here; False at the end. The 8 bytes
+        before stay: a search may find that they were a stamp."""
+        while len(self._window) - self._at < _AHEAD and not self._ended:
+            try:
+                # Not read(): before a compressed stream breaks off, this hands out all that came before.
+                chunk = self._stream.read1(_CHUNK)
+            except (EOFError, zlib.error, gzip.BadGzipFile):
+                chunk = b""
+                self.truncated = True
+            self._ended = not chunk
+            done = max(self._at - 8, 0)
+            self._window = self._window[done:] + chunk
+            self._at -= done
+        return self._at < len(self._window)
+
+    def _record(self, stamp: int, data: bytes) -> Record:
+        before, self._stamp = self._stamp, stamp
+        if before is not None and stamp & ~3 < before & ~3:
+            self.time_steps_back += 1
+        self.good += 1
+        return Record(stamp & ~3, stamp & 3, data)
+
+    def _plausible(self, at: int, reference: int | None) -> bool:
+        (stamp,) = _STAMP.unpack_from(self._window, at)
+        return reference is None or bool(abs(stamp - reference) <= PLAUSIBLE_JUMP)
+
+    def _step_over(self, *, sound: bool) -> bool:
+        """Pass a record that cannot be trusted by the length it claims, if its stamp is in order and the log
+        goes on properly behind it. ``sound``: only the message is unknown."""
+        length = claimed_length(self._window, self._at + 8)
+        if length is None:
+            return False
+        end = self._at + 8 + length
+        (own,) = _STAMP.unpack_from(self._window, self._at)
+        if not self._plausible(self._at, self._stamp):
+            return False
+        if end != len(self._window) and not (
+            STARTS.match(self._window, end + 8) is not None and self._plausible(end, own)
+        ):
+            return False
+        if sound:
+            self.unknown += 1
+        else:
+            self.bad += 1
+            self.skipped_bytes += 8 + length
+        self._at = end
+        return True
+
+    def _search(self, *, cut: bool) -> Record | None:
+        """Go on at the next frame whose checksum holds, if there is one. If it is right here, it shares the
+        last stamp. ``cut``: what is here may be a good record that the end of the file cuts off."""
+        skipped = 0
+        while self._fill():
+            start = STARTS.search(self._window, self._at)
+            resume = len(self._window) if start is None else start.start()
+            skipped += resume - self._at
+            self._at = resume
+            if start is None or not self._fill():
+                continue
+            frame = frame_at(self._window, self._at)
+            if isinstance(frame, Flaw) or not frame.known:
+                self._at += 1
+                skipped += 1
+                continue
+            stamp = self._stamp or 0
+            if skipped >= 8 and self._plausible(self._at - 8, self._stamp):
+                (stamp,) = _STAMP.unpack_from(self._window, self._at - 8)
+                skipped -= 8
+            self.bad += skipped > 0
+            self.skipped_bytes += skipped
+            self._at += len(frame.data)
+            return self._record(stamp, frame.data)
+        self.skipped_bytes += skipped
+        if cut:
+            self.truncated = True
+        else:
+            self.bad += 1
+        return None

@@ -1,0 +1,71 @@
+"""The settings of one emulated autopilot: who it is, where it starts, what it streams, how it flies alone."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+Rate = Annotated[float, Field(ge=0.0, le=1000.0)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(ge=0.0, le=3600.0)]
+
+
+class TelemetryRates(BaseModel):
+    """Messages per second that flow from the start, 0 for none; SET_MESSAGE_INTERVAL (511) changes them.
+
+    Real ArduCopter streams only HEARTBEAT and STATUSTEXT until asked. Here all that a companion needs flows.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    heartbeat: Rate = 1.0
+    sys_status: Rate = 1.0
+    attitude: Rate = 50.0
+    local_position: Rate = 50.0
+    global_position: Rate = 10.0
+    gps_global_origin: Rate = 0.2
+    position_target: Rate = 10.0
+    extended_sys_state: Rate = 2.0
+    ekf_status: Rate = 1.0
+
+
+class AutopilotConfig(BaseModel):
+    """One emulated autopilot. SI units; angles in radians; latitude and longitude in degrees."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    system_id: int = Field(ge=1, le=255)
+    flavour: Literal["ardupilot", "px4"] = "ardupilot"
+    latitude: float = Field(ge=-90.0, le=90.0)
+    longitude: float = Field(ge=-180.0, le=180.0)
+    altitude: FiniteFloat = Field(0.0, description="of the ground at the start, m above mean sea level")
+    yaw: FiniteFloat = Field(0.0, description="at the start, clockwise from north")
+    rates: TelemetryRates = TelemetryRates()
+    sensors: Literal["truth"] = "truth"
+
+    ready_after: Seconds = Field(1.0, description="from boot until position is known and arming is allowed")
+    disarm_delay: Seconds = Field(10.0, description="armed on the ground for this long: disarmed again")
+    touchdown_time: Seconds = Field(0.5, description="on the ground for this long: landed")
+
+    takeoff_height: Positive = Field(2.5, description="when NAV_TAKEOFF does not say (PX4)")
+    takeoff_speed: Positive = 1.5
+    land_speed: Positive = 0.8
+    max_speed: Positive = Field(10.0, description="of every reference, norm")
+    max_acceleration: Positive = Field(6.0, description="of every reference, norm")
+    max_jerk: Positive = Field(40.0, description="of shaped references, norm")
+    gentle_acceleration: Positive = Field(1.5, description="for takeoff, landing, braking into a hold")
+    max_yaw_rate: Positive = math.radians(90.0)
+    max_yaw_acceleration: Positive = Field(1.5, description="the firefly's yaw torque gives 2.5 rad/s²")
+
+    guided_timeout: Seconds = Field(3.0, description="ArduPilot's GUID_TIMEOUT")
+    offboard_timeout: Seconds = Field(1.0, description="PX4's COM_OF_LOSS_T")
+    offboard_loss: Literal["hold", "land", "descend"] = Field(
+        "hold",
+        description="PX4's COM_OBL_RC_ACT: hold 5; land 4; descend 0, PX4's default, which without RC sinks",
+    )
+    thrusting: Seconds = Field(
+        1.0,
+        description="a set-point's acceleration is extrapolated this long, its velocity until the time-out",
+    )

@@ -1,0 +1,187 @@
+"""Armed state, flight mode, and what changes them: a command, the ground, or time. It decides; the guidance
+flies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from sitl.autopilot_config import AutopilotConfig
+from sitl.flavours import FAILED, TEMPORARILY_REJECTED, Denial, Flavour, Mode, Status
+from sitl.guidance import Activity, Guidance
+from sitl.sensors import Estimate
+from sitl.steering import Steering
+from sitl.voice import Voice
+
+# PX4's position mode without sticks sinks with this speed (m/s).
+_SINKING: Final = 0.6
+
+
+class Commander:
+    """The state of one vehicle. A verb returns None, also when what it asks is already so, or why it is
+    denied."""
+
+    def __init__(
+        self,
+        config: AutopilotConfig,
+        flavour: Flavour,
+        guidance: Guidance,
+        steering: Steering,
+        estimate: Callable[[], Estimate],
+        altitude: float,
+        voice: Voice,
+    ) -> None:
+        """``estimate`` is the present state on demand, ``altitude`` home's (m above mean sea level)."""
+        self._config = config
+        self._flavour = flavour
+        self._guidance = guidance
+        self._steering = steering
+        self._estimate = estimate
+        self._altitude = altitude
+        self._voice = voice
+        self._takeoff_height = config.takeoff_height
+        self._ready_at = round(config.ready_after * 1e6)
+        self._touched_at: int | None = None
+        self._disarm_at = 0
+        self.armed = False
+        self.landed = True
+        self.ready = False
+        self.mode = flavour.boot_mode
+
+    def status(self, now: int) -> Status:
+        """What decisions at ``now`` (µs) depend on."""
+        stream = self._steering.stream
+        return Status(
+            self.armed,
+            self.landed,
+            self.ready,
+            self.mode,
+            -self._estimate().position[2],
+            self._guidance.activity is Activity.TAKEOFF,
+            stream.age(now),
+            stream.gap,
+        )
+
+    # What is asked
+
+    def arm(self, now: int, *, forced: bool) -> Denial | None:
+        """Allow the motors to turn. ``forced`` overrides every reason against it."""
+        if self.armed:
+            return None
+        if not forced:
+            if not self.ready:
+                return Denial(TEMPORARILY_REJECTED, "Arming refused: no position yet")
+            if reason := self._flavour.arming_denial(self.status(now)):
+                return Denial(FAILED, f"Arming refused: {reason}")
+        self.armed = True
+        self._postpone(now)
+        self._voice.inform("Armed")
+        if self.mode is Mode.TAKEOFF:
+            self._guidance.takeoff(self._takeoff_height, self._estimate().pose)
+        return None
+
+    def disarm(self, *, forced: bool) -> Denial | None:
+        """Stop the motors; in flight only if ``forced``, and then it falls."""
+        if self.armed and not self.landed and not forced:
+            return Denial(FAILED, "Disarming refused: flying")
+        if self.armed:
+            self._stop("Disarmed")
+        return None
+
+    def take_off(self, altitude: float, relative: bool | None, now: int) -> Denial | None:
+        """As NAV_TAKEOFF (22); arguments as for ``Flavour.takeoff``."""
+        verdict = self._flavour.takeoff(altitude, relative, self._altitude, self.status(now))
+        if isinstance(verdict, Denial):
+            return verdict
+        self.mode, self._takeoff_height = verdict.mode, verdict.height
+        if self.armed:
+            self._postpone(now)
+            self._guidance.takeoff(verdict.height, self._estimate().pose)
+        return None
+
+    def enter(self, mode: Mode, now: int) -> Denial | None:
+        """Change to ``mode``."""
+        if mode is self.mode:
+            return None
+        if denial := self._flavour.mode_denial(mode, self.status(now)):
+            return denial
+        self._switch(mode, now)
+        return None
+
+    # What happens
+
+    def watch(self, now: int, on_ground: bool) -> None:
+        """Notice what time and the ground brought about until ``now`` (µs)."""
+        self.ready = self.ready or now >= self._ready_at
+        if not on_ground:
+            self.landed = False
+            self._touched_at = None
+        elif not self.landed:
+            self._touch(now)
+        if not self.armed:
+            return
+        guidance = self._guidance
+        if guidance.timed_out:
+            self._lose(now)
+        elif guidance.activity is Activity.TAKEOFF and guidance.reached:
+            self.mode = self._flavour.after_takeoff
+            guidance.settle()
+        if not self.landed:
+            self._postpone(now)
+        elif now >= self._disarm_at:
+            self._stop("Disarmed: on the ground for too long")
+
+    def _switch(self, mode: Mode, now: int) -> None:
+        self.mode = mode
+        if self.landed or not self.armed:
+            self._guidance.idle()
+            if self.armed and mode is Mode.LAND:
+                self._stop("Landed, disarmed")
+            elif mode is Mode.LAND:
+                self.mode = self._flavour.after_landing
+            return
+        match mode:
+            case Mode.LAND:
+                self._guidance.land(self._config.land_speed)
+            case Mode.GUIDED:
+                self._steering.resume(self._estimate().pose, now)
+            case _:
+                self._guidance.hold()
+
+    def _lose(self, now: int) -> None:
+        self._guidance.timed_out = False
+        self._voice.warn("Set-points timed out")
+        if self._flavour.after_loss is not self.mode:
+            self._switch(self._flavour.after_loss, now)
+        if self.mode is Mode.POSITION:
+            self._guidance.land(_SINKING)
+
+    def _touch(self, now: int) -> None:
+        """On the ground, and not yet taken for landed."""
+        activity = self._guidance.activity
+        if activity is Activity.TAKEOFF:
+            return
+        if activity is Activity.LAND:
+            # Thrust is cut at once, so that it does not bounce while it is being sure.
+            self._guidance.idle()
+        if self._touched_at is None:
+            self._touched_at = now
+        if now - self._touched_at < self._config.touchdown_time * 1e6:
+            return
+        self.landed = True
+        self._postpone(now)
+        if self.armed and self._guidance.activity is Activity.IDLE:
+            self._stop("Landed, disarmed")
+        self._guidance.idle()
+
+    def _stop(self, why: str) -> None:
+        self.armed = False
+        self._guidance.idle()
+        if self.mode is Mode.LAND:
+            self.mode = self._flavour.after_landing
+        elif self.mode is Mode.TAKEOFF:
+            self.mode = self._flavour.after_takeoff
+        self._voice.inform(why)
+
+    def _postpone(self, now: int) -> None:
+        self._disarm_at = now + round(self._config.disarm_delay * 1e6)

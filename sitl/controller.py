@@ -1,0 +1,209 @@
+"""The geometric tracking controller of Lee, Leok and McClamroch (CDC 2010) with its whole feed-forward.
+
+Notation of the paper, e3 down: A is the force that the vehicle should feel apart from gravity's reaction, b3c
+= −A/‖A‖. Added to the paper: the rotor drag at zero wind can be cancelled (after Faessler, Franchi and
+Scaramuzza, 2018, who show that a drag linear in velocity only turns A), and A can be limited to a greatest
+tilt.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from sitl.compiled import kernel
+from sitl.vectors import Axes, Vector, cross, dot, norm, plus, scaled, times, to_body, to_ned
+
+if TYPE_CHECKING:
+    from sitl.airframe import Airframe
+
+Trajectory = tuple[Vector, Vector, Vector, Vector, Vector]
+"""x_d and its first four derivatives (m, NED)."""
+
+_WEIGHTLESS = 1e-3
+"""‖A‖ over weight below which A points nowhere."""
+_UPRIGHT_NOSE = 0.02
+"""Sine of the angle between b3c and b1d (or b1d's right) below which there is no heading."""
+
+
+@kernel
+def unit_with_rates(x: Vector, dx: Vector, ddx: Vector) -> tuple[Vector, Vector, Vector]:
+    """u = x/‖x‖ with its first two derivatives, from those of x."""
+    s = 1.0 / norm(x)
+    u, a, b = times(s, x), times(s, dx), times(s, ddx)
+    growth = dot(u, a)
+    du = plus(a, -growth, u)
+    ddu = plus(plus(b, -2.0 * growth, du), -dot(u, b) - dot(du, du), u)
+    return u, du, ddu
+
+
+@kernel
+def cross_with_rates(
+    a: tuple[Vector, Vector, Vector], b: tuple[Vector, Vector, Vector]
+) -> tuple[Vector, Vector, Vector]:
+    """a×b with its first two derivatives, from those of both."""
+    return (
+        cross(a[0], b[0]),
+        plus(cross(a[1], b[0]), 1.0, cross(a[0], b[1])),
+        plus(plus(cross(a[2], b[0]), 2.0, cross(a[1], b[1])), 1.0, cross(a[0], b[2])),
+    )
+
+
+@kernel
+def limited_force(A: Vector, airframe: Airframe) -> tuple[Vector, bool]:
+    """A within the greatest tilt and the thrust of the rotors, and whether that changed it.
+
+    Height comes first: the upward part lies between the least lift and all rotors at full thrust, and the
+    horizontal part has what the tilt and the thrust then leave, in its own direction.
+    """
+    up = max(airframe.min_lift, min(airframe.max_lift, -A[2]))
+    horizontal = math.sqrt(A[0] * A[0] + A[1] * A[1])
+    room = min(airframe.tan_max_tilt * up, math.sqrt(airframe.max_lift**2 - up * up))
+    if up == -A[2] and horizontal <= room:
+        return A, False
+    part = room / horizontal if horizontal > room else 1.0
+    return (part * A[0], part * A[1], -up), True
+
+
+@kernel
+def limited_yaw(yaw: float, axes: Axes, airframe: Airframe) -> float:
+    """``yaw`` (rad), or the heading that is the greatest yaw error away from the nose, on the shorter side.
+
+    Beyond a right angle e_R leads roll and pitch astray while a vehicle whose yaw is weak turns slowly round.
+    """
+    ahead, right = math.cos(yaw), math.sin(yaw)
+    b1 = axes[0]
+    along = ahead * b1[0] + right * b1[1]
+    if along >= airframe.cos_max_yaw_error * math.sqrt(b1[0] * b1[0] + b1[1] * b1[1]):
+        return yaw
+    side = 1.0 if b1[0] * right - b1[1] * ahead >= 0.0 else -1.0
+    return math.atan2(b1[1], b1[0]) + side * airframe.max_yaw_error
+
+
+@kernel
+def commanded_attitude(
+    A: tuple[Vector, Vector, Vector], yaw: float, yaw_rate: float, axes: Axes, airframe: Airframe
+) -> tuple[Axes, Vector, Vector]:
+    """R_c, Ω_c and Ω̇_c from A, its derivatives and b1d = (cos ψ, sin ψ, 0) at a constant yaw rate.
+
+    The paper takes b2c normal to b1d, which turns the nose of a tilted vehicle away from ψ by up to half its
+    tilt squared. With ``euler_heading`` b1c instead lies in the vertical plane of b1d, so that the yaw that
+    MAVLink speaks of is ψ. Where A vanishes the thrust axis stays where it is, and where b3c leaves no
+    heading to choose so does the nose, without feed-forward: there the command has no direction to follow.
+    """
+    still = (0.0, 0.0, 0.0)
+    if norm(A[0]) > _WEIGHTLESS * airframe.mass * airframe.gravity:
+        b3 = unit_with_rates(times(-1.0, A[0]), times(-1.0, A[1]), times(-1.0, A[2]))
+    else:
+        b3 = (axes[2], still, still)
+    nose = (math.cos(yaw), math.sin(yaw), 0.0)
+    aside = (-nose[1], nose[0], 0.0)
+    if airframe.euler_heading:
+        right = (aside, times(-yaw_rate, nose), times(-yaw_rate * yaw_rate, aside))
+        C = cross_with_rates(b3, cross_with_rates(right, b3))
+    else:
+        C = cross_with_rates(b3, (nose, times(yaw_rate, aside), times(-yaw_rate * yaw_rate, nose)))
+    if norm(C[0]) > _UPRIGHT_NOSE:
+        b2 = unit_with_rates(C[0], C[1], C[2])
+    else:
+        # Of b1 and b2 at most one can be along b3c.
+        side = cross(b3[0], axes[0])
+        if norm(side) < _UPRIGHT_NOSE:
+            side = plus(axes[1], -dot(axes[1], b3[0]), b3[0])
+        b3 = (b3[0], still, still)
+        b2 = (times(1.0 / norm(side), side), still, still)
+    b1 = cross_with_rates(b2, b3)
+    wx, wy, wz = dot(b3[0], b2[1]), dot(b1[0], b3[1]), dot(b2[0], b1[1])
+    rates_change = (
+        dot(b3[0], b2[2]) - wy * wz,
+        dot(b1[0], b3[2]) - wz * wx,
+        dot(b2[0], b1[2]) - wx * wy,
+    )
+    return (b1[0], b2[0], b3[0]), (wx, wy, wz), rates_change
+
+
+@kernel
+def desired_force(
+    position: Vector,
+    velocity: Vector,
+    acceleration: Vector,
+    axes: Axes,
+    rates: Vector,
+    target: Trajectory,
+    airframe: Airframe,
+) -> tuple[float, tuple[Vector, Vector, Vector]]:
+    """The thrust f (N) and A with its first two derivatives.
+
+    A = −k_x e_x − k_v e_v − m g e3 + m ẍ_d + D ẋ_d and f = −(A − D ẋ_d)·b3. D is the drag that is cancelled:
+    −D v⊥ is −D v and a force along b3, so that the first turns A and the second goes into f. The derivatives
+    take the measured acceleration where the paper has that of its model, which a steady wind would make wrong
+    for ever, and the jerk of the model.
+    """
+    m, k_x, k_v, D = airframe.mass, airframe.k_x, airframe.k_v, airframe.cancelled_drag
+    b3 = axes[2]
+    db3 = to_ned(axes, (rates[1], -rates[0], 0.0))
+    e_x, e_v = plus(position, -1.0, target[0]), plus(velocity, -1.0, target[1])
+    B = plus(plus(times(m, target[2]), -k_x, e_x), -k_v, e_v)
+    B = (B[0], B[1], B[2] - m * airframe.gravity)
+    A = plus(B, D, target[1])
+    limited, was_limited = limited_force(A, airframe) if airframe.limits_force else (A, False)
+    if was_limited:
+        f = -dot(plus(limited, -D, target[1]), b3)
+        still = (0.0, 0.0, 0.0)
+        return max(f, 0.0), (limited, still, still)
+    f = -dot(B, b3)
+    e_a = plus(acceleration, -1.0, target[2])
+    dB = plus(plus(times(m, target[3]), -k_x, e_v), -k_v, e_a)
+    df = -dot(dB, b3) - dot(B, db3)
+    sliding = plus(acceleration, -dot(acceleration, b3) - dot(velocity, db3), b3)
+    sliding = plus(sliding, -dot(velocity, b3), db3)
+    jerk = plus(plus(times(-df / m, b3), -f / m, db3), -D / m, sliding)
+    ddB = plus(plus(times(m, target[4]), -k_x, e_a), -k_v, plus(jerk, -1.0, target[3]))
+    if airframe.limits_force:
+        f = max(f, 0.0)
+    return f, (A, plus(dB, D, target[2]), plus(ddB, D, target[3]))
+
+
+@kernel
+def attitude_errors(axes: Axes, commanded: Axes, commanded_rates: Vector) -> tuple[Vector, Vector]:
+    """e_R = ½(R_cᵀR − RᵀR_c)^∨ and RᵀR_cΩ_c, the commanded rates in the body's own axes."""
+    x, y, z = to_body(commanded, axes[0]), to_body(commanded, axes[1]), to_body(commanded, axes[2])
+    e_R = (0.5 * (y[2] - z[1]), 0.5 * (z[0] - x[2]), 0.5 * (x[1] - y[0]))
+    return e_R, to_body(axes, to_ned(commanded, commanded_rates))
+
+
+@kernel
+def control(
+    position: Vector,
+    velocity: Vector,
+    acceleration: Vector,
+    axes: Axes,
+    rates: Vector,
+    target: Trajectory,
+    yaw: float,
+    yaw_rate: float,
+    airframe: Airframe,
+) -> tuple[float, Vector]:
+    """Thrust f (N, along −b3) and moment M (N m, body) that track a trajectory (NED) and a heading (rad).
+
+    M = −k_R e_R − k_Ω e_Ω + Ω×JΩ − J(Ω̂RᵀR_cΩ_c − RᵀR_cΩ̇_c), Ω̂ being the cross product with Ω, and less the
+    moment of the rotor drag that is cancelled, which acts at the height of the rotors.
+    """
+    f, A = desired_force(position, velocity, acceleration, axes, rates, target, airframe)
+    yaw = limited_yaw(yaw, axes, airframe)
+    commanded, rates_c, rates_change = commanded_attitude(A, yaw, yaw_rate, axes, airframe)
+    rates_c = times(airframe.rate_feed_forward, rates_c)
+    rates_change = times(airframe.rate_feed_forward, rates_change)
+    e_R, followed = attitude_errors(axes, commanded, rates_c)
+    e_Omega = plus(rates, -1.0, followed)
+    J = (airframe.inertia[0], airframe.inertia[1], airframe.inertia[2])
+    k_R = (airframe.k_R[0], airframe.k_R[1], airframe.k_R[2])
+    k_Omega = (airframe.k_Omega[0], airframe.k_Omega[1], airframe.k_Omega[2])
+    M = plus(times(-1.0, scaled(k_R, e_R)), -1.0, scaled(k_Omega, e_Omega))
+    M = plus(M, 1.0, cross(rates, scaled(J, rates)))
+    turning = plus(cross(rates, followed), -1.0, to_body(axes, to_ned(commanded, rates_change)))
+    slip = to_body(commanded, target[1])
+    M = plus(M, airframe.cancelled_drag_arm, (-slip[1], slip[0], 0.0))
+    M = plus(M, airframe.cancelled_rolling, (slip[0], slip[1], 0.0))
+    M = plus(M, airframe.cancelled_turning, (0.0, 0.0, followed[2]))
+    return f, plus(M, -1.0, scaled(J, turning))

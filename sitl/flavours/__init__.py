@@ -1,0 +1,128 @@
+"""What ArduPilot and PX4 do differently, behind one small interface.
+
+The commander knows when something is asked; a flavour knows whether it is allowed, how its modes are numbered
+and how it reads a set-point. Everything here is pure: ``Status`` in, verdicts out. Sources: ArduCopter 4.6.3
+and PX4 1.16.1 as flown and measured.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Final, NamedTuple, Protocol
+
+from mavlink_bridge.messages import SetpointLocal
+from sitl.setpoints import Pose, Reading, Setpoint
+
+# MAV_RESULT
+ACCEPTED: Final = 0
+TEMPORARILY_REJECTED: Final = 1
+DENIED: Final = 2
+UNSUPPORTED: Final = 3
+FAILED: Final = 4
+
+# MAV_MODE_FLAG
+CUSTOM: Final = 0x01
+AUTO: Final = 0x04
+GUIDED_FLAG: Final = 0x08
+STABILIZED: Final = 0x10
+MANUAL: Final = 0x40
+ARMED: Final = 0x80
+
+
+class Mode(Enum):
+    """What a mode means; a flavour gives it its number."""
+
+    STANDBY = "standby"
+    POSITION = "position"
+    HOLD = "hold"
+    GUIDED = "guided"
+    TAKEOFF = "takeoff"
+    LAND = "land"
+
+
+class Status(NamedTuple):
+    """What a decision may depend on. ``height`` (m) above home. ``stream_age`` and ``stream_gap`` (s): since
+    the last usable set-point, and between it and the one before it (0 when it is the first of its stream)."""
+
+    armed: bool
+    landed: bool
+    ready: bool
+    mode: Mode
+    height: float
+    taking_off: bool
+    stream_age: float
+    stream_gap: float
+
+
+class Takeoff(NamedTuple):
+    """Climb to ``height`` (m above home), in this mode."""
+
+    height: float
+    mode: Mode
+
+
+class Denial(NamedTuple):
+    """Not now or not at all: a MAV_RESULT, and why."""
+
+    result: int
+    reason: str
+
+
+class Flavour(Protocol):
+    """One firmware's dialect and rules."""
+
+    autopilot: int
+    """MAV_AUTOPILOT."""
+    boot_mode: Mode
+    stream_first: bool
+    """Whether set-points count before GUIDED is entered, and can take the vehicle off the ground in it."""
+    reports_ekf: bool
+    """Whether EKF_STATUS_REPORT (193) is streamed."""
+    echoes_yaw: bool
+    """Whether POSITION_TARGET_LOCAL_NED (85) comes back with yaw."""
+    shortest_interval: int
+    """µs; SET_MESSAGE_INTERVAL (511) refuses less."""
+    after_takeoff: Mode
+    after_landing: Mode
+    after_loss: Mode
+    """The mode when set-points time out."""
+
+    def custom_mode(self, mode: Mode) -> int:
+        """HEARTBEAT.custom_mode."""
+        ...
+
+    def base_mode(self, mode: Mode) -> int:
+        """HEARTBEAT.base_mode without the armed bit."""
+        ...
+
+    def requested(self, main: int, sub: int, /) -> Mode | None:
+        """The mode that DO_SET_MODE (176) asks for by parameters 2 and 3, None when there is none such."""
+        ...
+
+    def arming_denial(self, status: Status) -> str | None:
+        """Why it must not arm now."""
+        ...
+
+    def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
+        """Why ``mode`` must not be entered now."""
+        ...
+
+    def takeoff(
+        self, altitude: float, relative: bool | None, ground: float, status: Status, /
+    ) -> Takeoff | Denial:
+        """NAV_TAKEOFF (22) to ``altitude`` (m; NaN when not given), above home if ``relative``, above mean
+        sea level if not, None when the message has no frame. ``ground``: home's altitude above mean sea level
+        (m)."""
+        ...
+
+    def read(self, message: SetpointLocal, here: Pose) -> Reading:
+        """What a set-point asks for; offsets and body axes are resolved with ``here``."""
+        ...
+
+    def steering_denial(self, status: Status) -> str | None:
+        """Why a good set-point is not followed now; an empty text when that is no cause for complaint."""
+        ...
+
+    def timeout(self, setpoint: Setpoint, /) -> int | None:
+        """How long (µs) it is followed when no other comes; None for ever."""
+        ...

@@ -1,0 +1,165 @@
+"""ArduCopter 4.6: modes by one number, triples of ignore bits, offsets and body frames, takeoff by
+command."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from mavlink_bridge.messages import SetpointLocal, Vector
+from sitl.autopilot_config import AutopilotConfig
+from sitl.flavours import (
+    CUSTOM,
+    DENIED,
+    FAILED,
+    GUIDED_FLAG,
+    MANUAL,
+    STABILIZED,
+    TEMPORARILY_REJECTED,
+    Denial,
+    Mode,
+    Status,
+    Takeoff,
+)
+from sitl.setpoints import (
+    ACCELERATION,
+    BODY_NED,
+    BODY_OFFSET_NED,
+    IGNORE_ACCELERATION,
+    IGNORE_POSITION,
+    IGNORE_VELOCITY,
+    IGNORE_YAW,
+    IGNORE_YAW_RATE,
+    LOCAL_NED,
+    LOCAL_OFFSET_NED,
+    POSITION,
+    VELOCITY,
+    ZERO,
+    Pose,
+    Reading,
+    Refusal,
+    Setpoint,
+    Stop,
+    rotated,
+    unusable,
+)
+
+_NUMBERS: Final = {
+    Mode.STANDBY: 0,
+    Mode.GUIDED: 4,
+    Mode.TAKEOFF: 4,
+    Mode.POSITION: 5,
+    Mode.LAND: 9,
+    Mode.HOLD: 17,
+}
+_MODES: Final = {0: Mode.STANDBY, 4: Mode.GUIDED, 5: Mode.POSITION, 9: Mode.LAND, 17: Mode.HOLD}
+_FRAMES: Final = (LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED)
+_TRIPLES: Final = (IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION)
+
+
+class ArduPilot:
+    """STABILIZE 0, GUIDED 4, LOITER 5, LAND 9, BRAKE 17.
+
+    The force bit of a set-point means nothing to it: MAVProxy's velocity command has it set.
+    """
+
+    autopilot = 3
+    boot_mode = Mode.STANDBY
+    stream_first = False
+    reports_ekf = True
+    echoes_yaw = False
+    # Streams are served from the 400 Hz loop, and not faster than 80 % of it.
+    shortest_interval = 3125
+    after_takeoff = Mode.GUIDED
+    after_landing = Mode.LAND
+    after_loss = Mode.GUIDED
+
+    def __init__(self, config: AutopilotConfig) -> None:
+        self._timeout = round(config.guided_timeout * 1e6)
+
+    def custom_mode(self, mode: Mode) -> int:
+        return _NUMBERS[mode]
+
+    def base_mode(self, mode: Mode) -> int:
+        guided = GUIDED_FLAG if mode not in (Mode.STANDBY, Mode.POSITION) else 0
+        return CUSTOM | STABILIZED | MANUAL | guided
+
+    def requested(self, main: int, _sub: int, /) -> Mode | None:
+        return _MODES.get(main)
+
+    def arming_denial(self, status: Status) -> str | None:
+        return f"{status.mode.name} mode is not armable" if status.mode in (Mode.LAND, Mode.HOLD) else None
+
+    def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
+        if mode is Mode.STANDBY and status.armed and not status.landed:
+            return Denial(FAILED, "STABILIZE in flight needs a pilot")
+        if mode is not Mode.STANDBY and not status.ready:
+            return Denial(FAILED, "Mode change failed: requires position")
+        return None
+
+    def takeoff(
+        self, altitude: float, relative: bool | None, _ground: float, status: Status, /
+    ) -> Takeoff | Denial:
+        if relative is False:
+            return Denial(DENIED, "Takeoff needs an altitude above home")
+        if not math.isfinite(altitude) or altitude <= 0.0:
+            return Denial(FAILED, "Takeoff needs a positive altitude")
+        if status.mode is not Mode.GUIDED:
+            return Denial(FAILED, "Takeoff needs GUIDED mode")
+        if not status.armed:
+            return Denial(FAILED, "Takeoff needs armed motors")
+        if not status.landed and not status.taking_off:
+            return Denial(TEMPORARILY_REJECTED, "Takeoff refused: already flying")
+        return Takeoff(altitude, Mode.GUIDED)
+
+    def read(self, message: SetpointLocal, here: Pose) -> Reading:
+        mask = message.type_mask
+        for triple in _TRIPLES:
+            mask |= triple if mask & triple else 0
+        if fault := unusable(message, mask):
+            return Refusal(fault)
+        if message.frame not in _FRAMES:
+            return Stop(f"Set-point stops: frame {message.frame}")
+        position, velocity, acceleration = (not mask & triple for triple in _TRIPLES)
+        if (position and acceleration and not velocity) or not (position or velocity or acceleration):
+            return Stop(f"Set-point stops: mask 0x{message.type_mask:X}")
+
+        level = POSITION if position else VELOCITY if velocity else ACCELERATION
+        body = message.frame in (BODY_NED, BODY_OFFSET_NED)
+        turn = here.yaw if body else 0.0
+        yaw = None if mask & IGNORE_YAW else message.yaw + turn
+        return Setpoint(
+            (level, level, level),
+            _placed(message, here) if position else ZERO,
+            _turned(message.velocity, turn) if velocity else ZERO,
+            _turned(message.acceleration, turn) if acceleration else ZERO,
+            yaw,
+            None if mask & IGNORE_YAW_RATE else message.yaw_rate,
+            complete=position and velocity,
+        )
+
+    def steering_denial(self, status: Status) -> str | None:
+        if status.mode is not Mode.GUIDED:
+            return "Set-point ignored: not in GUIDED"
+        if not status.armed:
+            return "Set-point ignored: disarmed"
+        if status.landed:
+            return "Set-point ignored: landed, take off first"
+        return None
+
+    def timeout(self, setpoint: Setpoint, /) -> int | None:
+        return self._timeout if setpoint.moves else None
+
+
+def _turned(vector: Vector, yaw: float) -> Vector:
+    return rotated(vector, yaw) if yaw else vector
+
+
+def _placed(message: SetpointLocal, here: Pose) -> Vector:
+    """Frame 1: from the origin. 7: from here, along north and east. 8 and 9: from here, along the body."""
+    if message.frame == LOCAL_NED:
+        return message.position
+    turn = 0.0 if message.frame == LOCAL_OFFSET_NED else here.yaw
+    dx, dy, dz = _turned(message.position, turn)
+    x, y, z = here.position
+    return x + dx, y + dy, z + dz

@@ -1,0 +1,149 @@
+"""What the autopilot is doing, as a reference to track: stand, take off, follow set-points, hold, land.
+
+All in the vehicle's own local NED. Every motion goes through the shaper, so that none of them begins with a
+step.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from typing import Final
+
+from mavlink_bridge.messages import Vector
+from sitl.autopilot_config import AutopilotConfig
+from sitl.setpoints import POSITION, VELOCITY, Pose, Setpoint
+from sitl.shaper import Heading, Limits, Shaper
+
+_STAY: Final = Setpoint((VELOCITY, VELOCITY, VELOCITY))
+_FOR_EVER: Final = 1 << 62
+_REACHED: Final = (0.05, 0.1)  # m, m/s
+
+
+class Activity(Enum):
+    """What the guidance is busy with. IDLE: no reference, motors off or idling."""
+
+    IDLE = "idle"
+    TAKEOFF = "takeoff"
+    TRACK = "track"
+    HOLD = "hold"
+    LAND = "land"
+
+
+class Guidance:
+    """One reference, moved on in steps of some ms.
+
+    ``position``, ``velocity``, ``acceleration`` (SI, local NED) and ``yaw``, ``yaw_rate`` are what to track
+    now. ``timed_out`` becomes true when set-points stop for longer than they may: it brakes and holds where
+    it comes to rest.
+    """
+
+    def __init__(self, config: AutopilotConfig) -> None:
+        limits = config.max_speed, config.max_acceleration, config.max_jerk
+        gentle = config.gentle_acceleration, config.max_jerk
+        self._config = config
+        self._limits = {
+            Activity.TAKEOFF: Limits(config.takeoff_speed, *gentle),
+            Activity.TRACK: Limits(*limits),
+            Activity.HOLD: Limits(config.max_speed, *gentle),
+            Activity.LAND: Limits(config.max_speed, *gentle),
+        }
+        self._shaper = Shaper()
+        self._heading = Heading(config.max_yaw_rate, config.max_yaw_acceleration)
+        self._setpoint = _STAY
+        self._received = 0
+        self._deadline = _FOR_EVER
+        self.activity = Activity.IDLE
+        self.timed_out = False
+
+    @property
+    def position(self) -> Vector:
+        return self._shaper.position
+
+    @property
+    def velocity(self) -> Vector:
+        return self._shaper.velocity
+
+    @property
+    def acceleration(self) -> Vector:
+        return self._shaper.acceleration
+
+    @property
+    def yaw(self) -> float:
+        return self._heading.yaw
+
+    @property
+    def yaw_rate(self) -> float:
+        return self._heading.yaw_rate
+
+    @property
+    def reached(self) -> bool:
+        """Whether a takeoff is where it leads, and all but at rest."""
+        gap = self._setpoint.position[2] - self._shaper.position[2]
+        return abs(gap) < _REACHED[0] and math.hypot(*self._shaper.velocity) < _REACHED[1]
+
+    def wanted(self, now: int) -> Setpoint:
+        """The set-point that is followed, extrapolated to ``now`` (µs) and within the limits."""
+        config = self._config
+        age = (now - self._received) * 1e-6
+        return self._setpoint.after(age, config.thrusting).limited(config.max_speed, config.max_acceleration)
+
+    def idle(self) -> None:
+        """No reference."""
+        self.activity = Activity.IDLE
+
+    def takeoff(self, height: float, here: Pose) -> None:
+        """Straight up to ``height`` (m above the origin)."""
+        self._leave_ground(here)
+        x, y, _ = self._shaper.position
+        self._begin(Activity.TAKEOFF, Setpoint((POSITION, POSITION, POSITION), (x, y, -height)))
+
+    def track(self, setpoint: Setpoint, received: int, timeout: int | None, here: Pose, now: int) -> None:
+        """Follow ``setpoint``, which is for the time ``received`` (µs), until ``timeout`` µs after that."""
+        self._leave_ground(here)
+        self._begin(Activity.TRACK, setpoint)
+        self._received = received
+        self._deadline = _FOR_EVER if timeout is None else received + timeout
+        # A trajectory that is being passed through takes effect at once, not at the end of the next step.
+        self._shaper.advance(self.wanted(now), self._limits[Activity.TRACK], 0.0)
+
+    def hold(self) -> None:
+        """Brake, and stay where that ends."""
+        self._begin(Activity.HOLD, _STAY)
+
+    def settle(self) -> None:
+        """Stay where the takeoff led."""
+        self.activity = Activity.HOLD
+
+    def land(self, speed: float) -> None:
+        """Brake, and sink at ``speed`` (m/s)."""
+        self._begin(Activity.LAND, _STAY._replace(velocity=(0.0, 0.0, speed)))
+
+    def advance(self, now: int, step: int) -> None:
+        """Move the reference from ``now`` to ``now + step`` (µs)."""
+        activity = self.activity
+        if activity is Activity.IDLE:
+            return
+        end = now + step
+        dt = step * 1e-6
+        if activity is Activity.TRACK:
+            if end > self._deadline:
+                self.hold()
+                self.timed_out = True
+            wanted = self.wanted(end)
+        else:
+            if activity is Activity.HOLD and self._shaper.at_rest and self._heading.yaw_rate == 0.0:
+                return
+            wanted = self._setpoint
+        self._shaper.advance(wanted, self._limits[self.activity], dt)
+        self._heading.advance(wanted.yaw, wanted.yaw_rate, dt)
+
+    def _begin(self, activity: Activity, setpoint: Setpoint) -> None:
+        self.activity = activity
+        self.timed_out = False
+        self._setpoint = setpoint
+
+    def _leave_ground(self, here: Pose) -> None:
+        if self.activity is Activity.IDLE:
+            self._shaper.restart(here.position)
+            self._heading.restart(here.yaw)

@@ -1,0 +1,58 @@
+"""Where a vehicle's own local frame lies in the site, the one NED frame in which all vehicles of a simulation
+move.
+
+site NED = NED of the site's ``FleetFrame``; local NED = NED at the vehicle's own GPS_GLOBAL_ORIGIN.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from mavlink_bridge.frames import FleetFrame, enu_to_ned, ned_to_enu, yaw_to_ned
+from mavlink_bridge.messages import Vector
+
+Array = npt.NDArray[np.float64]
+
+
+class Origin:
+    """An origin at whole degE7 and mm, so that the GPS_GLOBAL_ORIGIN (49) that is sent is exact.
+
+    p_site = R p_local + t: ``rotation`` R (3, 3), ``position`` t (3,) m, site NED; ``turn`` (rad) is the yaw
+    in the site of the local north.
+    """
+
+    def __init__(self, site: FleetFrame, latitude: float, longitude: float, altitude: float) -> None:
+        self.latitude = round(latitude * 1e7) / 1e7
+        self.longitude = round(longitude * 1e7) / 1e7
+        self.altitude = round(altitude * 1e3) / 1e3
+        self._site = site
+        frame = site.local(self.latitude, self.longitude, self.altitude)
+        # Row i of ``axes`` is the local axis i in the site: the transpose of R, as rows of vectors need it.
+        axes = enu_to_ned(frame.velocity_to_fleet(np.eye(3)))
+        axes.flags.writeable = False
+        self._axes = axes
+        self.rotation = axes.T
+        self.position = enu_to_ned(frame.origin_fleet)
+        self.position.flags.writeable = False
+        self.turn = yaw_to_ned(frame.yaw_to_fleet(0.0))
+
+    def motion_to_site(self, motion: npt.ArrayLike) -> Array:
+        """Rows (n ≥ 1, 3) of position, then free vectors: local NED → site NED."""
+        moved: Array = np.array(motion) @ self._axes
+        moved[0] += self.position
+        return moved
+
+    def position_to_local(self, site: Array) -> Vector:
+        """A position (3,), m: site NED → local NED."""
+        x, y, z = ((site - self.position) @ self.rotation).tolist()
+        return x, y, z
+
+    def vector_to_local(self, site: Array) -> Vector:
+        """A velocity or acceleration (3,): site NED → local NED."""
+        x, y, z = (site @ self.rotation).tolist()
+        return x, y, z
+
+    def geodetic(self, local: Vector) -> tuple[float, float, float]:
+        """Latitude (deg), longitude (deg), altitude (m) of a position (m, local NED)."""
+        return self._site.to_geodetic(ned_to_enu(self.motion_to_site([local])[0]))

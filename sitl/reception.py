@@ -1,0 +1,67 @@
+"""One message in, its answer out: who is meant, and who takes care of it."""
+
+from __future__ import annotations
+
+from mavlink_bridge.messages import (
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    Message,
+    Ping,
+    SetpointLocal,
+    Source,
+    Timesync,
+)
+from sitl.commander import Commander
+from sitl.orders import Orders
+from sitl.sensors import Estimate
+from sitl.steering import Steering
+from sitl.voice import Voice
+
+
+class Reception:
+    """Hands messages for this vehicle to ``orders`` and ``steering``, answers TIMESYNC (111) and PING (4)
+    itself, and leaves alone what is for others. Answers go to ``outbox``."""
+
+    def __init__(
+        self,
+        source: Source,
+        outbox: list[Message],
+        voice: Voice,
+        commander: Commander,
+        orders: Orders,
+        steering: Steering,
+    ) -> None:
+        self._source = source
+        self._outbox = outbox
+        self._voice = voice
+        self._commander = commander
+        self._orders = orders
+        self._steering = steering
+
+    def handle(self, message: Message, now: int, estimate: Estimate) -> None:
+        """Act on a message that arrived at ``now`` (µs since boot), when ``estimate`` was believed."""
+        match message:
+            case SetpointLocal():
+                if self._is_mine(message.target_system, message.target_component):
+                    self._steering.steer(message, self._commander.status(now), estimate.pose, now)
+            case CommandLong() | CommandInt():
+                if self._is_mine(message.target_system, message.target_component):
+                    self._obey(message, now)
+            case Timesync(tc1=0):
+                # Zero would make the reply a request.
+                self._outbox.append(Timesync(self._source, max(1, now * 1000), message.ts1))
+            case Ping(target_system=0):
+                system, component = message.source
+                self._outbox.append(Ping(self._source, message.time, message.sequence, system, component))
+            case _:
+                pass
+
+    def _obey(self, message: CommandLong | CommandInt, now: int) -> None:
+        result, reason = self._orders.obey(message, now)
+        self._outbox.append(CommandAck(self._source, message.command, result, 0, 0, *message.source))
+        if reason:
+            self._voice.warn(reason)
+
+    def _is_mine(self, system: int, component: int) -> bool:
+        return system in (0, self._source.system) and component in (0, self._source.component)

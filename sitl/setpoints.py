@@ -1,0 +1,163 @@
+"""What a set-point asks for once an autopilot has understood it, and the words shared by both dialects.
+
+A SET_POSITION_TARGET_LOCAL_NED (84) means different things to ArduPilot and to PX4: ``flavours`` holds the
+two readings. Each turns the message into one ``Reading``: a ``Setpoint`` to fly, a ``Stop`` (understood as
+"brake and hold") or a ``Refusal`` (nothing changes). A stop or a refusal carries the reason that goes back as
+STATUSTEXT.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from mavlink_bridge.messages import SetpointLocal, Vector
+
+IGNORE_POSITION: Final = 0x007
+IGNORE_VELOCITY: Final = 0x038
+IGNORE_ACCELERATION: Final = 0x1C0
+FORCE: Final = 0x200
+IGNORE_YAW: Final = 0x400
+IGNORE_YAW_RATE: Final = 0x800
+
+# MAV_FRAME
+LOCAL_NED: Final = 1
+LOCAL_OFFSET_NED: Final = 7
+BODY_NED: Final = 8
+BODY_OFFSET_NED: Final = 9
+
+# The highest derivative-free quantity that an axis is told: the level at which its loop closes.
+POSITION: Final = 0
+VELOCITY: Final = 1
+ACCELERATION: Final = 2
+
+ZERO: Final[Vector] = (0.0, 0.0, 0.0)
+
+# A number at a limit may come back a little above it from float32.
+_ROUNDING: Final = 1.0 + 1e-6
+# Beyond any flight: larger numbers are damage, and would overflow the float32 of the echo.
+_RANGES: Final = (
+    ("position", 1e5),
+    ("velocity", 1e3),
+    ("acceleration", 1e3),
+    ("yaw", 1e3),
+    ("yaw rate", 1e2),
+)
+
+
+class Pose(NamedTuple):
+    """Where the vehicle believes it is: position (m, own local NED) and yaw (rad, clockwise from north)."""
+
+    position: Vector
+    yaw: float
+
+
+class Setpoint(NamedTuple):
+    """A motion to follow, in the vehicle's own local NED, valid at the time it was received.
+
+    ``levels`` says per axis what is controlled (POSITION, VELOCITY or ACCELERATION); the derivatives of that
+    quantity are feed-forward, zero where they were not given. ``complete`` when all axes have position *and*
+    velocity, so that the stream is a trajectory and not a destination. ``yaw`` and ``yaw_rate`` (rad, rad/s)
+    are None when ignored.
+    """
+
+    levels: tuple[int, int, int]
+    position: Vector = ZERO
+    velocity: Vector = ZERO
+    acceleration: Vector = ZERO
+    yaw: float | None = None
+    yaw_rate: float | None = None
+    complete: bool = False
+
+    @property
+    def moves(self) -> bool:
+        """Whether it asks for motion that must not go on for ever when the sender falls silent."""
+        return (
+            self.levels != (POSITION, POSITION, POSITION)
+            or self.velocity != ZERO
+            or self.acceleration != ZERO
+        )
+
+    def limited(self, speed: float, acceleration: float) -> Setpoint:
+        """The same with feed-forward within the limits (m/s, m/s²); not ``complete`` if that changed it."""
+        fast = math.hypot(*self.velocity)
+        strong = math.hypot(*self.acceleration)
+        if fast <= speed * _ROUNDING and strong <= acceleration * _ROUNDING:
+            return self
+        return self._replace(
+            velocity=scaled(self.velocity, min(1.0, speed / fast) if fast else 1.0),
+            acceleration=scaled(self.acceleration, min(1.0, acceleration / strong) if strong else 1.0),
+            complete=False,
+        )
+
+    def after(self, age: float, thrusting: float) -> Setpoint:
+        """Extrapolated by ``age`` seconds: the acceleration acts for the first ``thrusting`` of them, the
+        velocity reached then is kept (constant-acceleration kinematics, per axis)."""
+        burn = age if age < thrusting else thrusting
+        coast = age - burn
+        (x, y, z), (vx, vy, vz), (ax, ay, az) = self.position, self.velocity, self.acceleration
+        ux, uy, uz = vx + ax * burn, vy + ay * burn, vz + az * burn
+        half = 0.5 * burn
+        return Setpoint(
+            self.levels,
+            (
+                x + (vx + ux) * half + ux * coast,
+                y + (vy + uy) * half + uy * coast,
+                z + (vz + uz) * half + uz * coast,
+            ),
+            (ux, uy, uz),
+            self.acceleration if coast == 0.0 else ZERO,
+            None if self.yaw is None else self.yaw + (self.yaw_rate or 0.0) * age,
+            self.yaw_rate,
+            self.complete,
+        )
+
+
+class Stop(NamedTuple):
+    """Understood as: brake and hold."""
+
+    reason: str
+
+
+class Refusal(NamedTuple):
+    """Not understood or not acceptable: nothing changes."""
+
+    reason: str
+
+
+Reading = Setpoint | Stop | Refusal
+
+
+def scaled(vector: Vector, factor: float) -> Vector:
+    """``factor`` times ``vector``."""
+    return vector[0] * factor, vector[1] * factor, vector[2] * factor
+
+
+def rotated(vector: Vector, yaw: float) -> Vector:
+    """A vector given forward-right-down of a level vehicle of heading ``yaw``, in NED."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]
+
+
+def unusable(message: SetpointLocal, mask: int) -> str | None:
+    """Why a field that ``mask`` uses cannot be used (NaN, infinite, beyond any flight), or None."""
+    fields = (message.position, message.velocity, message.acceleration, (message.yaw,), (message.yaw_rate,))
+    bits = (1, 8, 64, IGNORE_YAW, IGNORE_YAW_RATE)
+    for values, bit, (name, bound) in zip(fields, bits, _RANGES, strict=True):
+        for axis, value in enumerate(values):
+            if not mask & bit << axis and not abs(value) <= bound:
+                fault = "out of range" if math.isfinite(value) else "not a number"
+                return f"Set-point refused: {name} {fault}"
+    return None
+
+
+def mask_of(setpoint: Setpoint) -> int:
+    """The type mask that describes what is followed, for POSITION_TARGET_LOCAL_NED (85)."""
+    mask = 0
+    for axis, level in enumerate(setpoint.levels):
+        mask |= (1 << axis) * (level > POSITION) | (8 << axis) * (level > VELOCITY)
+    if not setpoint.complete and POSITION in setpoint.levels and setpoint.velocity == ZERO:
+        mask |= IGNORE_VELOCITY
+    if setpoint.acceleration == ZERO and ACCELERATION not in setpoint.levels:
+        mask |= IGNORE_ACCELERATION
+    return mask | IGNORE_YAW * (setpoint.yaw is None) | IGNORE_YAW_RATE * (setpoint.yaw_rate is None)

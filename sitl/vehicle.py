@@ -1,0 +1,182 @@
+"""A simulated multirotor with its controller: reference in, true motion out."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sitl.airframe import FloatArray, airframe, airframe_record
+from sitl.config import VehicleConfig
+from sitl.environment import GRAVITY
+from sitl.pipeline import COMMAND_SIZE, FLYING, IDLE, LANDED, STATE_SIZE, STOPPED, advance_rows
+
+_ZERO = np.zeros(3)
+_ZERO.flags.writeable = False
+_JERK_TIME = 0.1
+"""Time constant of the jerk that is read from a stream of references (s)."""
+
+
+class Reference(NamedTuple):
+    """What a vehicle shall follow from now on; it is extrapolated with all the derivatives it gives."""
+
+    position: FloatArray  # (3,) m, NED
+    velocity: FloatArray = _ZERO  # (3,) m/s, NED
+    acceleration: FloatArray = _ZERO  # (3,) m/s², NED
+    jerk: FloatArray = _ZERO  # (3,) m/s³, NED
+    snap: FloatArray = _ZERO  # (3,) m/s⁴, NED
+    yaw: float = 0.0  # rad, clockwise from north
+    yaw_rate: float = 0.0  # rad/s
+
+    @classmethod
+    def hover(cls, position: ArrayLike, yaw: float = 0.0) -> Self:
+        """Stay at a position (3,) (m, NED) with a heading (rad)."""
+        return cls(np.asarray(position, dtype=np.float64), yaw=yaw)
+
+    def ahead(self, elapsed: int) -> Self:
+        """The same motion ``elapsed`` µs on, by its Taylor polynomial."""
+        t = elapsed * 1e-6
+        x, v, a, j, s, yaw, yaw_rate = self
+        return self._replace(
+            position=x + t * (v + t / 2.0 * (a + t / 3.0 * (j + t / 4.0 * s))),
+            velocity=v + t * (a + t / 2.0 * (j + t / 3.0 * s)),
+            acceleration=a + t * (j + t / 2.0 * s),
+            jerk=j + t * s,
+            yaw=yaw + t * yaw_rate,
+        )
+
+    def following(self, previous: Self, elapsed: int) -> Self:
+        """This reference with the jerk that follows from ``previous``, ``elapsed`` µs ago.
+
+        For a stream of set-points that carry no jerk: without it the controller sees no turning of the thrust
+        axis ahead, and lags in curves. Low-pass filtered, so that a jump of acceleration does not become a
+        jolt.
+        """
+        if elapsed <= 0:
+            return self._replace(jerk=previous.jerk)
+        t = elapsed * 1e-6
+        change = (self.acceleration - previous.acceleration) / t
+        share = -math.expm1(-t / _JERK_TIME)
+        return self._replace(jerk=previous.jerk + share * (change - previous.jerk))
+
+
+class VehicleState(NamedTuple):
+    """The true state of a vehicle; own copies."""
+
+    position: FloatArray  # (3,) m, NED
+    velocity: FloatArray  # (3,) m/s, NED
+    attitude: FloatArray  # (4,) w, x, y, z, body (FRD) to NED
+    body_rates: FloatArray  # (3,) rad/s, FRD
+    rotor_speeds: FloatArray  # (n,) rad/s
+    acceleration: FloatArray  # (3,) m/s², NED, mean of the last physics step; 0 at rest
+
+
+class NotFiniteError(ValueError):
+    """A reference or a wind that is not finite; the vehicle has not moved."""
+
+
+def initial_states(config: VehicleConfig, positions: ArrayLike, yaws: ArrayLike, ground: float) -> FloatArray:
+    """State rows (K, STATE_SIZE + n) of vehicles at rest, motors off.
+
+    Positions (K, 3) in m, NED; yaws (K,) in rad; ``ground`` is the NED z (m). Who starts on the ground or
+    below it is put on its gear there.
+    """
+    places = np.atleast_2d(np.asarray(positions, dtype=np.float64))
+    half_yaws = 0.5 * np.asarray(yaws, dtype=np.float64)
+    states = np.zeros((len(places), STATE_SIZE + len(config.rotors)))
+    floor = ground - config.rest_height
+    states[:, 0:3] = places
+    states[:, 2] = np.minimum(places[:, 2], floor)
+    states[:, 6], states[:, 9] = np.cos(half_yaws), np.sin(half_yaws)
+    states[:, LANDED] = places[:, 2] >= floor
+    return states
+
+
+def command_row(
+    reference: Reference | None, *, idle: bool = False, wind: ArrayLike = _ZERO, ground: float = 0.0
+) -> FloatArray:
+    """The command row (COMMAND_SIZE,) for ``advance_many``; arguments as for ``Vehicle``."""
+    row = np.zeros(COMMAND_SIZE)
+    write_command(row, reference, idle, wind, ground)
+    return row
+
+
+def write_command(
+    row: FloatArray, reference: Reference | None, idle: bool, wind: ArrayLike, ground: float
+) -> None:
+    """Fill a command row (COMMAND_SIZE,) in place."""
+    if reference is None:
+        row[0] = IDLE if idle else STOPPED
+    else:
+        row[0] = FLYING
+        row[1:4], row[4:7], row[7:10], row[10:13], row[13:16], row[16], row[17] = reference
+    row[18:21] = wind
+    row[21] = ground
+
+
+def advance_many(
+    states: FloatArray, commands: FloatArray, airframes: NDArray[np.void], steps: int
+) -> FloatArray:
+    """Advance K vehicles of one type in place; the positions (K, steps, 3) after each physics step.
+
+    ``states`` (K, STATE_SIZE + n) and ``commands`` (K, COMMAND_SIZE) are rows as in ``pipeline``,
+    C-contiguous float64; ``airframes`` comes from ``airframe_record``. Each vehicle moves exactly, to the
+    bit, as it would alone. Raises NotFiniteError.
+    """
+    tracks = np.empty((states.shape[0], steps, 3))
+    bad = advance_rows(states, commands, airframes, steps, tracks)
+    if bad >= 0:
+        raise NotFiniteError(f"the command of vehicle {bad} is not finite: {commands[bad].tolist()}")
+    return tracks
+
+
+class Vehicle:
+    """One vehicle over flat ground."""
+
+    def __init__(
+        self,
+        config: VehicleConfig,
+        position: ArrayLike,
+        yaw: float = 0.0,
+        ground: float = 0.0,
+        gravity: float = GRAVITY,
+    ) -> None:
+        """Motors off, at rest; ``position`` (3,) and the z of the ``ground`` in m, NED, ``yaw`` in rad."""
+        self.config = config
+        self._airframe = airframe_record(airframe(config, gravity))
+        self._states = initial_states(config, np.asarray(position), np.asarray([yaw]), ground)
+        self._commands = np.zeros((1, COMMAND_SIZE))
+        self._state, self._command = self._states[0], self._commands[0]
+        self._ground = ground
+
+    def advance(
+        self, steps: int, reference: Reference | None, wind: ArrayLike = _ZERO, *, idle: bool = False
+    ) -> FloatArray:
+        """Advance by ``steps`` physics steps; the true positions (steps, 3) (m, NED) after each of them.
+
+        The reference holds for the beginning of the first step. None stops the motors, or with ``idle``
+        leaves them turning slowly. ``wind`` (3,) is the velocity of the air (m/s, NED). Raises
+        NotFiniteError.
+        """
+        write_command(self._command, reference, idle, wind, self._ground)
+        track: FloatArray = advance_many(self._states, self._commands, self._airframe, steps)[0]
+        return track
+
+    @property
+    def state(self) -> VehicleState:
+        """The true state after the last step."""
+        row = self._state.copy()
+        return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], row[STATE_SIZE:], row[13:16])
+
+    @property
+    def yaw(self) -> float:
+        """Heading (rad, −π…π, clockwise from north)."""
+        w, x, y, z = self._state[6:10].tolist()
+        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the vehicle stands on the ground after the last step."""
+        return bool(self._state[LANDED])

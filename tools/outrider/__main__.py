@@ -1,0 +1,92 @@
+"""The command ``outrider``. Heavy imports wait until a command needs them."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from outrider.errors import InputError, OutriderError
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="A ring of MAVs escorts a moving target without colliding.",
+)
+BAD_INPUT, FAULT = 2, 3
+
+
+@app.callback()
+def _root() -> None:
+    """Keeps every command a sub-command."""
+
+
+@app.command()
+def swarm(
+    scenario: Annotated[str, typer.Argument(help="A file, or the name of a shipped scenario.")],
+    method: Annotated[Optional[str], typer.Option(help="baseline, tangential; joined by +.")] = None,  # noqa: UP045
+    avoidance: Annotated[Optional[str], typer.Option(help="field.")] = None,  # noqa: UP045
+    planar: Annotated[bool, typer.Option("--planar", help="Fix the height, as the paper.")] = False,
+    vehicles: Annotated[Optional[int], typer.Option(help="How many fly.")] = None,  # noqa: UP045
+    seed: Annotated[int, typer.Option(min=0, help="Of jitter, phases and link faults.")] = 1,
+    loss: Annotated[Optional[float], typer.Option(min=0.0, max=1.0, help="Share of messages lost.")] = None,  # noqa: UP045
+    delay_ms: Annotated[Optional[float], typer.Option(min=0.0, help="Of the swarm and target links.")] = None,  # noqa: UP045
+    sensors: Annotated[Optional[str], typer.Option(help="truth.")] = None,  # noqa: UP045
+    replan_hz: Annotated[Optional[float], typer.Option(help="Plans per second.")] = None,  # noqa: UP045
+    out: Annotated[Optional[Path], typer.Option(help="Run directory; new or empty.")] = None,  # noqa: UP045
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Fly a scenario in lock-step and leave logs, summary and picture in a run directory."""
+    from outrider import swarm as flying
+    from outrider.console import progress, show
+    from outrider.summary import exit_status
+
+    options = flying.Options(method, avoidance, planar, vehicles, loss, delay_ms, sensors, replan_hz)
+    prepared = flying.prepare(scenario, options)
+    directory = flying.run_directory(out, prepared.scenario, seed)
+    with progress(prepared.scenario.duration_s) as watch:
+        summary = flying.fly(prepared, seed, directory, watch)
+    if as_json:
+        sys.stdout.write(json.dumps(summary) + "\n")
+    else:
+        show(summary)
+    raise typer.Exit(exit_status(summary))
+
+
+@app.command()
+def bench(
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer rounds, no flight.")] = False,
+) -> None:
+    """Measure this machine: plan step, PIQP, physics, codec, tlog, real-time factor (CPU time)."""
+    from outrider.bench import measure
+    from outrider.console import bench_progress, show_bench
+
+    with bench_progress() as watch:
+        figures = measure(watch, quick=quick)
+    if as_json:
+        sys.stdout.write(json.dumps(figures) + "\n")
+    else:
+        show_bench(figures)
+
+
+def main() -> None:
+    """Run the command line: bad input ends with status 2 and one line for each fault, never with a traceback."""
+    from mavlink_bridge.errors import BridgeError
+
+    try:
+        app(standalone_mode=True)
+    except InputError as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(BAD_INPUT)
+    except (OutriderError, BridgeError, OSError) as error:
+        sys.stderr.write(f"outrider: {error}\n")
+        sys.exit(FAULT)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""The operator's ground station as a node: it gives each companion its go, its goal and the order to land."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.node import COMPONENT
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Source
+from mavlink_bridge.node import Datagram
+
+LINK = "ground"
+NAV_LAND, NAV_TAKEOFF, DO_REPOSITION = 21, 22, 192
+GLOBAL_FRAME = 0
+_NAN = float("nan")
+_RETRY = 500_000
+
+_Key = tuple[int, int]
+
+
+class Operator:
+    """Repeats every order each half second until its companion acknowledges it."""
+
+    name = "operator"
+
+    def __init__(self, fleet: FleetFrame) -> None:
+        self._fleet = fleet
+        self._source = Source(255, 190)
+        self._codec = Codec()
+        self._open: dict[_Key, tuple[CommandInt | CommandLong, int]] = {}
+        self._now = 0
+
+    def take_off(self, system: int, height: float) -> None:
+        """Climb to ``height`` (m) above the start, and escort."""
+        params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, height)
+        self._order(CommandLong(self._source, system, COMPONENT, NAV_TAKEOFF, 0, params))
+
+    def land(self, system: int) -> None:
+        """Land where you are."""
+        params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0)
+        self._order(CommandLong(self._source, system, COMPONENT, NAV_LAND, 0, params))
+
+    def goal(self, system: int, position: NDArray[np.float64]) -> None:
+        """Go to ``position`` (3,), fleet-local ENU."""
+        latitude, longitude, altitude = self._fleet.to_geodetic(position)
+        self._order(
+            CommandInt(
+                self._source,
+                system,
+                COMPONENT,
+                GLOBAL_FRAME,
+                DO_REPOSITION,
+                (-1.0, 0.0, 0.0, _NAN),
+                round(latitude * 1e7),
+                round(longitude * 1e7),
+                altitude,
+            )
+        )
+
+    @property
+    def unanswered(self) -> list[int]:
+        """System ids that have not acknowledged an order."""
+        return sorted({system for system, _ in self._open})
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Cross off what was acknowledged, send what is new or overdue."""
+        self._now = now
+        for datagram in inbox:
+            for message in self._codec.feed(datagram.data):
+                if isinstance(message, CommandAck) and message.result == 0:
+                    self._open.pop((message.source.system, message.command), None)
+        out = []
+        for key, (order, due) in self._open.items():
+            if now >= due:
+                out.append(Datagram(LINK, self._codec.encode(order)))
+                self._open[key] = (order, now + _RETRY)
+        return out
+
+    def _order(self, order: CommandInt | CommandLong) -> None:
+        self._open[order.target_system, order.command] = (order, self._now)

@@ -1,0 +1,145 @@
+"""``outrider swarm``: a scenario, changed by options, flown, summarised and drawn into a run directory."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+from pydantic import ValidationError
+
+from outrider import figures
+from outrider.errors import InputError
+from outrider.flight import Flight, Stage
+from outrider.resources import config_root, find
+from outrider.scenario import Scenario
+from outrider.summary import Cost, Value, summarise, write
+from outrider.yaml_file import load
+from sitl.config import VehicleConfig
+
+METHODS = ("baseline", "tangential")
+Progress = Callable[[Stage, float], None]
+
+
+class Options(NamedTuple):
+    """What the command line changes in a scenario; None leaves the file's value."""
+
+    method: str | None = None
+    avoidance: str | None = None
+    planar: bool = False
+    vehicles: int | None = None
+    loss: float | None = None
+    delay_ms: float | None = None
+    sensors: str | None = None
+    replan_hz: float | None = None
+
+
+class Prepared(NamedTuple):
+    """A scenario as it will be flown, with its vehicle."""
+
+    scenario: Scenario
+    vehicle: VehicleConfig
+
+
+def prepare(name: str, options: Options) -> Prepared:
+    """Load a scenario by name or path and apply ``options``. InputError in one line for whatever is wrong."""
+    scenario = load(find("scenarios", name), Scenario)
+    scenario = apply(scenario, options)
+    return Prepared(scenario, load(find("vehicles", scenario.vehicle), VehicleConfig))
+
+
+def apply(scenario: Scenario, options: Options) -> Scenario:
+    """The scenario with the options' changes, checked as a whole again."""
+    changes: dict[str, object] = {}
+    companion: dict[str, object] = {}
+    if options.method is not None:
+        companion["methods"] = _methods(options.method)
+    if options.avoidance not in (None, "field"):
+        raise InputError(f"--avoidance {options.avoidance}: allowed is 'field'")
+    if options.planar:
+        companion["planar"] = True
+    if options.vehicles is not None:
+        changes["vehicles"] = options.vehicles
+    if options.sensors is not None:
+        changes["sensors"] = options.sensors
+    if options.replan_hz is not None:
+        if options.replan_hz <= 0.0:
+            raise InputError(f"--replan-hz {options.replan_hz}: allowed are numbers above 0")
+        companion["rates"] = {
+            **scenario.companion.rates.model_dump(),
+            "replan_us": round(1e6 / options.replan_hz),
+        }
+    if options.loss is not None or options.delay_ms is not None:
+        links = scenario.links.model_dump()
+        for link in ("swarm", "target"):
+            if options.loss is not None:
+                links[link]["loss"] = options.loss
+            if options.delay_ms is not None:
+                links[link]["delay_ms"] = options.delay_ms
+        changes["links"] = links
+    if companion:
+        changes["companion"] = {**scenario.companion.model_dump(), **companion}
+    if not changes:
+        return scenario
+    try:
+        return Scenario.model_validate({**scenario.model_dump(), **changes})
+    except ValidationError as error:
+        raise InputError(
+            "; ".join(
+                f"{'.'.join(map(str, fault['loc'])) or 'options'}: {fault['msg']}" for fault in error.errors()
+            )
+        ) from None
+
+
+def fly(prepared: Prepared, seed: int, directory: Path, progress: Progress) -> dict[str, Value]:
+    """Fly it, and leave logs, the resolved configuration, the summary and the picture in ``directory``."""
+    scenario, vehicle = prepared
+    resolved = {"seed": seed, "scenario": scenario.model_dump(mode="json")}
+    (directory / "configuration.yaml").write_text(
+        yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True), encoding="utf-8"
+    )
+    wall, cpu = time.perf_counter(), time.process_time()
+    flight = Flight(
+        scenario, vehicle, seed, config_root() / "logs", progress=progress, run_directory=directory
+    )
+    flight.run()
+    cost = Cost(time.perf_counter() - wall, time.process_time() - cpu)
+    summary = summarise(flight, cost, seed, directory)
+    write(summary, directory / "summary.json")
+    figures.draw(flight, summary, directory / "flight.png")
+    return summary
+
+
+def run_directory(out: Path | None, scenario: Scenario, seed: int) -> Path:
+    """A new, empty directory: ``out``, or the first free ``runs/NAME-METHOD-seedN[-k]``. Nothing is overwritten."""
+    if out is not None:
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise InputError(f"--out {out}: exists and is not an empty directory")
+        return _made(out)
+    stem = f"{scenario.name}-{'+'.join(scenario.companion.methods)}-seed{seed}"
+    number = 1
+    while True:
+        path = Path("runs") / (stem if number == 1 else f"{stem}-{number}")
+        if not path.exists():
+            return _made(path)
+        number += 1
+
+
+def _made(path: Path) -> Path:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be made: {error.strerror}") from None
+    return path
+
+
+def _methods(text: str) -> tuple[str, ...]:
+    names = tuple(text.split("+"))
+    for name in names:
+        if name not in METHODS:
+            raise InputError(f"--method {text}: {name!r} is no method; allowed are {', '.join(METHODS)}, joined by +")
+    return names
+
+

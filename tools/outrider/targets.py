@@ -1,0 +1,162 @@
+"""The target as a node: it sends GLOBAL_POSITION_INT on its link, and the harness may ask where it truly is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import GlobalPosition, Source
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.tlog import read_tlog
+from outrider.errors import InputError
+from outrider.scenario import TARGET_SYSTEM, FixedTarget, RecordedTarget
+
+Array = NDArray[np.float64]
+LINK = "target"
+
+
+class Target(Protocol):
+    """A node with a known truth."""
+
+    @property
+    def name(self) -> str:
+        """Name of the node."""
+        ...
+
+    @property
+    def system(self) -> int:
+        """System id in its messages."""
+        ...
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """As every node."""
+        ...
+
+    def begin(self, now: int) -> None:
+        """The goal event: jump, or start the record."""
+        ...
+
+    def position(self, now: int) -> Array | None:
+        """True position (3,), fleet-local ENU, at ``now`` (µs); None when it is not there."""
+        ...
+
+
+class Standing:
+    """Stays at one place; jumps to another at the goal event if it has one."""
+
+    name = "target"
+    system = TARGET_SYSTEM
+
+    def __init__(self, config: FixedTarget, fleet: FleetFrame) -> None:
+        self._config = config
+        self._fleet = fleet
+        self._period = round(1e6 / config.rate_hz)
+        self._place = np.array(config.at)
+        self._next: int | None = None
+        self._boot = 0
+        self._codec = Codec()
+
+    def begin(self, now: int) -> None:
+        """Jump, and say so at once."""
+        if self._config.jump_to is not None:
+            self._place = np.array(self._config.jump_to)
+            self._next = now
+
+    def position(self, now: int) -> Array | None:
+        """Where it stands."""
+        return self._place
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Its position, at its rate."""
+        if self._next is None:
+            self._boot = self._next = now
+        if now < self._next:
+            return []
+        self._next += self._period
+        latitude, longitude, altitude = self._fleet.to_geodetic(self._place)
+        message = GlobalPosition(
+            Source(self.system, 1),
+            now - self._boot,
+            latitude,
+            longitude,
+            altitude,
+            float(self._place[2]),
+            (0.0, 0.0, 0.0),
+            None,
+        )
+        return [Datagram(LINK, self._codec.encode(message))]
+
+
+class Recording(NamedTuple):
+    """Frames of one sender: ``times`` (n,) µs from the start of the piece, the bytes, and the truth (n, 3) ENU."""
+
+    times: NDArray[np.int64]
+    frames: tuple[bytes, ...]
+    positions: Array
+
+
+class Recorded:
+    """Plays a piece of a tlog. Its truth is the log, interpolated at the times of reception."""
+
+    name = "target"
+
+    def __init__(self, config: RecordedTarget, path: Path, fleet: FleetFrame) -> None:
+        self.system = config.system
+        self.recording = load(config, path, fleet)
+        self._fleet = fleet
+        self._start: int | None = None
+        self._next = 0
+
+    def begin(self, now: int) -> None:
+        """The record starts now."""
+        self._start = now
+
+    def position(self, now: int) -> Array | None:
+        """The log interpolated at ``now``; before the start its first place; None after its end: it is gone."""
+        times, places = self.recording.times, self.recording.positions
+        since = 0 if self._start is None else now - self._start
+        if since > times[-1]:
+            return None
+        return np.array([np.interp(since, times, places[:, i]) for i in range(3)])
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Every frame whose time has come, byte for byte."""
+        out: list[Datagram] = []
+        if self._start is None:
+            return out
+        times, frames = self.recording.times, self.recording.frames
+        while self._next < len(frames) and times[self._next] <= now - self._start:
+            out.append(Datagram(LINK, frames[self._next]))
+            self._next += 1
+        return out
+
+
+def load(config: RecordedTarget, path: Path, fleet: FleetFrame) -> Recording:
+    """The piece of the log that ``config`` names. InputError when it holds no such messages there."""
+    codec = Codec(lambda identifier, system, _component: identifier == 33 and system == config.system)
+    first: int | None = None
+    times: list[int] = []
+    frames: list[bytes] = []
+    positions: list[Array] = []
+    for record in read_tlog(path):
+        first = record.time if first is None else first
+        since = record.time - first - round(config.start_s * 1e6)
+        if since < 0 or since > config.duration_s * 1e6:
+            continue
+        for message in codec.feed(record.frame):
+            if isinstance(message, GlobalPosition):
+                times.append(since)
+                frames.append(record.frame)
+                positions.append(fleet.to_enu(message.latitude, message.longitude, message.altitude))
+    if len(times) < 2:
+        raise InputError(
+            f"{path}: holds {len(times)} GLOBAL_POSITION_INT of system {config.system} between "
+            f"{config.start_s} s and {config.start_s + config.duration_s} s; at least 2 are needed"
+        )
+    return Recording(np.array(times) - times[0], tuple(frames), np.array(positions))
