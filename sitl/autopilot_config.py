@@ -56,8 +56,8 @@ class AutopilotConfig(BaseModel):
     max_acceleration: Positive = Field(6.0, description="of every reference, norm")
     max_jerk: Positive = Field(40.0, description="of shaped references, norm")
     gentle_acceleration: Positive = Field(1.5, description="for takeoff, landing, braking into a hold")
-    max_yaw_rate: Positive = math.radians(90.0)
-    max_yaw_acceleration: Positive = Field(1.5, description="the firefly's yaw torque gives 2.5 rad/s²")
+    max_yaw_rate: Positive = math.radians(180.0)
+    max_yaw_acceleration: Positive = Field(2.4, description="the firefly's yaw torque gives 2.5 rad/s²")
 
     guided_timeout: Seconds = Field(3.0, description="ArduPilot's GUID_TIMEOUT")
     offboard_timeout: Seconds = Field(1.0, description="PX4's COM_OF_LOSS_T")

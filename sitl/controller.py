@@ -82,9 +82,14 @@ def limited_yaw(yaw: float, axes: Axes, airframe: Airframe) -> float:
 
 @kernel
 def commanded_attitude(
-    A: tuple[Vector, Vector, Vector], yaw: float, yaw_rate: float, axes: Axes, airframe: Airframe
+    A: tuple[Vector, Vector, Vector],
+    yaw: float,
+    yaw_rate: float,
+    yaw_acceleration: float,
+    axes: Axes,
+    airframe: Airframe,
 ) -> tuple[Axes, Vector, Vector]:
-    """R_c, Ω_c and Ω̇_c from A, its derivatives and b1d = (cos ψ, sin ψ, 0) at a constant yaw rate.
+    """R_c, Ω_c and Ω̇_c from A, its derivatives and b1d = (cos ψ, sin ψ, 0) and its derivatives.
 
     The paper takes b2c normal to b1d, which turns the nose of a tilted vehicle away from ψ by up to half its
     tilt squared. With ``euler_heading`` b1c instead lies in the vertical plane of b1d, so that the yaw that
@@ -98,11 +103,13 @@ def commanded_attitude(
         b3 = (axes[2], still, still)
     nose = (math.cos(yaw), math.sin(yaw), 0.0)
     aside = (-nose[1], nose[0], 0.0)
+    inward = -yaw_rate * yaw_rate
     if airframe.euler_heading:
-        right = (aside, times(-yaw_rate, nose), times(-yaw_rate * yaw_rate, aside))
-        C = cross_with_rates(b3, cross_with_rates(right, b3))
+        turning = plus(times(inward, aside), -yaw_acceleration, nose)
+        C = cross_with_rates(b3, cross_with_rates((aside, times(-yaw_rate, nose), turning), b3))
     else:
-        C = cross_with_rates(b3, (nose, times(yaw_rate, aside), times(-yaw_rate * yaw_rate, nose)))
+        turning = plus(times(inward, nose), yaw_acceleration, aside)
+        C = cross_with_rates(b3, (nose, times(yaw_rate, aside), turning))
     if norm(C[0]) > _UPRIGHT_NOSE:
         b2 = unit_with_rates(C[0], C[1], C[2])
     else:
@@ -182,6 +189,7 @@ def control(
     target: Trajectory,
     yaw: float,
     yaw_rate: float,
+    yaw_acceleration: float,
     airframe: Airframe,
 ) -> tuple[float, Vector]:
     """Thrust f (N, along −b3) and moment M (N m, body) that track a trajectory (NED) and a heading (rad).
@@ -191,7 +199,7 @@ def control(
     """
     f, A = desired_force(position, velocity, acceleration, axes, rates, target, airframe)
     yaw = limited_yaw(yaw, axes, airframe)
-    commanded, rates_c, rates_change = commanded_attitude(A, yaw, yaw_rate, axes, airframe)
+    commanded, rates_c, rates_change = commanded_attitude(A, yaw, yaw_rate, yaw_acceleration, axes, airframe)
     rates_c = times(airframe.rate_feed_forward, rates_c)
     rates_change = times(airframe.rate_feed_forward, rates_change)
     e_R, followed = attitude_errors(axes, commanded, rates_c)

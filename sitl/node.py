@@ -80,6 +80,8 @@ class Autopilot:
         self._boot: int | None = None
         self._now = 0
         self._steps = 0
+        self._followed: Reference | None = None
+        self._elapsed = 0
         self._trace: list[npt.NDArray[np.float64]] = []
         self._trace_start = 0
 
@@ -112,6 +114,9 @@ class Autopilot:
         while self._steps < last:
             count = min(last - self._steps, stride - self._steps % stride)
             reference = self.reference
+            if reference is not None and self._followed is not None:
+                reference = reference.following(self._followed, self._elapsed)
+            self._followed, self._elapsed = reference, count * period
             self._trace.append(
                 vehicle.advance(count, reference, self.wind, idle=reference is None and self._commander.armed)
             )

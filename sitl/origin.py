@@ -39,7 +39,7 @@ class Origin:
 
     def motion_to_site(self, motion: npt.ArrayLike) -> Array:
         """Rows (n ≥ 1, 3) of position, then free vectors: local NED → site NED."""
-        moved: Array = np.array(motion) @ self._axes
+        moved: Array = np.array(motion).dot(self._axes)
         moved[0] += self.position
         return moved
 

@@ -6,8 +6,8 @@ Rows are float64. A *state* row has STATE_SIZE + n columns: position 0:3, veloci
 6:10 (w, x, y, z, body to NED), body rates 10:13 (rad/s, FRD), acceleration 13:16 (m/s², NED) and angular
 acceleration 16:19 (rad/s², FRD), both means of the last step, 19 is 1 when it stands on the ground, then the
 n rotor speeds (rad/s). A *command* row has COMMAND_SIZE columns: mode 0, the reference's position, velocity,
-acceleration, jerk, snap 1:16 (NED), yaw 16, yaw rate 17, wind 18:21 (m/s, NED, where the air goes), z of the
-ground 21 (m, NED).
+acceleration, jerk, snap 1:16 (NED), yaw, yaw rate and yaw acceleration 16:19, wind 19:22 (m/s, NED, where the
+air goes), z of the ground 22 (m, NED).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 STATE_SIZE = 20
 LANDED = 19
-COMMAND_SIZE = 22
+COMMAND_SIZE = 23
 STOPPED, IDLE, FLYING = 0.0, 1.0, 2.0
 """Modes: motors off; rotors turning slowly; following the reference."""
 
@@ -71,7 +71,7 @@ def commanded_speeds(
         commanded[:] = airframe.omega_idle if command[0] == IDLE else 0.0
         return
     position, velocity, attitude, rates = motion
-    yaw_rate = command[17]
+    yaw_rate, yaw_acceleration = command[17], command[18]
     thrust, moment = control(
         position,
         velocity,
@@ -79,8 +79,9 @@ def commanded_speeds(
         body_axes(attitude),
         rates,
         extrapolated(command, t),
-        command[16] + yaw_rate * t,
-        yaw_rate,
+        command[16] + t * (yaw_rate + 0.5 * t * yaw_acceleration),
+        yaw_rate + t * yaw_acceleration,
+        yaw_acceleration,
         airframe,
     )
     allocate(thrust, moment, airframe, commanded)
@@ -102,7 +103,7 @@ def physics_step(
     velocity through the air are carried there by the accelerations of the last step.
     """
     half_step(speeds, commanded, airframe)
-    wind = vector_at(command, 18)
+    wind = vector_at(command, 19)
     half = 0.5 * airframe.step
     middle_velocity = plus(motion[1], half, acceleration)
     middle_rates = plus(motion[3], half, angular_acceleration)
@@ -111,7 +112,7 @@ def physics_step(
     force, moment = wrench(speeds, air_velocity, middle_rates, airframe)
     half_step(speeds, commanded, airframe)
     moved = free_flight(motion, force, moment, airframe)
-    moved, landed = ground_contact(motion, moved, command[21], airframe)
+    moved, landed = ground_contact(motion, moved, command[22], airframe)
     rate = 1.0 / airframe.step
     return (
         moved,

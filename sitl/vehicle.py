@@ -17,6 +17,8 @@ _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
 _JERK_TIME = 0.1
 """Time constant of the jerk that is read from a stream of references (s)."""
+_TURN_TIME = 0.03
+"""Time constant of the yaw acceleration that is read from a stream of references (s)."""
 
 
 class Reference(NamedTuple):
@@ -29,6 +31,7 @@ class Reference(NamedTuple):
     snap: FloatArray = _ZERO  # (3,) m/s⁴, NED
     yaw: float = 0.0  # rad, clockwise from north
     yaw_rate: float = 0.0  # rad/s
+    yaw_acceleration: float = 0.0  # rad/s²
 
     @classmethod
     def hover(cls, position: ArrayLike, yaw: float = 0.0) -> Self:
@@ -38,28 +41,35 @@ class Reference(NamedTuple):
     def ahead(self, elapsed: int) -> Self:
         """The same motion ``elapsed`` µs on, by its Taylor polynomial."""
         t = elapsed * 1e-6
-        x, v, a, j, s, yaw, yaw_rate = self
+        x, v, a, j, s, yaw, yaw_rate, yaw_acceleration = self
         return self._replace(
             position=x + t * (v + t / 2.0 * (a + t / 3.0 * (j + t / 4.0 * s))),
             velocity=v + t * (a + t / 2.0 * (j + t / 3.0 * s)),
             acceleration=a + t * (j + t / 2.0 * s),
             jerk=j + t * s,
-            yaw=yaw + t * yaw_rate,
+            yaw=yaw + t * (yaw_rate + t / 2.0 * yaw_acceleration),
+            yaw_rate=yaw_rate + t * yaw_acceleration,
         )
 
     def following(self, previous: Self, elapsed: int) -> Self:
-        """This reference with the jerk that follows from ``previous``, ``elapsed`` µs ago.
+        """This reference with the jerk and yaw acceleration that follow from ``previous``, ``elapsed`` µs
+        ago.
 
-        For a stream of set-points that carry no jerk: without it the controller sees no turning of the thrust
-        axis ahead, and lags in curves. Low-pass filtered, so that a jump of acceleration does not become a
-        jolt.
+        For a stream of set-points that carry neither: without jerk the controller sees no turning of the
+        thrust axis ahead and lags in curves, and without yaw acceleration a weak yaw control lags behind every
+        turn. Low-pass filtered, so that a jump of what is given does not become a jolt.
         """
         if elapsed <= 0:
-            return self._replace(jerk=previous.jerk)
+            return self._replace(jerk=previous.jerk, yaw_acceleration=previous.yaw_acceleration)
         t = elapsed * 1e-6
+        share, turning_share = -math.expm1(-t / _JERK_TIME), -math.expm1(-t / _TURN_TIME)
         change = (self.acceleration - previous.acceleration) / t
-        share = -math.expm1(-t / _JERK_TIME)
-        return self._replace(jerk=previous.jerk + share * (change - previous.jerk))
+        turning = (self.yaw_rate - previous.yaw_rate) / t
+        return self._replace(
+            jerk=previous.jerk + share * (change - previous.jerk),
+            yaw_acceleration=previous.yaw_acceleration
+            + turning_share * (turning - previous.yaw_acceleration),
+        )
 
 
 class VehicleState(NamedTuple):
@@ -111,9 +121,9 @@ def write_command(
         row[0] = IDLE if idle else STOPPED
     else:
         row[0] = FLYING
-        row[1:4], row[4:7], row[7:10], row[10:13], row[13:16], row[16], row[17] = reference
-    row[18:21] = wind
-    row[21] = ground
+        row[1:4], row[4:7], row[7:10], row[10:13], row[13:16], row[16], row[17], row[18] = reference
+    row[19:22] = wind
+    row[22] = ground
 
 
 def advance_many(

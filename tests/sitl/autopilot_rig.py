@@ -84,7 +84,7 @@ class Rig:
 
     def run(self, seconds: float, *every: Message, hz: float = 50.0) -> None:
         """Let time pass, sending ``every`` at ``hz``."""
-        pause = round(1e6 / hz / self.tick)
+        pause = max(1, round(1e6 / hz / self.tick))
         for k in range(round(seconds * 1e6 / self.tick)):
             self.step(*(every if k % pause == 0 else ()))
 

@@ -80,18 +80,21 @@ def test_a_contradictory_mask_never_moves_it(hovering):
 
 
 @CALM
-@given(numbers=st.tuples(*[ANY] * 11), mask=st.integers(0, 0xFFFF), frame=st.sampled_from((1, 7, 8, 9)))
-def test_whatever_comes_the_flight_stays_finite_and_bounded(numbers, mask, frame):
-    rig = Rig("px4", start_airborne=None) if False else Rig("px4")
-    rig.run(1.1)
-    p, v, a = numbers[0:3], numbers[3:6], numbers[6:9]
-    message = setpoint(mask, p, v, a, numbers[9], numbers[10], frame=frame)
-    rig.step(message)
+@given(
+    flavour=st.sampled_from(FLAVOURS),
+    numbers=st.tuples(*[ANY] * 11),
+    mask=st.integers(0, 0xFFFF),
+    frame=st.sampled_from((1, 7, 8, 9)),
+)
+def test_whatever_comes_the_flight_stays_finite_and_bounded(flavour, numbers, mask, frame):
+    rig = Rig(flavour).hover(2.5)
+    rig.step(setpoint(position=(0.0, 0.0, -2.5)))
     rig.guided()
-    rig.order(400, 1)
-    rig.run(0.5, message)
+    message = setpoint(mask, numbers[0:3], numbers[3:6], numbers[6:9], *numbers[9:], frame=frame)
+    rig.run(1.0, message)
     assert np.all(np.isfinite(rig.position))
-    assert rig.speed < rig.config.max_speed
+    assert np.all(np.isfinite(rig.autopilot.state.attitude))
+    assert rig.speed < rig.config.max_acceleration * 1.2
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -139,7 +142,7 @@ def test_set_points_outside_guided_do_nothing():
         assert rig.texts == (["Set-point ignored: not in GUIDED"] if flavour == "ardupilot" else [])
 
 
-def drifted(rig, message, seconds=12.0):
+def drifted(rig, message, seconds):
     """Distance covered after the last set-point of a stream, and whether it then stands."""
     rig.steer(6.0, message)
     start = rig.position
@@ -149,7 +152,7 @@ def drifted(rig, message, seconds=12.0):
 
 def test_ardupilot_keeps_the_velocity_for_three_seconds_and_then_brakes():
     rig = Rig("ardupilot").hover(5.0)
-    distance, stands = drifted(rig, setpoint(VELOCITY_YAW, velocity=(2.0, 0.0, 0.0)))
+    distance, stands = drifted(rig, setpoint(VELOCITY_YAW, velocity=(2.0, 0.0, 0.0)), 12.0)
     assert 6.0 + 0.9 < distance < 8.5
     assert stands
     assert rig.autopilot.mode is Mode.GUIDED
@@ -167,7 +170,9 @@ def test_ardupilot_flies_to_a_position_for_ever():
 @pytest.mark.parametrize("loss", ["hold", "land", "descend"])
 def test_px4_leaves_offboard_after_one_second(loss):
     rig = Rig("px4", offboard_loss=loss).hover(5.0)
-    distance, stands = drifted(rig, setpoint(VELOCITY_YAW, velocity=(2.0, 0.0, 0.0)), seconds=4.0)
+    distance, stands = drifted(
+        rig, setpoint(VELOCITY_YAW, velocity=(2.0, 0.0, 0.0)), 8.0 if loss == "hold" else 3.0
+    )
     assert "Set-points timed out" in rig.texts
     if loss == "hold":
         assert 2.0 + 0.9 < distance < 4.5
@@ -184,7 +189,8 @@ def test_px4_position_set_points_time_out_too():
     rig = Rig("px4").hover(5.0)
     rig.steer(1.0, setpoint(position=(60.0, 0.0, -5.0)))
     rig.run(12.0)
-    assert rig.position[0] < 40.0
+    assert rig.speed < 0.1
+    assert rig.position[0] < 50.0
     assert rig.autopilot.mode is Mode.HOLD
 
 
@@ -243,7 +249,7 @@ def test_a_far_jump_of_a_trajectory_is_flown_within_limits(flavour):
         references.append(rig.autopilot.reference.position)
     steps = np.linalg.norm(np.diff(references, axis=0), axis=1)
     assert steps.max() < 0.1
-    assert max(speeds) < rig.config.max_speed
+    assert max(speeds) < 1.05 * rig.config.max_speed
     np.testing.assert_allclose(rig.position, [30, 0, -5], atol=0.05)
 
 

@@ -75,9 +75,9 @@ def fly(motion, airframes, steps, on_helix):
         f, _ = desired_force(motion[0], motion[1], zero, axes, motion[3], target, model)
         acceleration = plus((0.0, 0.0, model.gravity), -f / model.mass, axes[2])
         _, A = desired_force(motion[0], motion[1], acceleration, axes, motion[3], target, model)
-        R_c, _, _ = commanded_attitude(A, yaw_rate * t, yaw_rate, axes, model)
+        R_c, _, _ = commanded_attitude(A, yaw_rate * t, yaw_rate, 0.0, axes, model)
         f, moment = control(
-            motion[0], motion[1], acceleration, axes, motion[3], target, yaw_rate * t, yaw_rate, model
+            motion[0], motion[1], acceleration, axes, motion[3], target, yaw_rate * t, yaw_rate, 0.0, model
         )
         e = (motion[0][0] - target[0][0], motion[0][1] - target[0][1], motion[0][2] - target[0][2])
         history[i, 0] = math.sqrt(e[0] ** 2 + e[1] ** 2 + e[2] ** 2)
@@ -130,16 +130,19 @@ LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @kernel
-def command(A, yaw, yaw_rate, axes, airframes):
-    return commanded_attitude(A, yaw, yaw_rate, axes, airframes[0])
+def command(A, yaw, yaw_rate, yaw_acceleration, axes, airframes):
+    return commanded_attitude(A, yaw, yaw_rate, yaw_acceleration, axes, airframes[0])
 
 
 @pytest.mark.parametrize("heading", ["paper", "euler"])
 def test_commanded_rates_are_the_derivatives_of_the_commanded_attitude(heading):
     record = airframe_record(airframe(LEE.model_copy(update={"heading": heading})))
 
+    def yaw(t):
+        return 0.3 + 0.8 * t + 0.25 * t * t
+
     def commanded(t):
-        axes, rates, change = command(curve(t), 0.3 + 0.8 * t, 0.8, LEVEL, record)
+        axes, rates, change = command(curve(t), yaw(t), 0.8 + 0.5 * t, 0.5, LEVEL, record)
         return np.array(axes).T, np.array(rates), np.array(change)
 
     h = 1e-5
@@ -153,7 +156,7 @@ def test_commanded_rates_are_the_derivatives_of_the_commanded_attitude(heading):
         np.testing.assert_allclose([spin[2, 1], spin[0, 2], spin[1, 0]], rates, atol=1e-7)
         np.testing.assert_allclose((after[1] - before[1]) / (2.0 * h), change, atol=1e-7)
         if heading == "euler":
-            turned = math.remainder(math.atan2(R[1, 0], R[0, 0]) - 0.3 - 0.8 * t, math.tau)
+            turned = math.remainder(math.atan2(R[1, 0], R[0, 0]) - yaw(t), math.tau)
             assert abs(turned) < 1e-12
 
 
@@ -164,7 +167,7 @@ def test_commanded_rates_are_the_derivatives_of_the_commanded_attitude(heading):
 @pytest.mark.parametrize("axes", [LEVEL, ((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))])
 def test_a_command_without_direction_is_still_a_rotation(heading, A, axes):
     record = airframe_record(airframe(LEE.model_copy(update={"heading": heading})))
-    R, rates, change = map(np.array, command((A, (1.0, 2.0, 3.0), (3.0, 2.0, 1.0)), 0.0, 0.5, axes, record))
+    R, rates, change = map(np.array, command((A, (1.0, 2.0, 3.0), (3.0, 2.0, 1.0)), 0.0, 0.5, 0.2, axes, record))
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(R) > 0.0
     assert np.all(np.isfinite(rates))

@@ -1,0 +1,48 @@
+"""What the command line raises. Every error says which exit status the process ends with."""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
+
+
+class OutriderError(Exception):
+    """Base of every error of ``outrider``; what is not further named is a fault of ours."""
+
+    exit_status: ClassVar[int] = 3
+
+
+class Fault(NamedTuple):
+    """One thing that is wrong with an input. ``line`` and ``column`` count from 1; without, it is the whole.
+
+    ``what`` says what is wrong, what is allowed, and the nearest valid word if there is one.
+    """
+
+    where: str
+    what: str
+    line: int | None = None
+    column: int | None = None
+
+    def __str__(self) -> str:
+        place = self.where if self.line is None else f"{self.where}:{self.line}:{self.column}"
+        return f"{place}: {self.what}"
+
+
+class InputError(OutriderError):
+    """What the user gave cannot be used. The message is one line for each fault, in the order of the file.
+
+    A fault that is no part of a file (an argument) is a plain text.
+    """
+
+    exit_status = 2
+
+    def __init__(self, *faults: Fault | str) -> None:
+        super().__init__(*faults)
+        self.faults = faults
+
+    def __str__(self) -> str:
+        return "\n".join(_one_line(str(fault)) for fault in self.faults)
+
+
+def _one_line(text: str) -> str:
+    """``text`` with whatever would break a line or steer a terminal written as an escape."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

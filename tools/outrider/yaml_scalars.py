@@ -1,0 +1,71 @@
+"""What a plain YAML scalar means: what the core schema of YAML 1.2 says. What YAML 1.1 reads differently
+(``on``, ``010``, ``1:30``, ``1_000``) is text, so that it never becomes a number by stealth.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+Value = None | bool | int | float | str
+
+_NULLS = frozenset({"", "~", "null", "Null", "NULL"})
+_BOOLEANS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+_DIGITS = "(?:0|[1-9][0-9]*)"
+_INTEGER = re.compile(rf"[-+]?{_DIGITS}")
+_BASED = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(rf"[-+]?(?:\.[0-9]+|{_DIGITS}(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
+_SEXAGESIMAL = re.compile(r"[-+]?[0-9]+(?::[0-9]+)+(?:\.[0-9]*)?")
+_LONGEST_INTEGER = 24
+_YAML_1_1_BOOLEANS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
+
+
+class ScalarError(ValueError):
+    """A number that no field can hold; the message says why."""
+
+
+def resolve(text: str) -> Value:
+    """The value of a plain scalar. Raises ScalarError for NaN, infinities, and integers beyond 64 bits."""
+    if text in _NULLS:
+        return None
+    if text in _BOOLEANS:
+        return _BOOLEANS[text]
+    if _INTEGER.fullmatch(text):
+        return _integer(text, 10)
+    if _BASED.fullmatch(text):
+        return _integer(text, 0)
+    if _NOT_FINITE.fullmatch(text):
+        raise ScalarError(f"{text} is not finite; allowed: finite numbers")
+    if _FLOAT.fullmatch(text):
+        value = float(text)
+        if not math.isfinite(value):
+            raise ScalarError(f"{text[:40]} is too large; allowed: finite numbers, magnitude below 1.8e308")
+        return value
+    return text
+
+
+def _integer(text: str, base: int) -> int:
+    value = int(text, base) if len(text) <= _LONGEST_INTEGER else 1 << 63
+    if not -(1 << 63) <= value < 1 << 63:
+        raise ScalarError(f"{text[:40]} is too large; allowed: integers of 64 bits")
+    return value
+
+
+def number_hint(text: str) -> str:
+    """What somebody who wrote this text for a number may have meant, or nothing."""
+    if _SEXAGESIMAL.fullmatch(text):
+        return "; base 60 is not read, write one number"
+    cleaned = text.strip().replace("_", "").replace(",", ".")
+    sign, digits = ("-", cleaned[1:]) if cleaned.startswith("-") else ("", cleaned.removeprefix("+"))
+    stripped = digits.lstrip("0")
+    meant = sign + (stripped if stripped[:1].isdecimal() else "0" + stripped)
+    if len(text) > _LONGEST_INTEGER or not _FLOAT.fullmatch(meant):
+        return ""
+    return f"; did you mean {meant}?" if meant != text else "; remove the quotes"
+
+
+def boolean_hint(text: str) -> str:
+    """The same for a text where true or false should stand."""
+    meant = _YAML_1_1_BOOLEANS.get(text.casefold())
+    return "" if meant is None else f"; did you mean {meant}?"
