@@ -66,7 +66,8 @@ class FieldConfig(Settings):
     d_min: Positive = Field(0.5, description="m, between centres: the field is clamped there")
     d_safe: Positive = Field(3.0, description="m, between centres: the field begins there")
     braking: Positive | None = Field(
-        4.0, description="m/s², relative deceleration to count on when closing; null is the paper's bare field"
+        4.0,
+        description="m/s², relative deceleration to count on when closing; null is the paper's bare field",
     )
 
     @model_validator(mode="after")
@@ -113,7 +114,9 @@ class HeadingConfig(Settings):
     """What yaw may be asked of the vehicle, and how eagerly."""
 
     rate_max: Positive = Field(3.0, description="rad/s")
-    acceleration_max: Positive = Field(2.0, description="rad/s²; the firefly's yaw torque gives 2.5")
+    acceleration_max: Positive = Field(
+        1.6, description="rad/s²; the firefly's yaw torque gives 2.5 at hover, less while it turns hard"
+    )
     effort: Positive = Field(1e-4, description="s⁴, weight of (yaw acceleration)² against (yaw error)²")
     blind: Positive = Field(0.1, description="m, horizontally: nearer than this no bearing counts")
 
@@ -126,6 +129,8 @@ class GuardConfig(Settings):
     target_stale_us: Micros = 3_000_000
     neighbour_stale_us: Micros = 2_000_000
     plan_stale_us: Micros = Field(500_000, description="a shared horizon older than this is not used")
+    landing_speed: Positive = Field(0.3, description="m/s; slower than this a vehicle may land")
+    landing_clearance: Positive = Field(1.0, description="m, horizontally to the nearest neighbour, to land")
     tube: Positive = Field(1.0, description="m of tracking error at which the plan is anchored anew")
 
 
@@ -145,12 +150,15 @@ class CompanionConfig(Settings):
     methods: tuple[Literal["baseline", "tangential"], ...] = ("tangential",)
     planar: bool = False
     neighbour_prediction: Literal["held", "velocity"] = Field(
-        "held", description="without a shared horizon: the paper holds the n = 0 position; 'velocity' moves it on"
+        "held",
+        description="without a shared horizon: the paper holds the n = 0 position; 'velocity' moves it on",
     )
     setpoint_lead_us: int = Field(10_000, ge=0, le=1_600_000, description="look-ahead of the set-point")
     own: TrackConfig = TrackConfig(delay_us=5_000, sigma_acceleration=10.0)
     neighbour: TrackConfig = TrackConfig()
-    target: TrackConfig = TrackConfig(sigma_position=0.5, sigma_velocity=0.3, sigma_acceleration=2.0, jump=8.0)
+    target: TrackConfig = TrackConfig(
+        sigma_position=0.5, sigma_velocity=0.3, sigma_acceleration=2.0, jump=8.0
+    )
     target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
     target_d_safe: float | None = Field(None, gt=0.0, le=100.0)
     horizon: HorizonConfig = HorizonConfig()

@@ -60,6 +60,7 @@ class Dqmpc:
         n = horizon.steps + 1
         dt = horizon.dt_us * 1e-6
         self.n, self.dt, self.cost, self.limits = n, dt, cost, limits
+        self.seconds = n * dt
         k = np.arange(n)
         lower = (k[:, None] >= k).astype(float)
         self.S_v: Array = dt * lower
@@ -77,7 +78,8 @@ class Dqmpc:
         w = self.cost
         return 2.0 * (
             w.omega_i * np.eye(self.n)
-            + omega_scale * (w.omega_t_position * np.outer(s_x, s_x) + w.omega_t_velocity * np.outer(s_v, s_v))
+            + omega_scale
+            * (w.omega_t_position * np.outer(s_x, s_x) + w.omega_t_velocity * np.outer(s_v, s_v))
         )
 
     def problem(

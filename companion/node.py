@@ -9,6 +9,7 @@ import numpy as np
 
 from companion.config import CompanionConfig
 from companion.errors import SolverError
+from companion.forces import Obstacles
 from companion.guard import Guard
 from companion.heading import Heading
 from companion.horizon import Array, Horizon, Motion
@@ -17,6 +18,7 @@ from companion.planner import Aim, Plan, Planner
 from companion.setpoint import setpoint
 from companion.sharing import Sharing
 from companion.surface import circle
+from companion.tracks import State
 from companion.world import View, World
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
@@ -75,6 +77,8 @@ class Companion:
         self._codecs = {link: Codec(_filter(link, system, target_system)) for link in _WANTED}
         self.plan: Plan | None = None
         self._goal: Array | None = None
+        self._rest: Array | None = None
+        self._obstacles = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
         self._heading = Heading(config.heading, config.horizon)
         self._boot: int | None = None
         self._next_plan = self._next_setpoint = 0
@@ -110,7 +114,7 @@ class Companion:
 
     @property
     def _airborne(self) -> bool:
-        return self.pilot.phase is Phase.ESCORT or self.pilot.streaming
+        return self.pilot.phase in (Phase.ESCORT, Phase.SETTLE) or self.pilot.streaming
 
     def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
         answers: list[Message] = []
@@ -173,7 +177,7 @@ class Companion:
         state = self.guard.anchor(now, measured)
         started = self._stopwatch()
         try:
-            obstacles = self.world.obstacles(now, view)
+            self._obstacles = obstacles = self.world.obstacles(now, view)
             prediction = (
                 np.broadcast_to(state.position, (config.steps + 1, 3))
                 if horizon is None
@@ -201,6 +205,8 @@ class Companion:
     def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to: the own goal, or the surface around the target where it will be at the end of the horizon."""
         config, target = self.config, view.target
+        if self.pilot.phase is Phase.SETTLE:
+            return self._settle(measured, target)
         stale = target is None or target.age > config.guard.target_stale_us
         if config.task == "goto":
             goal = measured.position if self._goal is None else self._goal
@@ -208,9 +214,23 @@ class Companion:
         if target is None or stale:
             return None
         ahead = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
-        at_end = target.position + ahead * target.velocity
-        destination = circle(at_end, measured.position, config.surface.radius, config.surface.height)
-        return Aim(destination, target.velocity, target.position)
+        destination = circle(target.position, measured.position, config.surface.radius, config.surface.height)
+        return Aim(destination + ahead * target.velocity, target.velocity, target.position)
+
+    def _settle(self, measured: Motion, target: State | None) -> Aim:
+        """Stop where braking from the order on ends, still avoiding; then, calm and clear of the others, land."""
+        if self._rest is None:
+            reach = float(np.linalg.norm(measured.velocity)) / (2.0 * min(self.config.limits.u_max))
+            self._rest = measured.position + reach * measured.velocity
+        calm = float(np.linalg.norm(measured.velocity)) < self.config.guard.landing_speed
+        if calm and self._clearance(measured.position) > self.config.guard.landing_clearance:
+            self.pilot.settled()
+        return Aim(self._rest, _ZERO, self._rest if target is None else target.position)
+
+    def _clearance(self, position: Array) -> float:
+        """Horizontal distance to the nearest neighbour: landing is straight down."""
+        apart = self._obstacles.positions[:, 0, :2] - position[:2]
+        return float(np.sqrt(np.einsum("ji,ji->j", apart, apart).min(initial=np.inf)))
 
     def _setpoints(self, now: int, view: View) -> list[Message]:
         if now < self._next_setpoint:
@@ -223,9 +243,7 @@ class Companion:
         time = now + self.config.setpoint_lead_us
         since_boot = now - (now if self._boot is None else self._boot)
         yaw = self._heading.at(time)
-        return [
-            setpoint(time, since_boot, horizon, yaw, view.local, self._source, profile.setpoint_mask)
-        ]
+        return [setpoint(time, since_boot, horizon, yaw, view.local, self._source, profile.setpoint_mask)]
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:
         out = []

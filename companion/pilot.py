@@ -1,4 +1,4 @@
-"""The way into the air and back: connect → arm → take-off → escort → land, by MAVLink commands, each until acknowledged.
+"""The way into the air and back: connect → arm → take-off → escort → settle → land, by MAVLink commands, each until acknowledged.
 
 Nothing starts without an operator's go (a NAV_TAKEOFF addressed to the companion), and while the autopilot is not in the
 mode in which our set-points steer, none are sent.
@@ -40,6 +40,7 @@ class Phase(Enum):
     CONNECT = "connect"
     PREPARE = "prepare"
     ESCORT = "escort"
+    SETTLE = "settle"
     LAND = "land"
     DONE = "done"
 
@@ -79,7 +80,7 @@ class Pilot:
     @property
     def streaming(self) -> bool:
         """Whether set-points are to be sent."""
-        if self.phase is Phase.ESCORT:
+        if self.phase in (Phase.ESCORT, Phase.SETTLE):
             return self.guided
         return (
             self.phase is Phase.PREPARE
@@ -112,12 +113,20 @@ class Pilot:
         return True
 
     def land(self) -> bool:
-        """The operator's order to land where the vehicle is."""
+        """The operator's order to land. A vehicle under way first comes to a hover clear of the others, because an
+        autopilot that lands looks out for nobody."""
         if self.phase is Phase.CONNECT:
             return False
-        if self.phase is not Phase.DONE:
+        if self.phase is Phase.ESCORT:
+            self.phase = Phase.SETTLE
+        elif self.phase is Phase.PREPARE:
             self.phase = Phase.LAND
         return True
+
+    def settled(self) -> None:
+        """The vehicle hovers clear of the others: land now."""
+        if self.phase is Phase.SETTLE:
+            self.phase = Phase.LAND
 
     def step(self, now: int, view: View) -> list[Message]:
         """Commands to send now."""

@@ -43,13 +43,24 @@ class Planner:
         self._methods = build(config)
         self._gradient: Array = np.zeros(3)
 
-    def plan(self, now: int, position: Array, velocity: Array, prediction: Array, aim: Aim, obstacles: Obstacles) -> Plan:
+    def plan(
+        self, now: int, position: Array, velocity: Array, prediction: Array, aim: Aim, obstacles: Obstacles
+    ) -> Plan:
         """One plan from the state at ``now`` (µs). ``prediction`` (N + 1, 3): the previous plan at n = 0…N.
 
         SolverError when there is no solution: the caller holds what it has.
         """
+        to_go = aim.destination - self.dqmpc.seconds * aim.velocity - position
         scene = Scene(
-            position, velocity, prediction, aim.destination, aim.velocity, aim.target, obstacles, self._gradient
+            position,
+            velocity,
+            prediction,
+            aim.destination,
+            aim.velocity,
+            to_go,
+            aim.target,
+            obstacles,
+            self._gradient,
         )
         influence = self._influence(scene)
         problem = self.dqmpc.problem(
@@ -88,5 +99,7 @@ def build(config: CompanionConfig) -> list[Method]:
     methods: list[Method] = []
     for name in config.methods:
         if name == "tangential":
-            methods.append(Tangential(config.tangential, max(config.limits.u_max), config.horizon.dt_us * 1e-6))
+            methods.append(
+                Tangential(config.tangential, max(config.limits.u_max), config.horizon.dt_us * 1e-6)
+            )
     return methods

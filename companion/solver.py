@@ -41,7 +41,9 @@ class QpSolver:
     ) -> Array:
         """The minimiser (n,), a copy. ShapeError on sizes or NaN, SolverError when PIQP does not say SOLVED."""
         if len(c) != self.size or len(x_l) != self.size or len(x_u) != self.size:
-            raise ShapeError(f"c, x_l, x_u must have {self.size} entries, not {len(c)}, {len(x_l)}, {len(x_u)}")
+            raise ShapeError(
+                f"c, x_l, x_u must have {self.size} entries, not {len(c)}, {len(x_l)}, {len(x_u)}"
+            )
         # A NaN bound would count as absent and the answer as SOLVED; the sum finds one in a single pass.
         check = float(c.sum() + x_l.sum() + x_u.sum())
         if self.rows:

@@ -25,6 +25,4 @@ def circle(target: Array, own: Array, radius: float, height: float) -> Array:
 
 def circle_error(target: Array, own: Array, radius: float, height: float) -> float:
     """Distance (m) of ``own`` from the circle: what stand-off error means in reports."""
-    return hypot(
-        hypot(own[0] - target[0], own[1] - target[1]) - radius, float(own[2] - target[2] - height)
-    )
+    return hypot(hypot(own[0] - target[0], own[1] - target[1]) - radius, float(own[2] - target[2] - height))

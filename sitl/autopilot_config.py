@@ -53,7 +53,7 @@ class AutopilotConfig(BaseModel):
     takeoff_speed: Positive = 1.5
     land_speed: Positive = 0.8
     max_speed: Positive = Field(10.0, description="of every reference, norm")
-    max_acceleration: Positive = Field(6.0, description="of every reference, norm")
+    max_acceleration: Positive = Field(8.0, description="of every reference, norm")
     max_jerk: Positive = Field(40.0, description="of shaped references, norm")
     gentle_acceleration: Positive = Field(1.5, description="for takeoff, landing, braking into a hold")
     max_yaw_rate: Positive = math.radians(180.0)

@@ -2,8 +2,8 @@
 
     .venv/bin/python tools/extract_log.py INPUT OUTPUT --message GLOBAL_POSITION_INT --start 475 --duration 70
 
-``--start`` and ``--duration`` are seconds of receive time after the first record of the log, and one vehicle is
-kept. The stretch that ships, and what is to be known of it, stand in the README beside it.
+``--start`` and ``--duration`` are s of receive time from the log's first record on; one vehicle is kept.
+The stretch that ships, and what is to be known of it, stand in the README beside it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def message_id(name: str) -> int:
 
 
 def stretch(source: Path, message: int, system: int, start_s: float, duration_s: float) -> list[Record]:
-    """The records of ``message`` from ``system`` received in [start, start + duration), in the log's order."""
+    """The records of ``message`` from ``system`` in [start, start + duration), in the order of the log."""
     kept = []
     first: int | None = None
     for record in read_tlog(source):

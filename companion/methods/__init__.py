@@ -12,6 +12,8 @@ class Scene(NamedTuple):
     """What one plan is made from: own state and prediction, target and obstacles, fleet-local ENU, SI.
 
     ``prediction`` (N + 1, 3) is the previous plan at n = 0…N from now; ``gradient`` the last ∇J (3,), zero at first.
+    ``to_go`` (3,) leads from the vehicle to where its destination is *now*: in a moving formation what flies along with
+    everybody is in nobody's way.
     """
 
     position: Array
@@ -19,6 +21,7 @@ class Scene(NamedTuple):
     prediction: Array
     destination: Array
     destination_velocity: Array
+    to_go: Array
     target: Array
     obstacles: Obstacles
     gradient: Array

@@ -5,8 +5,8 @@ F_tang(0) = k_tang ‖∇J‖ α̂,  α̂ ⊥ α, the same for the whole horizon
 Settled against the text. The gradient is its norm divided by Ω_t. The band reaches from the obstacle to d_safe + d_band
 and further for one that comes fast (``reach_s`` times the closing speed): turning aside takes time, not distance. The
 force grows from zero at the band's edge, quickly up to u_max − the input cancels so much of it − and then up to
-``force_max`` at ``d_full``. It acts only about obstacles that lie ahead, fading out at 30° from abeam, so that the band is
-left once the obstacle is passed. The sense is latched per obstacle for as long as the encounter lasts, otherwise it
+``force_max`` at ``d_full``. It acts only about obstacles that stand in the way: ahead, fading out from 60° off the bow to
+abeam, so that the band is left once the obstacle is passed; and not beyond the destination, fading out over d_safe. The sense is latched per obstacle for as long as the encounter lasts, otherwise it
 chatters when the bearing crosses zero.
 """
 
@@ -45,7 +45,7 @@ class Tangential:
         flat = np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2) + _NEAR
         weight = self._weights(scene, away)
         self._release(obstacles, weight)
-        sense = self._senses(obstacles, weight, away, scene.destination - scene.position)
+        sense = self._senses(obstacles, weight, away, scene.to_go)
         # α̂ = ± ẑ × α, horizontal: passing never costs height.
         share = weight * sense / flat
         total = np.array([-(share @ away[:, 1]), share @ away[:, 0], 0.0])
@@ -68,9 +68,12 @@ class Tangential:
         closing = np.maximum(0.0, -np.einsum("ji,ji->j", away, scene.velocity - moving) / distance)
         edge = obstacles.d_safe + config.d_band + config.reach_s * closing
         depth = np.clip((edge - distance) / (edge - config.d_full), 0.0, 1.0)
-        to_go = scene.destination - scene.position
-        ahead = -(away @ to_go) / (distance * (np.sqrt(to_go @ to_go) + _NEAR))
-        weights: Array = depth * np.clip(ahead / _ABEAM, 0.0, 1.0)
+        to_go = scene.to_go
+        length = float(np.sqrt(to_go @ to_go)) + _NEAR
+        along = -(away @ to_go) / length
+        ahead = np.clip(along / (_ABEAM * distance), 0.0, 1.0)
+        before = np.clip(1.0 + (length - along) / obstacles.d_safe, 0.0, 1.0)
+        weights: Array = depth * ahead * before
         return weights
 
     def _release(self, obstacles: Obstacles, weight: Array) -> None:

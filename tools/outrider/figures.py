@@ -105,7 +105,9 @@ def _errors(standoff: Axes, yaw: Axes, flight: Flight, samples: Samples, time: n
     standoff.set(ylabel="m")
     _finish(standoff, flight)
     yaw.plot(time[on_clock], yaw_errors(samples.position, samples.yaw, samples.target)[on_clock], lw=0.9)
-    yaw.set(title="yaw error", ylabel="deg", xlabel="s after the goal event" if flight.scenario.has_goal else "s")
+    yaw.set(
+        title="yaw error", ylabel="deg", xlabel="s after the goal event" if flight.scenario.has_goal else "s"
+    )
     _finish(yaw, flight)
 
 

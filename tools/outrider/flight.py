@@ -188,7 +188,9 @@ class Flight:
             if not any(a.armed for a in self.autopilots):
                 self.stage = Stage.DONE
             elif now - self._land_at > _LAND_CAP:
-                self.failure = f"not all vehicles were down {_LAND_CAP // 1_000_000} s after the order to land"
+                self.failure = (
+                    f"not all vehicles were down {_LAND_CAP // 1_000_000} s after the order to land"
+                )
                 self.stage = Stage.DONE
         return self.stage is Stage.DONE
 
@@ -246,7 +248,8 @@ class _Recorder:
 
     def __init__(self, directory: Path, systems: list[int], files: ExitStack) -> None:
         self._writers = {
-            f"companion-{s}": files.enter_context(TlogWriter(directory / f"vehicle-{s}.tlog")) for s in systems
+            f"companion-{s}": files.enter_context(TlogWriter(directory / f"vehicle-{s}.tlog"))
+            for s in systems
         }
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:

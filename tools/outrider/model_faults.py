@@ -17,8 +17,8 @@ _KEY = "[key]"
 
 
 class _Place(NamedTuple):
-    """Where a location leads. ``path`` names it as the file does, ``parent`` is the schema of the whole that it is
-    part of; ``at`` is where it is reported, ``holder_at`` the key that holds it; ``absent`` what the tree lacks."""
+    """Where a location leads. ``path`` names it as the file does; ``parent`` is the schema of what it is part
+    of. It is reported at ``at``, its key is at ``holder_at``; ``absent`` is what the tree lacks."""
 
     path: tuple[str | int, ...]
     tree: Tree

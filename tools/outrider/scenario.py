@@ -39,7 +39,9 @@ class Ring(Part):
 
     centre: tuple[float, float] = (0.0, 0.0)
     radius: Length
-    height: float = Field(5.0, ge=0.5, le=100.0, description="m above ground, where the vehicles hover at first")
+    height: float = Field(
+        5.0, ge=0.5, le=100.0, description="m above ground, where the vehicles hover at first"
+    )
     jitter: float = Field(0.0, ge=0.0, le=2.0, description="m, radius of the ball around each start")
     first_deg: float = Field(0.0, ge=-360.0, le=360.0, description="bearing of the first vehicle, ENU")
 
@@ -86,7 +88,9 @@ class Timing(Part):
     """Periods, µs; all are whole numbers of the base tick."""
 
     base_tick_us: Period = 2_500
-    autopilot_us: Period = Field(5_000, description="how often an autopilot's node runs; its physics has its own")
+    autopilot_us: Period = Field(
+        5_000, description="how often an autopilot's node runs; its physics has its own"
+    )
     companion_us: Period = Field(10_000, description="how often a companion's node runs")
 
 

@@ -142,5 +142,3 @@ def _finite(value: float) -> float | None:
 
 def _ns_to_ms(readings: list[list[int]]) -> Array:
     return np.array([ns for per_vehicle in readings for ns in per_vehicle], dtype=float) * 1e-6
-
-

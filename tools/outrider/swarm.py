@@ -139,7 +139,7 @@ def _methods(text: str) -> tuple[str, ...]:
     names = tuple(text.split("+"))
     for name in names:
         if name not in METHODS:
-            raise InputError(f"--method {text}: {name!r} is no method; allowed are {', '.join(METHODS)}, joined by +")
+            raise InputError(
+                f"--method {text}: {name!r} is no method; allowed are {', '.join(METHODS)}, joined by +"
+            )
     return names
-
-

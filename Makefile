@@ -1,0 +1,40 @@
+# A fresh machine needs python3, make and git; `make fly` and `make test` do the rest.
+PYTHON ?= python3
+ARGS ?=
+JOBS ?= 2
+BIN = .venv/bin
+SCRIPTS = tools/bootstrap.py tools/extract_log.py
+
+.PHONY: fly test lint bench schemas requirements clean
+.DEFAULT_GOAL := fly
+
+fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--method tangential …"
+	@$(BIN)/outrider swarm escort $(ARGS)
+
+test: .venv/.made  ## everything; one test with ARGS="-k name"
+	@$(BIN)/pytest -n $(JOBS) --dist loadfile $(ARGS) </dev/null
+
+lint: .venv/.made  ## style, types, and who may import whom
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	@$(BIN)/mypy $(SCRIPTS)
+	@$(BIN)/lint-imports
+
+bench: .venv/.made  ## measure this machine
+	@$(BIN)/outrider bench $(ARGS)
+
+schemas: .venv/.made  ## write config/schemas anew after a change of a configuration model
+	@$(BIN)/python -m outrider.schemas config/schemas
+
+requirements:  ## write uv.lock and requirements.txt anew after a change of dependencies; needs uv
+	@uv lock
+	@uv export --locked --extra sitl --group dev --no-emit-project --no-header --no-annotate --quiet \
+		--format requirements-txt --output-file requirements.txt
+
+clean:  ## everything that was made, the environment too
+	@rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.venv/.made: pyproject.toml uv.lock requirements.txt tools/bootstrap.py
+	@$(PYTHON) tools/bootstrap.py
