@@ -1,7 +1,8 @@
-"""The companion's settings: frozen, checked at load, passed explicitly. SI units, fleet-local ENU, times in µs.
+"""The companion's settings: frozen, checked at load, passed explicitly. SI units, fleet-local ENU, times in
+µs.
 
-Defaults are the paper's where it gives a number; where it is silent the value that we settled on stands here with its
-reason, and `config/companions/*.yaml` may say otherwise.
+Defaults are the paper's where it gives a number; where it is silent the value that we settled on stands here
+with its reason, and `config/companions/*.yaml` may say otherwise.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ class HorizonConfig(Settings):
 
 
 class CostConfig(Settings):
-    """Ω_t and Ω_i. Only their ratios matter. Not given in the paper: `docs` of the scenario files say how chosen."""
+    """Ω_t and Ω_i. Only their ratios matter. Not given in the paper: `docs` of the scenario files say how
+    chosen."""
 
     omega_t_position: Positive = 100.0
     omega_t_velocity: Positive = 20.0

@@ -2,13 +2,15 @@
 
 F(d) = K · (π/2)/(d_safe − d_min) · (cot z + z − π/2),  z = (π/2)(d − d_min)/(d_safe − d_min)
 
-Settled against the text: the force points *away* from the obstacle (the printed α points towards it); below d_min the
-formula turns negative, so it is clamped there; "tends to infinity" ends at the acceleration that the vehicle has.
+Settled against the text: the force points *away* from the obstacle (the printed α points towards it); below
+d_min the formula turns negative, so it is clamped there; "tends to infinity" ends at the acceleration that
+the vehicle has.
 
-Closing speed. From d_safe = 3 m the bare field cannot stop two vehicles that meet at 5 m/s each: that takes about 10 m/s²
-net. So the distance that enters F is what would be left after braking, d − ċ²/(2 a_rel) with ċ the speed of closing and
-a_rel the relative deceleration to count on. At rest this is the paper's field; when closing fast its reach grows with the
-square of the speed, and d_min is approached no faster than can be braked. ``braking=None`` is the paper's field alone.
+Closing speed. From d_safe = 3 m the bare field cannot stop two vehicles that meet at 5 m/s each: that takes
+about 10 m/s² net. So the distance that enters F is what would be left after braking, d − ċ²/(2 a_rel) with ċ
+the speed of closing and a_rel the relative deceleration to count on. At rest this is the paper's field; when
+closing fast its reach grows with the square of the speed, and d_min is approached no faster than can be
+braked. ``braking=None`` is the paper's field alone.
 """
 
 from __future__ import annotations
@@ -21,14 +23,14 @@ import numpy as np
 from companion.horizon import Array
 
 _NEAR = 1e-6
-"""Below this distance (m) a direction is not defined; the force then points along +x for both vehicles' good."""
+"""Below this distance (m) no direction is away; the force then points along +x rather than nowhere."""
 
 
 class Obstacles(NamedTuple):
     """What is to be avoided, M of them, aligned in time with the own horizon (fleet-local ENU, m).
 
-    ``positions`` (M, N + 1, 3) at n = 0…N; ``d_min``, ``d_safe`` (M,) between centres; ``ids`` name them for latches and
-    logs.
+    ``positions`` (M, N + 1, 3) at n = 0…N; ``d_min``, ``d_safe`` (M,) between centres; ``ids`` name them for
+    latches and logs.
     """
 
     ids: tuple[int, ...]
@@ -38,9 +40,10 @@ class Obstacles(NamedTuple):
 
 
 def magnitude(distance: Array, d_min: Array, d_safe: Array, gain: float, clamp: float) -> Array:
-    """F_hyp(d), m/s², the shapes broadcast: 0 from d_safe on, continuous, falling, ``clamp`` at and below d_min."""
+    """F_hyp(d), m/s², the shapes broadcast: 0 from d_safe on, continuous, falling, ``clamp`` at and below
+    d_min."""
     width = d_safe - d_min
-    z = np.clip((0.5 * pi) * (distance - d_min) / width, 1e-9, 0.5 * pi)
+    z = np.minimum(np.maximum((0.5 * pi) * (distance - d_min) / width, 1e-9), 0.5 * pi)
     force: Array = np.minimum((gain * 0.5 * pi) * (1.0 / np.tan(z) + z - 0.5 * pi) / width, clamp)
     return np.maximum(force, 0.0, out=force)
 
@@ -50,7 +53,8 @@ def repulsion(
 ) -> Array:
     """Σ_j F_rep (N + 1, 3) on the own predicted positions (N + 1, 3), each source clamped to ``clamp`` m/s².
 
-    ``braking`` is a_rel (m/s²) of the module's docstring, ``dt`` (s) the step between the predicted positions.
+    ``braking`` is a_rel (m/s²) of the module's docstring, ``dt`` (s) the step between the predicted
+    positions.
     """
     if not obstacles.ids:
         return np.zeros_like(own)
@@ -69,7 +73,8 @@ def repulsion(
 
 
 def stopping_distance(distance: Array, braking: float, dt: float) -> Array:
-    """ċ²/(2 a_rel) (M, N + 1) from predicted distances (M, N + 1), with ċ their rate where they shrink, else 0."""
+    """ċ²/(2 a_rel) (M, N + 1) from predicted distances (M, N + 1), with ċ their rate where they shrink, else
+    0."""
     closing = np.empty_like(distance)
     np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
     closing[:, -1] = closing[:, -2]

@@ -1,4 +1,5 @@
-"""What flies when planning does not: the held plan for a bounded time, then a brake to hover. Nothing is held for ever."""
+"""What flies when planning does not: the held plan for a bounded time, then a brake to hover. Nothing is held
+for ever."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ class Holding(Enum):
 
 
 class Guard:
-    """Owns the horizon that is flown. ``held`` counts replans that kept the old one, ``failures`` those by the solver."""
+    """Owns the horizon that is flown. ``held`` counts replans that kept the old one, ``failures`` those by
+    the solver."""
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
@@ -56,8 +58,8 @@ class Guard:
     def anchor(self, now: int, position: Motion) -> Motion:
         """The state to plan from: the flown horizon's, unless the vehicle has left the tube around it.
 
-        Planning from the plan keeps the set-point continuous and lets the autopilot reject wind; out of the tube the
-        plan starts anew at the measured state.
+        Planning from the plan keeps the set-point continuous and lets the autopilot reject wind; out of the
+        tube the plan starts anew at the measured state.
         """
         if self.horizon is None:
             return position
@@ -70,7 +72,8 @@ class Guard:
 
 
 def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
-    """Straight to rest within the horizon, at u_max or as hard as that takes; then hover. (N + 1 segments.)"""
+    """Straight to rest within the horizon, at u_max or as hard as that takes; then hover. (N + 1
+    segments.)"""
     n = config.horizon.steps + 1
     h = config.horizon.dt_us * 1e-6
     speed = float(np.sqrt(motion.velocity @ motion.velocity))

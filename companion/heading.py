@@ -1,8 +1,9 @@
 """The yaw that faces the target, planned over the horizon like a fourth axis.
 
-The paper sends the bearing of the target (Algorithm 1, line 4). Close by, that bearing turns faster than a multirotor can:
-its yaw torque is weak. Knowing the planned path, the yaw starts to turn beforehand: the QP keeps the yaw nearest to the
-bearings ahead, in the sense of least squares, within the vehicle's yaw rate and acceleration.
+The paper sends the bearing of the target (Algorithm 1, line 4). Close by, that bearing turns faster than a
+multirotor can: its yaw torque is weak. Knowing the planned path, the yaw starts to turn beforehand: the QP
+keeps the yaw nearest to the bearings ahead, in the sense of least squares, within the vehicle's yaw rate and
+acceleration.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from companion.config import HeadingConfig, HorizonConfig
 from companion.errors import SolverError
 from companion.horizon import Array
+from companion.prediction import prediction
 from companion.solver import QpSolver
 
 
@@ -31,12 +33,8 @@ class Heading:
     def __init__(self, config: HeadingConfig, horizon: HorizonConfig) -> None:
         n, dt = horizon.steps + 1, horizon.dt_us * 1e-6
         self._config, self._dt, self._n = config, dt, n
-        k = np.arange(n)
-        lower = (k[:, None] >= k).astype(float)
-        self._S_v: Array = dt * lower
-        self._S_x: Array = dt**2 * (k[:, None] - k + 0.5) * lower
-        self._ahead: Array = dt * (k + 1.0)
-        P = 2.0 * (self._S_x.T @ self._S_x + config.effort * np.eye(n))
+        self._S_v, self._S_x, self._ahead = prediction(n, dt)
+        P: Array = 2.0 * (self._S_x.T @ self._S_x + config.effort * np.eye(n))
         self._solver = QpSolver(P, self._S_v)
         self._start: int | None = None
         self._state = Yaw(0.0, 0.0, 0.0)
@@ -48,7 +46,8 @@ class Heading:
         self._state = Yaw(measured, 0.0, 0.0)
 
     def plan(self, now: int, positions: Array, targets: Array) -> None:
-        """Plan from ``now`` (µs) along own ``positions`` (N + 1, 3) at n = 1…N + 1 facing ``targets`` (N + 1, 3).
+        """Plan from ``now`` (µs) along own ``positions`` (N + 1, 3) at n = 1…N + 1 facing ``targets`` (N + 1,
+        3).
 
         Without a solution the yaw planned before is kept.
         """

@@ -1,7 +1,9 @@
-"""A trajectory on equidistant knots with piecewise constant acceleration: what a plan is, own or a neighbour's.
+"""A trajectory on equidistant knots with piecewise constant acceleration: what a plan is, own or a
+neighbour's.
 
-Time is integer µs on the companion's clock, positions are fleet-local ENU in metres. Before the first knot and after the
-last one the motion goes on at constant velocity, so that a horizon of 1.6 s that is 0.1 s old still covers 1.6 s.
+Time is integer µs on the companion's clock, positions are fleet-local ENU in metres. Before the first knot
+and after the last one the motion goes on at constant velocity, so that a horizon of 1.6 s that is 0.1 s old
+still covers 1.6 s.
 """
 
 from __future__ import annotations
@@ -11,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from companion.prediction import prediction
 
 Array = NDArray[np.float64]
 
@@ -24,7 +28,8 @@ class Motion(NamedTuple):
 
 
 class Horizon(NamedTuple):
-    """Knots 0…n of a trajectory, ``knots`` (n + 1, 9): position, velocity, acceleration of the segment that follows.
+    """Knots 0…n of a trajectory, ``knots`` (n + 1, 9): position, velocity, acceleration of the segment that
+    follows.
 
     The acceleration of the last knot is zero: beyond the end the velocity is kept.
     """
@@ -67,26 +72,21 @@ _COUNT = np.arange(64)
 def roll_out(epoch: int, dt: int, position: Array, velocity: Array, accelerations: Array) -> Horizon:
     """The horizon that follows from a state and accelerations (n, 3): the A and B of the paper, eq. (5)."""
     n = len(accelerations)
-    h = dt * 1e-6
+    S_v, S_x, time = prediction(n, dt * 1e-6)
     knots = np.zeros((n + 1, 9))
+    knots[0, 0:3], knots[0, 3:6] = position, velocity
+    knots[1:, 0:3] = S_x @ accelerations + position + np.multiply.outer(time, velocity)
+    knots[1:, 3:6] = S_v @ accelerations + velocity
     knots[:n, 6:9] = accelerations
-    knots[0, 3:6] = velocity
-    np.cumsum(accelerations, axis=0, out=knots[1:, 3:6])
-    knots[1:, 3:6] *= h
-    knots[1:, 3:6] += velocity
-    steps = knots[:n, 3:6] + (0.5 * h) * accelerations
-    knots[0, 0:3] = position
-    np.cumsum(steps, axis=0, out=knots[1:, 0:3])
-    knots[1:, 0:3] *= h
-    knots[1:, 0:3] += position
     return Horizon(epoch, dt, knots)
 
 
 class HorizonTable:
-    """The latest horizon of each of many senders, sampled together: ``steps`` positions at ``dt`` (µs) from any time.
+    """The latest horizon of each of many senders, sampled together: ``steps`` positions at ``dt`` (µs) from
+    any time.
 
-    Aligned by time, not by index: the original implementation shared horizons without time stamps and never noticed
-    their age.
+    Aligned by time, not by index: the original implementation shared horizons without time stamps and never
+    noticed their age.
     """
 
     def __init__(self, steps: int, dt: int) -> None:
@@ -119,8 +119,8 @@ class HorizonTable:
         self._epochs[row], self._dts[row], self._lasts[row] = horizon.epoch, horizon.dt, length - 1
 
     def positions(self, senders: Sequence[int], start: int, oldest: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Positions (M, steps, 3) of ``senders`` at ``start + n·dt``, and which of them are not made before ``oldest``
-        (µs); the rows of the others mean nothing."""
+        """Positions (M, steps, 3) of ``senders`` at ``start + n·dt``, and which of them are not made before
+        ``oldest`` (µs); the rows of the others mean nothing."""
         if not self._rows:
             return np.zeros((len(senders), self._steps, 3)), np.zeros(len(senders), dtype=np.bool_)
         rows = np.array([self._rows.get(sender, -1) for sender in senders])

@@ -1,7 +1,7 @@
 """The other vehicles as the swarm link tells of them: a track each, and the horizon each has shared.
 
-A neighbour that shares no horizon, or whose horizon is old or no longer where the neighbour is, is taken at its n = 0
-position for the whole horizon (Sec. IV-A), or carried on at constant velocity if so configured.
+A neighbour that shares no horizon, or whose horizon is old or no longer where the neighbour is, is taken at
+its n = 0 position for the whole horizon (Sec. IV-A), or carried on at constant velocity if so configured.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
-from companion.horizon import HorizonTable, roll_out
+from companion.horizon import Array, HorizonTable, roll_out
 from companion.tracks import Track
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
@@ -29,6 +29,10 @@ class Neighbours:
         self._system = system
         self._fleet = fleet
         self._tracks: dict[int, Track] = {}
+        # The tracks' last states as rows, in the order of the tracks: sampled together at every plan.
+        self._ids: tuple[int, ...] = ()
+        self._states: Array = np.zeros((0, 6))
+        self._times = np.zeros(0, dtype=np.int64)
         self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
         self.refused_plans = 0
 
@@ -39,8 +43,15 @@ class Neighbours:
             return
         if system not in self._tracks:
             self._tracks[system] = Track(self._config.neighbour)
+            self._ids = tuple(self._tracks)
+            self._states = np.vstack([self._states, np.zeros(6)])
+            self._times = np.append(self._times, now)
         position = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
-        self._tracks[system].measure(now, position, ned_to_enu(message.velocity_ned))
+        track = self._tracks[system]
+        track.measure(now, position, ned_to_enu(message.velocity_ned))
+        row = self._ids.index(system)
+        self._states[row] = track.last
+        self._times[row] = track.time
 
     def hear_plan(self, now: int, message: Tunnel) -> None:
         """A neighbour's horizon in a TUNNEL. One in another fleet frame, or from the future, is refused."""
@@ -63,17 +74,17 @@ class Neighbours:
     def obstacles(self, now: int) -> Obstacles:
         """All neighbours aligned with ``now + n·dt``, n = 0…N; those unheard of for too long are left out."""
         config = self._config
-        states = {system: track.at(now) for system, track in self._tracks.items()}
-        known = [
-            (system, state)
-            for system, state in states.items()
-            if state is not None and state.age <= config.guard.neighbour_stale_us
-        ]
         steps = config.horizon.steps + 1
-        if not known:
+        age = now - self._times
+        fresh = age <= config.guard.neighbour_stale_us
+        ids = self._ids
+        if not fresh.all():
+            ids = tuple(system for system, is_fresh in zip(ids, fresh, strict=True) if is_fresh)
+        if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
-        ids = tuple(system for system, _ in known)
-        here = np.array([state.position for _, state in known])
+        states = self._states[fresh]
+        carried = np.minimum(np.maximum(age[fresh], 0), config.neighbour.extrapolate_us) * 1e-6
+        here = states[:, 0:3] + carried[:, None] * states[:, 3:6]
         positions, trusted = self._table.positions(ids, now, now - config.guard.plan_stale_us)
         off = positions[:, 0] - here
         trusted &= np.einsum("ji,ji->j", off, off) <= _STRAYED**2
@@ -81,13 +92,11 @@ class Neighbours:
             lost = ~trusted
             positions[lost] = here[lost][:, None]
             if config.neighbour_prediction == "velocity":
-                velocity = np.array([state.velocity for _, state in known])[lost]
                 ahead = 1e-6 * config.horizon.dt_us * np.arange(steps)
-                positions[lost] += ahead[:, None] * velocity[:, None]
+                positions[lost] += ahead[:, None] * states[lost, None, 3:6]
         field, count = config.field, len(ids)
         return Obstacles(ids, positions, np.full(count, field.d_min), np.full(count, field.d_safe))
 
     def ages(self, now: int) -> dict[int, int]:
         """Age (µs) of every neighbour's track."""
-        states = {system: track.at(now) for system, track in self._tracks.items()}
-        return {system: state.age for system, state in states.items() if state is not None}
+        return {system: now - int(time) for system, time in zip(self._ids, self._times, strict=True)}

@@ -203,7 +203,8 @@ class Companion:
         self._heading.plan(now, horizon.knots[1:, 0:3], targets)
 
     def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:
-        """Where to: the own goal, or the surface around the target where it will be at the end of the horizon."""
+        """Where to: the own goal, or the surface around the target where it will be at the end of the
+        horizon."""
         config, target = self.config, view.target
         if self.pilot.phase is Phase.SETTLE:
             return self._settle(measured, target)
@@ -218,7 +219,8 @@ class Companion:
         return Aim(destination + ahead * target.velocity, target.velocity, target.position)
 
     def _settle(self, measured: Motion, target: State | None) -> Aim:
-        """Stop where braking from the order on ends, still avoiding; then, calm and clear of the others, land."""
+        """Stop where braking from the order on ends, still avoiding; then, calm and clear of the others,
+        land."""
         if self._rest is None:
             reach = float(np.linalg.norm(measured.velocity)) / (2.0 * min(self.config.limits.u_max))
             self._rest = measured.position + reach * measured.velocity

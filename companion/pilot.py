@@ -1,7 +1,8 @@
-"""The way into the air and back: connect → arm → take-off → escort → settle → land, by MAVLink commands, each until acknowledged.
+"""The way into the air and back: connect → arm → take-off → escort → settle → land, by MAVLink commands, each
+until acknowledged.
 
-Nothing starts without an operator's go (a NAV_TAKEOFF addressed to the companion), and while the autopilot is not in the
-mode in which our set-points steer, none are sent.
+Nothing starts without an operator's go (a NAV_TAKEOFF addressed to the companion), and while the autopilot is
+not in the mode in which our set-points steer, none are sent.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
 _RETRY = 500_000
 _NAN = float("nan")
 _NEEDED = {32: 20_000, 30: 20_000, 1: 1_000_000, 245: 500_000}
-"""Message id → interval (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS, EXTENDED_SYS_STATE."""
+"""Message id → interval (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
+EXTENDED_SYS_STATE."""
 
 _Call = tuple[int, tuple[float, ...]]
 
@@ -113,8 +115,8 @@ class Pilot:
         return True
 
     def land(self) -> bool:
-        """The operator's order to land. A vehicle under way first comes to a hover clear of the others, because an
-        autopilot that lands looks out for nobody."""
+        """The operator's order to land. A vehicle under way first comes to a hover clear of the others,
+        because an autopilot that lands looks out for nobody."""
         if self.phase is Phase.CONNECT:
             return False
         if self.phase is Phase.ESCORT:

@@ -96,10 +96,5 @@ _FLAT = np.array([1.0, 1.0, 0.0])
 
 def build(config: CompanionConfig) -> list[Method]:
     """The strategies that the configuration names, in its order; ``baseline`` adds nothing."""
-    methods: list[Method] = []
-    for name in config.methods:
-        if name == "tangential":
-            methods.append(
-                Tangential(config.tangential, max(config.limits.u_max), config.horizon.dt_us * 1e-6)
-            )
-    return methods
+    u_max, dt = max(config.limits.u_max), config.horizon.dt_us * 1e-6
+    return [Tangential(config.tangential, u_max, dt) for name in config.methods if name == "tangential"]

@@ -1,7 +1,9 @@
-"""What is sent: a consistent position, velocity, acceleration and yaw at a bounded look-ahead of the flown horizon.
+"""What is sent: a consistent position, velocity, acceleration and yaw at a bounded look-ahead of the flown
+horizon.
 
-The paper sends x(N + 1), 1.6 s ahead; a position-first controller that chases a point 8 m ahead overshoots its limits. A
-look-ahead of the link's delay makes the set-point right when it arrives; 1 600 000 µs is the paper's choice.
+The paper sends x(N + 1), 1.6 s ahead; a position-first controller that chases a point 8 m ahead overshoots
+its limits. A look-ahead of the link's delay makes the set-point right when it arrives; 1 600 000 µs is the
+paper's choice.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ FRAME_LOCAL_NED = 1
 def setpoint(
     time: int, since_boot: int, horizon: Horizon, yaw: Yaw, local: LocalFrame, own: Source, mask: int
 ) -> SetpointLocal:
-    """SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame, frame 1: the horizon and ``yaw`` at ``time`` (µs)."""
+    """SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame, frame 1: the horizon and ``yaw`` at
+    ``time`` (µs)."""
     motion = horizon.at(time)
     return SetpointLocal(
         own,

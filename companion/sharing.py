@@ -1,4 +1,5 @@
-"""What the others need to know: own GLOBAL_POSITION_INT and horizon on the swarm link, a heartbeat on both links.
+"""What the others need to know: own GLOBAL_POSITION_INT and horizon on the swarm link, a heartbeat on both
+links.
 
 The position is always sent besides the horizon: any MAVLink listener understands it.
 """

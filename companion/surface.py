@@ -18,7 +18,8 @@ def bearing(origin: Array, point: Array) -> float:
 
 
 def circle(target: Array, own: Array, radius: float, height: float) -> Array:
-    """x̌ = x_P + [d cos ψ, d sin ψ, h] with ψ the bearing of the robot *from the target* (Sec. III-A), ENU (3,)."""
+    """x̌ = x_P + [d cos ψ, d sin ψ, h] with ψ the bearing of the robot *from the target* (Sec. III-A), ENU
+    (3,)."""
     psi = bearing(target, own)
     return np.array([target[0] + radius * cos(psi), target[1] + radius * sin(psi), target[2] + height])
 

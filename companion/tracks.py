@@ -1,7 +1,8 @@
-"""One moving thing as seen through its messages: a filterpy Kalman filter with age, a gate and bounded extrapolation.
+"""One moving thing as seen through its messages: a filterpy Kalman filter with age, a gate and bounded
+extrapolation.
 
-State [p, v] (6,), fleet-local ENU, SI; constant velocity with white acceleration; every measurement is position and
-velocity, as GLOBAL_POSITION_INT and LOCAL_POSITION_NED carry both.
+State [p, v] (6,), fleet-local ENU, SI; constant velocity with white acceleration; every measurement is
+position and velocity, as GLOBAL_POSITION_INT and LOCAL_POSITION_NED carry both.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ _WITNESSES = 2
 
 
 class State(NamedTuple):
-    """Position (3,), velocity (3,), fleet-local ENU; ``age`` µs since the last accepted measurement was true."""
+    """Position (3,), velocity (3,), fleet-local ENU; ``age`` µs since the last accepted measurement was
+    true."""
 
     position: Array
     velocity: Array
@@ -48,9 +50,9 @@ class Track:
     def measure(self, received: int, position: Array, velocity: Array) -> bool:
         """Take a measurement that arrived at ``received`` (µs); whether it was accepted.
 
-        One that lies more than ``jump`` metres from the prediction needs a second witness near it: a teleport of one
-        message is noise, a persistent one is real and starts the track anew. Late ones (older than the state) are
-        rejected.
+        One that lies more than ``jump`` metres from the prediction needs a second witness near it: a teleport
+        of one message is noise, a persistent one is real and starts the track anew. Late ones (older than the
+        state) are rejected.
         """
         time = received - self._config.delay_us
         z = np.concatenate([position, velocity])
@@ -77,6 +79,12 @@ class Track:
             return None
         position, velocity = self._extrapolate(now)
         return State(position, velocity, now - self._time)
+
+    @property
+    def last(self) -> Array:
+        """Position and velocity (6,) at the last accepted measurement."""
+        state: Array = self._filter.x
+        return state
 
     def covariance(self) -> Array:
         """Covariance (6, 6) at the last measurement."""

@@ -1,4 +1,5 @@
-"""The world picture, from MAVLink alone: own vehicle, neighbours, target, each with its age, in the fleet frame."""
+"""The world picture, from MAVLink alone: own vehicle, neighbours, target, each with its age, in the fleet
+frame."""
 
 from __future__ import annotations
 

@@ -8,7 +8,8 @@ class BridgeError(Exception):
 
 
 class EncodeError(BridgeError):
-    """A value does not fit its MAVLink field: a programming error or a NaN that must not leave the process."""
+    """A value does not fit its MAVLink field: a programming error or a NaN that must not leave the
+    process."""
 
 
 class LogError(BridgeError):

@@ -1,9 +1,10 @@
-"""The values that outrider exchanges: one frozen tuple per MAVLink message, SI units, the message's own frame.
+"""The values that outrider exchanges: one frozen tuple per MAVLink message, SI units, the message's own
+frame.
 
-Angles are radians, distances metres, latitudes and longitudes degrees (float64, so that the degE7 step of 1.1 cm is
-kept), times integer µs. Positions stay local NED or geodetic as the message is: ``frames`` alone converts.
-``None`` stands for a field that the sender marked unknown. Tuples rather than dataclasses: they are made thousands of
-times a second and a tuple costs a third as much.
+Angles are radians, distances metres, latitudes and longitudes degrees (float64, so that the degE7 step of 1.1
+cm is kept), times integer µs. Positions stay local NED or geodetic as the message is: ``frames`` alone
+converts. ``None`` stands for a field that the sender marked unknown. Tuples rather than dataclasses: they are
+made thousands of times a second and a tuple costs a third as much.
 """
 
 from __future__ import annotations
@@ -81,8 +82,8 @@ class LocalPosition(NamedTuple):
 
 
 class GlobalPosition(NamedTuple):
-    """GLOBAL_POSITION_INT (33). ``altitude`` above mean sea level, ``relative_altitude`` above home, yaw clockwise
-    from north in rad or None."""
+    """GLOBAL_POSITION_INT (33). ``altitude`` above mean sea level, ``relative_altitude`` above home, yaw
+    clockwise from north in rad or None."""
 
     source: Source
     time_boot: int

@@ -56,8 +56,8 @@ class Reference(NamedTuple):
         ago.
 
         For a stream of set-points that carry neither: without jerk the controller sees no turning of the
-        thrust axis ahead and lags in curves, and without yaw acceleration a weak yaw control lags behind every
-        turn. Low-pass filtered, so that a jump of what is given does not become a jolt.
+        thrust axis ahead and lags in curves, and without yaw acceleration a weak yaw control lags behind
+        every turn. Low-pass filtered, so that a jump of what is given does not become a jolt.
         """
         if elapsed <= 0:
             return self._replace(jerk=previous.jerk, yaw_acceleration=previous.yaw_acceleration)

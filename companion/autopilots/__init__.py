@@ -1,4 +1,5 @@
-"""What PX4 and ArduPilot want differently: modes, the order of take-off, and which set-point fields they take."""
+"""What PX4 and ArduPilot want differently: modes, the order of take-off, and which set-point fields they
+take."""
 
 from __future__ import annotations
 
@@ -17,10 +18,12 @@ class Step(Enum):
 
 
 class Profile(NamedTuple):
-    """An autopilot's ways. ``mode_params`` are p1…p3 of DO_SET_MODE; ``setpoint_mask`` is the type_mask to send.
+    """An autopilot's ways. ``mode_params`` are p1…p3 of DO_SET_MODE; ``setpoint_mask`` is the type_mask to
+    send.
 
-    ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer. ``streams_first``: set-points must flow before
-    the mode is granted. ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level, not above home.
+    ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer. ``streams_first``: set-points must
+    flow before the mode is granted. ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level,
+    not above home.
     """
 
     name: str

@@ -1,4 +1,5 @@
-"""ArduCopter: GUIDED, arm, NAV_TAKEOFF above home, then set-points with all five parts (measured as its best)."""
+"""ArduCopter: GUIDED, arm, NAV_TAKEOFF above home, then set-points with all five parts (measured as its
+best)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Ways out of the field's local minima (Sec. III-C): interchangeable strategies that see a scene and add influence."""
+"""Ways out of the field's local minima (Sec. III-C): interchangeable strategies that see a scene and add
+influence."""
 
 from __future__ import annotations
 
@@ -11,9 +12,9 @@ from companion.horizon import Array
 class Scene(NamedTuple):
     """What one plan is made from: own state and prediction, target and obstacles, fleet-local ENU, SI.
 
-    ``prediction`` (N + 1, 3) is the previous plan at n = 0…N from now; ``gradient`` the last ∇J (3,), zero at first.
-    ``to_go`` (3,) leads from the vehicle to where its destination is *now*: in a moving formation what flies along with
-    everybody is in nobody's way.
+    ``prediction`` (N + 1, 3) is the previous plan at n = 0…N from now; ``gradient`` the last ∇J (3,), zero at
+    first. ``to_go`` (3,) leads from the vehicle to where its destination is *now*: in a moving formation what
+    flies along with everybody is in nobody's way.
     """
 
     position: Array

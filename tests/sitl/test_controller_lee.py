@@ -167,7 +167,9 @@ def test_commanded_rates_are_the_derivatives_of_the_commanded_attitude(heading):
 @pytest.mark.parametrize("axes", [LEVEL, ((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))])
 def test_a_command_without_direction_is_still_a_rotation(heading, A, axes):
     record = airframe_record(airframe(LEE.model_copy(update={"heading": heading})))
-    R, rates, change = map(np.array, command((A, (1.0, 2.0, 3.0), (3.0, 2.0, 1.0)), 0.0, 0.5, 0.2, axes, record))
+    R, rates, change = map(
+        np.array, command((A, (1.0, 2.0, 3.0), (3.0, 2.0, 1.0)), 0.0, 0.5, 0.2, axes, record)
+    )
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(R) > 0.0
     assert np.all(np.isfinite(rates))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Final, Optional, cast
 
 import typer
 
@@ -18,6 +18,8 @@ app = typer.Typer(
     help="A ring of MAVs escorts a moving target without colliding.",
 )
 BAD_INPUT, FAULT = 2, 3
+# Click's UsageError: typer has no name of its own for it, and newer ones bring their own click.
+_UsageError: Final = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 
 
 @app.callback()
@@ -75,17 +77,28 @@ def bench(
 
 
 def main() -> None:
-    """Run the command line: bad input ends with status 2 and one line for each fault, never with a traceback."""
+    """Run the command line: bad input ends with status 2 and one line for each fault, never with a
+    traceback."""
     from mavlink_bridge.errors import BridgeError
 
     try:
-        app(standalone_mode=True)
+        status = app(standalone_mode=False)
     except InputError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(BAD_INPUT)
+    except _UsageError as error:
+        said = error.format_message()
+        if said and error.ctx is not None:
+            command = error.ctx.command_path
+            line = f"{command}: {said.rstrip('.')}; see {command} --help"
+            sys.stderr.write(f"{InputError(line)}\n")
+        sys.exit(BAD_INPUT)
+    except typer.Abort:
+        sys.exit(FAULT)
     except (OutriderError, BridgeError, OSError) as error:
         sys.stderr.write(f"outrider: {error}\n")
         sys.exit(FAULT)
+    sys.exit(status)
 
 
 if __name__ == "__main__":

@@ -42,7 +42,8 @@ _WORDS = {
 
 @contextmanager
 def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
-    """A bar for one flight; the callable takes stage and simulated seconds. Quiet when there is no terminal."""
+    """A bar for one flight; the callable takes stage and simulated seconds. Quiet when there is no
+    terminal."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

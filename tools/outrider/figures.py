@@ -92,7 +92,8 @@ def _separation(axes: Axes, flight: Flight, samples: Samples, time: np.ndarray) 
 
 
 def _errors(standoff: Axes, yaw: Axes, flight: Flight, samples: Samples, time: np.ndarray) -> None:
-    """How far from where it should be, and how far off the bow the target is, per vehicle, from the clock's start on."""
+    """How far from where it should be, and how far off the bow the target is, per vehicle, from the clock's
+    start on."""
     on_clock = (time >= 0.0) & (samples.time <= (flight.clock_end or samples.time[-1]))
     if flight.scenario.task == "escort":
         values = standoff_errors(flight, samples.position, samples.target)
@@ -116,7 +117,11 @@ def _plan_time(axes: Axes, flight: Flight) -> None:
     tallies = flight.tallies
     values = np.array([n for before, after in tallies for n in after.plan_ns[len(before.plan_ns) :]]) * 1e-6
     if len(values):
-        axes.hist(values, bins=np.linspace(0.0, max(1.0, float(np.percentile(values, 99.9))), 80), color="C0")
+        axes.hist(
+            values,
+            bins=np.linspace(0.0, max(1.0, float(np.percentile(values, 99.9))), 80).tolist(),
+            color="C0",
+        )
         for q in (50, 99):
             level = float(np.percentile(values, q))
             axes.axvline(level, color="0.2", lw=0.9, ls=":", label=f"p{q} {level:.2f} ms")

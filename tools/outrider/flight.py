@@ -1,5 +1,6 @@
-"""One lock-step flight of a scenario: compose companions, autopilots, target and operator, take off, give the goal, watch,
-land. The only place where companion and sitl stand side by side; they still meet only in MAVLink bytes."""
+"""One lock-step flight of a scenario: compose companions, autopilots, target and operator, take off, give the
+goal, watch, land. The only place where companion and sitl stand side by side; they still meet only in MAVLink
+bytes."""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ class Stage(Enum):
 
 
 class Flight:
-    """Builds the nodes of a scenario for one seed, and runs them. ``progress`` hears the stage and simulated seconds."""
+    """Builds the nodes of a scenario for one seed, and runs them. ``progress`` hears the stage and simulated
+    seconds."""
 
     def __init__(
         self,
@@ -107,7 +109,8 @@ class Flight:
         return list(zip(start, (c.tally for c in self.companions), strict=True))
 
     def errors(self, positions: np.ndarray, target: np.ndarray | None) -> np.ndarray:
-        """Distance (K,) of each vehicle from where it should be: its goal, or the surface around ``target``."""
+        """Distance (K,) of each vehicle from where it should be: its goal, or the surface around
+        ``target``."""
         if self.starts.goals is not None:
             return np.asarray(np.linalg.norm(positions - self.starts.goals, axis=1))
         if target is None:
@@ -252,7 +255,7 @@ class _Recorder:
             for s in systems
         }
 
-    def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
+    def __call__(self, now: int, node: str, _direction: Direction, datagram: Datagram, /) -> None:
         writer = self._writers.get(node)
         if writer is not None:
             writer.write(now, LINK_NUMBERS[datagram.link], datagram.data)

@@ -1,4 +1,5 @@
-"""Where the shipped configuration lies, in a checkout and in an installed wheel, and how a name becomes a file."""
+"""Where the shipped configuration lies, in a checkout and in an installed wheel, and how a name becomes a
+file."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ def config_root() -> Path:
 
 
 def find(kind: str, name: str) -> Path:
-    """The file that ``name`` means: a path, or the name of a shipped file of ``kind`` (a folder of the configuration).
+    """The file that ``name`` means: a path, or the name of a shipped file of ``kind`` (a folder of the
+    configuration).
 
     InputError that lists what is there, and the nearest, when it is neither.
     """

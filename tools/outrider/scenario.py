@@ -8,7 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from companion.config import CompanionConfig
 
-Position = tuple[float, float, float]
+Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
+Position = tuple[Coordinate, Coordinate, Coordinate]
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
 Milliseconds = Annotated[float, Field(ge=0.0, le=10_000.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -16,8 +17,8 @@ Period = Annotated[int, Field(gt=0, le=1_000_000, multiple_of=4)]
 
 FIRST_SYSTEM = 11
 """System id of the first vehicle of a fleet; a recorded target keeps its own."""
-TARGET_SYSTEM = 101
-"""System id of a target that is not recorded."""
+TARGET_SYSTEM = 10
+"""System id of a target that is not recorded: below the fleet, so that no vehicle can have it."""
 
 
 class Part(BaseModel):
@@ -35,9 +36,10 @@ class Origin(Part):
 
 
 class Ring(Part):
-    """Starts: evenly on a circle, hovering at ``height`` above the ground, jittered within a ball per seed."""
+    """Starts: evenly on a circle, hovering at ``height`` above the ground, jittered within a ball per
+    seed."""
 
-    centre: tuple[float, float] = (0.0, 0.0)
+    centre: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     radius: Length
     height: float = Field(
         5.0, ge=0.5, le=100.0, description="m above ground, where the vehicles hover at first"
@@ -130,6 +132,8 @@ class Scenario(Part):
     def _consistent(self) -> Scenario:
         timing, rates = self.timing, self.companion.rates
         tick = timing.base_tick_us
+        if 1_000_000 % tick:
+            raise ValueError(f"timing.base_tick_us = {tick} does not divide a second")
         periods = {
             "timing.autopilot_us": timing.autopilot_us,
             "timing.companion_us": timing.companion_us,
@@ -139,6 +143,13 @@ class Scenario(Part):
         for name, period in periods.items():
             if period % tick:
                 raise ValueError(f"{name} = {period} is not a whole number of base ticks of {tick} µs")
+        if min(rates.replan_us, rates.setpoint_us) < timing.companion_us:
+            raise ValueError(
+                f"companion.rates.replan_us and setpoint_us must be at least timing.companion_us = "
+                f"{timing.companion_us}"
+            )
+        if isinstance(self.target, RecordedTarget) and 0 <= self.target.system - FIRST_SYSTEM < self.vehicles:
+            raise ValueError(f"target.system = {self.target.system} is the id of a vehicle of the fleet")
         if self.task == "antipodal" and not isinstance(self.target, FixedTarget):
             raise ValueError("task 'antipodal' needs a target of kind 'fixed': what the vehicles face")
         return self

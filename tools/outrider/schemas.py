@@ -13,7 +13,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
-SCHEMAS: list[tuple[str, type[BaseModel]]] = []
+from outrider.scenario import Scenario
+from sitl.config import VehicleConfig
+
+SCHEMAS: list[tuple[str, type[BaseModel]]] = [("scenario", Scenario), ("vehicle", VehicleConfig)]
 """The name of each schema file, and the model that it is made from."""
 
 

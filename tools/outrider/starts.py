@@ -14,15 +14,16 @@ Array = NDArray[np.float64]
 
 
 class Starts(NamedTuple):
-    """Fleet-local ENU, m. ``positions`` (K, 3): where each hovers first, jittered; ``goals`` (K, 3) or None."""
+    """Fleet-local ENU, m. ``positions`` (K, 3): where each hovers first, jittered; ``goals`` (K, 3) or
+    None."""
 
     positions: Array
     goals: Array | None
 
 
 def starts(scenario: Scenario, seed: int, planar: bool) -> Starts:
-    """Evenly on the ring, each moved within a ball of ``jitter`` (a disc if ``planar``); the goal is the opposite point
-    of the ring, not of the jittered start. ``seed`` alone decides the jitter."""
+    """Evenly on the ring, each moved within a ball of ``jitter`` (a disc if ``planar``); the goal is the
+    opposite point of the ring, not of the jittered start. ``seed`` alone decides the jitter."""
     ring, count = scenario.starts, scenario.vehicles
     angles = math.radians(ring.first_deg) + 2.0 * math.pi * np.arange(count) / count
     slots = np.column_stack(

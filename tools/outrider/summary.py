@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,8 +27,8 @@ class Cost(NamedTuple):
 
 
 def summarise(flight: Flight, cost: Cost, seed: int, run_dir: Path) -> dict[str, Value]:
-    """The summary of a finished flight; keys and words as in the design. Errors, speeds and counters are those of the
-    clock; separation is that of the whole time in the air."""
+    """The summary of a finished flight; keys and words as in the design. Errors, speeds and counters are
+    those of the clock; separation is that of the whole time in the air."""
     scenario, truth = flight.scenario, flight.truth
     config = scenario.companion
     start = flight.clock_start
@@ -93,7 +94,8 @@ def summarise(flight: Flight, cost: Cost, seed: int, run_dir: Path) -> dict[str,
 
 
 def exit_status(summary: dict[str, Value]) -> int:
-    """0 finished; 1 a violation of d_min, or a goal that was not reached, or a flight that did not come about."""
+    """0 finished; 1 a violation of d_min, or a goal that was not reached, or a flight that did not come
+    about."""
     failed = summary["d_min_violations"] or summary["converged"] is False or summary["failure"]
     return 1 if failed else 0
 
@@ -140,5 +142,5 @@ def _finite(value: float) -> float | None:
     return round(value, 4) if np.isfinite(value) else None
 
 
-def _ns_to_ms(readings: list[list[int]]) -> Array:
+def _ns_to_ms(readings: Sequence[Sequence[int]]) -> Array:
     return np.array([ns for per_vehicle in readings for ns in per_vehicle], dtype=float) * 1e-6

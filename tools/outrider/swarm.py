@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
 import yaml
 from pydantic import ValidationError
 
+from mavlink_bridge.frames import FleetFrame
 from outrider import figures
 from outrider.errors import InputError
 from outrider.flight import Flight, Stage
 from outrider.resources import config_root, find
-from outrider.scenario import Scenario
+from outrider.scenario import RecordedTarget, Scenario
 from outrider.summary import Cost, Value, summarise, write
+from outrider.targets import load as load_log
 from outrider.yaml_file import load
 from sitl.config import VehicleConfig
 
@@ -47,6 +50,11 @@ def prepare(name: str, options: Options) -> Prepared:
     """Load a scenario by name or path and apply ``options``. InputError in one line for whatever is wrong."""
     scenario = load(find("scenarios", name), Scenario)
     scenario = apply(scenario, options)
+    if isinstance(scenario.target, RecordedTarget):
+        # Before a run directory is made: a log that cannot be used leaves none behind.
+        origin = scenario.origin
+        frame = FleetFrame(origin.latitude, origin.longitude, origin.altitude)
+        load_log(scenario.target, config_root() / "logs" / scenario.target.log, frame)
     return Prepared(scenario, load(find("vehicles", scenario.vehicle), VehicleConfig))
 
 
@@ -65,7 +73,7 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
     if options.sensors is not None:
         changes["sensors"] = options.sensors
     if options.replan_hz is not None:
-        if options.replan_hz <= 0.0:
+        if not 0.0 < options.replan_hz < inf:
             raise InputError(f"--replan-hz {options.replan_hz}: allowed are numbers above 0")
         companion["rates"] = {
             **scenario.companion.rates.model_dump(),
@@ -87,9 +95,7 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
         return Scenario.model_validate({**scenario.model_dump(), **changes})
     except ValidationError as error:
         raise InputError(
-            "; ".join(
-                f"{'.'.join(map(str, fault['loc'])) or 'options'}: {fault['msg']}" for fault in error.errors()
-            )
+            *(f"{'.'.join(map(str, fault['loc'])) or 'options'}: {fault['msg']}" for fault in error.errors())
         ) from None
 
 
@@ -113,18 +119,29 @@ def fly(prepared: Prepared, seed: int, directory: Path, progress: Progress) -> d
 
 
 def run_directory(out: Path | None, scenario: Scenario, seed: int) -> Path:
-    """A new, empty directory: ``out``, or the first free ``runs/NAME-METHOD-seedN[-k]``. Nothing is overwritten."""
+    """A new, empty directory: ``out``, or the first free ``runs/NAME-METHOD-seedN[-k]``. Nothing is
+    overwritten."""
     if out is not None:
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             raise InputError(f"--out {out}: exists and is not an empty directory")
         return _made(out)
     stem = f"{scenario.name}-{'+'.join(scenario.companion.methods)}-seed{seed}"
+    runs = _made(Path("runs"))
     number = 1
-    while True:
-        path = Path("runs") / (stem if number == 1 else f"{stem}-{number}")
-        if not path.exists():
-            return _made(path)
+    while not _is_new(path := runs / (stem if number == 1 else f"{stem}-{number}")):
         number += 1
+    return path
+
+
+def _is_new(path: Path) -> bool:
+    """Make it and say True, or False if it is there: two runs that start at once never share one."""
+    try:
+        path.mkdir()
+    except FileExistsError:
+        return False
+    except OSError as error:
+        raise InputError(f"{path}: cannot be made: {error.strerror}") from None
+    return True
 
 
 def _made(path: Path) -> Path:
@@ -142,4 +159,6 @@ def _methods(text: str) -> tuple[str, ...]:
             raise InputError(
                 f"--method {text}: {name!r} is no method; allowed are {', '.join(METHODS)}, joined by +"
             )
+    if len(set(names)) < len(names):
+        raise InputError(f"--method {text}: a method is there twice; allowed: once")
     return names

@@ -1,4 +1,5 @@
-"""The target as a node: it sends GLOBAL_POSITION_INT on its link, and the harness may ask where it truly is."""
+"""The target as a node: it sends GLOBAL_POSITION_INT on its link, and the harness may ask where it truly
+is."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavlink_bridge.codec import Codec
+from mavlink_bridge.errors import LogError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import GlobalPosition, Source
 from mavlink_bridge.node import Datagram
@@ -19,6 +21,8 @@ from outrider.scenario import TARGET_SYSTEM, FixedTarget, RecordedTarget
 
 Array = NDArray[np.float64]
 LINK = "target"
+SHORT = 1.0
+"""s; a log may end this much before the piece that is wanted of it does."""
 
 
 class Target(Protocol):
@@ -94,7 +98,8 @@ class Standing:
 
 
 class Recording(NamedTuple):
-    """Frames of one sender: ``times`` (n,) µs from the start of the piece, the bytes, and the truth (n, 3) ENU."""
+    """Frames of one sender: ``times`` (n,) µs from the start of the piece, the bytes, and the truth (n, 3)
+    ENU."""
 
     times: NDArray[np.int64]
     frames: tuple[bytes, ...]
@@ -118,7 +123,8 @@ class Recorded:
         self._start = now
 
     def position(self, now: int) -> Array | None:
-        """The log interpolated at ``now``; before the start its first place; None after its end: it is gone."""
+        """The log interpolated at ``now``; before the start its first place; None after its end: it is
+        gone."""
         times, places = self.recording.times, self.recording.positions
         since = 0 if self._start is None else now - self._start
         if since > times[-1]:
@@ -138,14 +144,21 @@ class Recorded:
 
 
 def load(config: RecordedTarget, path: Path, fleet: FleetFrame) -> Recording:
-    """The piece of the log that ``config`` names. InputError when it holds no such messages there."""
+    """The piece of the log that ``config`` names, in the order of time. InputError when there is no such log,
+    when it ends before the piece does, or when it holds no such messages there."""
     codec = Codec(lambda identifier, system, _component: identifier == 33 and system == config.system)
     first: int | None = None
+    last = 0
     times: list[int] = []
     frames: list[bytes] = []
     positions: list[Array] = []
-    for record in read_tlog(path):
+    try:
+        log = read_tlog(path)
+    except LogError as error:
+        raise InputError(str(error)) from None
+    for record in log:
         first = record.time if first is None else first
+        last = max(last, record.time - first)
         since = record.time - first - round(config.start_s * 1e6)
         if since < 0 or since > config.duration_s * 1e6:
             continue
@@ -154,9 +167,16 @@ def load(config: RecordedTarget, path: Path, fleet: FleetFrame) -> Recording:
                 times.append(since)
                 frames.append(record.frame)
                 positions.append(fleet.to_enu(message.latitude, message.longitude, message.altitude))
+    end = config.start_s + config.duration_s
+    if last < (end - SHORT) * 1e6:
+        raise InputError(f"{path}: ends after {last * 1e-6:.1f} s; it is needed up to {end} s")
     if len(times) < 2:
         raise InputError(
             f"{path}: holds {len(times)} GLOBAL_POSITION_INT of system {config.system} between "
-            f"{config.start_s} s and {config.start_s + config.duration_s} s; at least 2 are needed"
+            f"{config.start_s} s and {end} s; at least 2 are needed"
         )
-    return Recording(np.array(times) - times[0], tuple(frames), np.array(positions))
+    # Stamps of real logs step back at times.
+    order = np.argsort(times, kind="stable")
+    return Recording(
+        np.array(times)[order] - min(times), tuple(frames[i] for i in order), np.array(positions)[order]
+    )

@@ -1,5 +1,5 @@
-"""What really happened, from the simulated physics and never from estimates: separation at every physics step, and samples
-at 50 Hz of all that figures and the summary show."""
+"""What really happened, from the simulated physics and never from estimates: separation at every physics
+step, and samples at 50 Hz of all that figures and the summary show."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ SAMPLE = 20_000
 class Samples(NamedTuple):
     """T samples of K vehicles, fleet-local ENU, SI, radians; NaN where there is nothing.
 
-    ``time`` (T,) µs; ``position``, ``velocity``, ``acceleration``, ``reference`` (T, K, 3); ``yaw``, ``tilt`` (T, K);
-    ``target`` (T, 3); ``separation`` (T,): least distance between vehicles since the sample before.
+    ``time`` (T,) µs; ``position``, ``velocity``, ``acceleration``, ``reference`` (T, K, 3); ``yaw``, ``tilt``
+    (T, K); ``target`` (T, 3); ``separation`` (T,): least distance between vehicles since the sample before.
     """
 
     time: NDArray[np.int64]
@@ -47,9 +47,8 @@ class Encounters:
 
     def see(self, distances: Array) -> None:
         """Distances (n, pairs) at consecutive times; NaN where a pair is not in the air."""
-        if np.isnan(distances).all():
-            return
-        self.minimum = min(self.minimum, float(np.nanmin(distances)))
+        if not np.isnan(distances).all():
+            self.minimum = min(self.minimum, float(np.nanmin(distances)))
         below = np.vstack([self._below, distances < self._least])
         self.count += int((below[1:] & ~below[:-1]).sum())
         self._below = below[-1]
@@ -104,10 +103,17 @@ class Truth:
     def samples(self, since: int = 0, until: int | None = None) -> Samples:
         """All samples with ``since`` ≤ time < ``until``."""
         rows = [row for row in self._rows if row[0] >= since and (until is None or row[0] < until)]
-        parts = [np.array([row[1][i] for row in rows]) for i in range(6)]
+        position, velocity, acceleration, reference, yaw, tilt = (
+            np.array([row[1][i] for row in rows]) for i in range(6)
+        )
         return Samples(
             np.array([row[0] for row in rows], dtype=np.int64),
-            *parts,
+            position,
+            velocity,
+            acceleration,
+            reference,
+            yaw,
+            tilt,
             np.array([row[2] for row in rows]).reshape(-1, 3),
             np.array([row[3] for row in rows]),
         )

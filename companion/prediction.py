@@ -1,0 +1,36 @@
+"""The double integrator over the horizon, as matrices: the A and B of the paper, eq. (5), stacked.
+
+Settled against the text: A and B are 6 × 6 and 6 × 3 there, not 3 × 3; per axis that leaves 2 × 2 and 2 × 1,
+and with a (n,) the accelerations of n steps, velocities 1…n are v + S_v a and positions 1…n are x + t v + S_x
+a.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Prediction(NamedTuple):
+    """``S_v``, ``S_x`` (n, n): accelerations to velocities and positions; ``time`` (n,): t of steps 1…n,
+    s."""
+
+    S_v: Array
+    S_x: Array
+    time: Array
+
+
+@lru_cache(maxsize=64)
+def prediction(steps: int, dt: float) -> Prediction:
+    """For ``steps`` inputs of ``dt`` seconds each."""
+    k = np.arange(steps)
+    lower = (k[:, None] >= k).astype(np.float64)
+    parts = Prediction(dt * lower, np.asarray(dt**2 * (k[:, None] - k + 0.5) * lower), dt * (k + 1.0))
+    for part in parts:
+        part.flags.writeable = False
+    return parts
