@@ -21,14 +21,15 @@ from companion.horizon import Array
 from companion.prediction import prediction
 from companion.solver import QpSolver
 
+_TOLERANCE = 1e-7
+"""m and m/s by which a state limit may be passed: far below what anything can measure."""
 _WIDEN = 0.01
 """Share of the reach by which an unreachable bound is widened: an interior keeps the interior-point method
 happy."""
 
 
 class AxisQp(NamedTuple):
-    """One axis: min ½ aᵀPa + cᵀa, x_l ≤ a ≤ x_u, h_l ≤ Ga ≤ h_u; ``G`` empty when no state limit is in
-    reach."""
+    """One axis: min ½ aᵀPa + cᵀa, x_l ≤ a ≤ x_u, h_l ≤ Ga ≤ h_u."""
 
     P: Array
     c: Array
@@ -48,7 +49,6 @@ class Problem(NamedTuple):
     x_u: Array
     h_l: Array
     h_u: Array
-    constrained: tuple[bool, bool, bool]
 
 
 class Solution(NamedTuple):
@@ -56,6 +56,14 @@ class Solution(NamedTuple):
 
     acceleration: Array
     relaxed: int
+
+
+class _Solvers(NamedTuple):
+    """For one weight Ω_t: −P⁻¹ (n, n), the QP with bounds on a alone, and the QP with state limits."""
+
+    minimiser: Array
+    bounded: QpSolver
+    limited: QpSolver
 
 
 class Dqmpc:
@@ -69,9 +77,21 @@ class Dqmpc:
         self.seconds = n * dt
         self.S_v, self.S_x, self._time = prediction(n, dt)
         self.G: Array = np.vstack([self.S_v, self.S_x])
+        self._G_T: Array = np.ascontiguousarray(self.G.T)
         self._u = np.array(limits.u_max)[:, None]
-        self._box = np.array([limits.box_min, limits.box_max])
-        self._v_max = np.array(limits.v_max)[:, None]
+        ones, no = np.ones(n), np.zeros(n)
+        # [v, x] (3, 2) times this is what velocities and positions 1…n are without any input (3, 2n).
+        self._drift: Array = np.vstack([np.hstack([ones, self._time]), np.hstack([no, ones])])
+        self._low, self._high = (
+            np.hstack([np.outer(speed, ones), np.outer(place, ones)])
+            for speed, place in (
+                (-np.array(limits.v_max), limits.box_min),
+                (np.array(limits.v_max), limits.box_max),
+            )
+        )
+        # [x − x̌, v − v̌] at the end (3, 2) times this is c, for Ω_t as configured.
+        weights = 2.0 * np.array([cost.omega_t_position, cost.omega_t_velocity])
+        self._pull: Array = weights[:, None] * np.vstack([self.S_x[-1], self.S_v[-1]])
         self._solvers = lru_cache(maxsize=16)(self._build)
 
     def hessian(self, omega_scale: float) -> Array:
@@ -90,63 +110,65 @@ class Dqmpc:
     ) -> Problem:
         """The QPs' vectors from state (3,), (3,), field f (N + 1, 3), destination x̌ (3,) and terminal
         velocity (3,)."""
-        limits, w = self.limits, self.cost
         fT = f.T
         reach = np.abs(fT) + self._u
         norm = np.sqrt((reach * reach).sum(axis=0))
-        far = reach * np.minimum(1.0, limits.a_total / norm)
+        far = reach * np.minimum(1.0, self.limits.a_total / norm)
         x_l = np.maximum(fT - self._u, -far)
         x_u = np.minimum(fT + self._u, far)
-        end = x + self._time[-1] * v
-        scale = 2.0 * omega_scale
-        c = np.multiply.outer(scale * w.omega_t_position * (end - destination), self.S_x[-1])
-        c += np.multiply.outer(scale * w.omega_t_velocity * (v - velocity), self.S_v[-1])
-        # Extremes of velocity and position that the bounds allow: they tell which limits matter and which
-        # must give way.
-        low, high = x_l @ self.G.T, x_u @ self.G.T
-        free = np.empty_like(low)
-        free[:, : self.n] = v[:, None]
-        free[:, self.n :] = x[:, None] + np.multiply.outer(v, self._time)
-        h_l = np.empty_like(low)
-        h_u = np.empty_like(low)
-        h_l[:, : self.n], h_u[:, : self.n] = -self._v_max, self._v_max
-        h_l[:, self.n :], h_u[:, self.n :] = self._box[0][:, None], self._box[1][:, None]
-        h_l -= free
-        h_u -= free
-        active = (low < h_l).any(axis=1) | (high > h_u).any(axis=1)
+        state = np.empty((3, 2))
+        state[:, 0], state[:, 1] = v, x
+        off = np.empty((3, 2))
+        off[:, 0], off[:, 1] = x + self.seconds * v - destination, v - velocity
+        free = state @ self._drift
+        return Problem((omega_scale * off) @ self._pull, x_l, x_u, self._low - free, self._high - free)
+
+    def reachable(self, problem: Problem) -> Problem:
+        """The problem with every state limit that no input can keep widened to what is reachable, and a
+        little."""
+        low, high = problem.x_l @ self._G_T, problem.x_u @ self._G_T
         margin = _WIDEN * (high - low)
-        np.minimum(h_l, high - margin, out=h_l)
-        np.maximum(h_u, low + margin, out=h_u)
-        return Problem(c, x_l, x_u, h_l, h_u, (bool(active[0]), bool(active[1]), bool(active[2])))
+        return problem._replace(
+            h_l=np.minimum(problem.h_l, high - margin), h_u=np.maximum(problem.h_u, low + margin)
+        )
 
     def axis(self, problem: Problem, axis: int, omega_scale: float) -> AxisQp:
         """One axis in full, for another solver or a KKT check."""
-        rows = 2 * self.n if problem.constrained[axis] else 0
+        problem = self.reachable(problem)
         return AxisQp(
             self.hessian(omega_scale),
             problem.c[axis],
-            self.G[:rows],
-            problem.h_l[axis][:rows],
-            problem.h_u[axis][:rows],
+            self.G,
+            problem.h_l[axis],
+            problem.h_u[axis],
             problem.x_l[axis],
             problem.x_u[axis],
         )
 
     def solve(self, problem: Problem, omega_scale: float) -> Solution:
-        """Solve the three axes. An axis whose state limits contradict each other is solved without them and
-        counted; its bounds on a always hold. SolverError only if even that fails."""
-        free, limited = self._solvers(omega_scale)
-        a = np.empty((self.n, 3))
+        """Solve the three axes, each with no more constraints than matter.
+
+        The free minimiser is the solution where it lies within the bounds on a; otherwise PIQP solves with
+        these bounds, and once more with all constraints where that solution breaks a state limit. An axis
+        whose state limits contradict each other is solved without them and counted; its bounds on a always
+        hold. SolverError only if even that fails.
+        """
+        solvers = self._solvers(omega_scale)
+        c, x_l, x_u, h_l, h_u = problem
+        a: Array = solvers.minimiser @ c.T
+        outside = ((a < x_l.T) | (a > x_u.T)).any(axis=0)
+        for i in np.flatnonzero(outside):
+            a[:, i] = solvers.bounded.solve(c[i], x_l[i], x_u[i])
+        rows = self.G @ a
+        broken = ((rows < h_l.T - _TOLERANCE) | (rows > h_u.T + _TOLERANCE)).any(axis=0)
         relaxed = 0
-        c, x_l, x_u, h_l, h_u, constrained = problem
-        for i in range(3):
-            if constrained[i]:
-                try:
-                    a[:, i] = limited.solve(c[i], x_l[i], x_u[i], h_l[i], h_u[i])
-                    continue
-                except SolverError:
-                    relaxed += 1
-            a[:, i] = free.solve(c[i], x_l[i], x_u[i])
+        if broken.any():
+            _, _, _, h_l, h_u = self.reachable(problem)
+        for i in np.flatnonzero(broken):
+            try:
+                a[:, i] = solvers.limited.solve(c[i], x_l[i], x_u[i], h_l[i], h_u[i])
+            except SolverError:
+                relaxed += 1
         # PIQP keeps bounds to 1e-8: the last digits are ours.
         np.minimum(np.maximum(a, x_l.T), x_u.T, out=a)
         return Solution(a, relaxed)
@@ -164,6 +186,7 @@ class Dqmpc:
         gradient: Array = 2.0 * (e_x + by_input)
         return gradient
 
-    def _build(self, omega_scale: float) -> tuple[QpSolver, QpSolver]:
+    def _build(self, omega_scale: float) -> _Solvers:
         P = self.hessian(omega_scale)
-        return QpSolver(P), QpSolver(P, self.G)
+        minimiser: Array = -np.asarray(np.linalg.inv(P), dtype=np.float64)
+        return _Solvers(minimiser, QpSolver(P), QpSolver(P, self.G))

@@ -4,6 +4,7 @@ for ever."""
 from __future__ import annotations
 
 from enum import Enum
+from math import ceil
 
 import numpy as np
 
@@ -72,13 +73,16 @@ class Guard:
 
 
 def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
-    """Straight to rest within the horizon, at u_max or as hard as that takes; then hover. (N + 1
-    segments.)"""
-    n = config.horizon.steps + 1
-    h = config.horizon.dt_us * 1e-6
+    """Straight to rest within the horizon, at u_max or as hard as that takes; then hover. (N + 1 segments.)
+
+    Where even a_total does not stop the vehicle in time the steps get longer: a brake has as many as a plan.
+    """
+    n, limits = config.horizon.steps + 1, config.limits
     speed = float(np.sqrt(motion.velocity @ motion.velocity))
-    rate = max(min(config.limits.u_max), speed / ((n - 1) * h))
+    dt = max(config.horizon.dt_us, 4 * ceil(speed * 250_000 / ((n - 1) * limits.a_total)))
+    h = dt * 1e-6
+    rate = max(min(limits.u_max), speed / ((n - 1) * h))
     speeds = np.maximum(0.0, speed - rate * h * np.arange(n + 1))
     direction = motion.velocity / speed if speed > 1e-9 else np.zeros(3)
     accelerations = np.diff(speeds)[:, None] / h * direction
-    return roll_out(now, config.horizon.dt_us, motion.position, motion.velocity, accelerations)
+    return roll_out(now, dt, motion.position, motion.velocity, accelerations)

@@ -18,6 +18,8 @@ from companion.horizon import Array
 from companion.prediction import prediction
 from companion.solver import QpSolver
 
+_EVERY = 2
+
 
 class Yaw(NamedTuple):
     """ENU yaw (rad, not wrapped), its rate (rad/s) and acceleration (rad/s²)."""
@@ -31,11 +33,15 @@ class Heading:
     """Plans the yaw of one vehicle; each plan starts from the last one's state."""
 
     def __init__(self, config: HeadingConfig, horizon: HorizonConfig) -> None:
-        n, dt = horizon.steps + 1, horizon.dt_us * 1e-6
+        # Half as many steps of twice the length as the path has: yaw is slow.
+        n, dt = (horizon.steps + 1) // _EVERY, _EVERY * horizon.dt_us * 1e-6
         self._config, self._dt, self._n = config, dt, n
         self._S_v, self._S_x, self._ahead = prediction(n, dt)
         P: Array = 2.0 * (self._S_x.T @ self._S_x + config.effort * np.eye(n))
-        self._solver = QpSolver(P, self._S_v)
+        self._minimiser: Array = -np.asarray(np.linalg.inv(P), dtype=np.float64)
+        self._bounded, self._limited = QpSolver(P), QpSolver(P, self._S_v)
+        self._limit: Array = np.full(n, config.acceleration_max)
+        self._swing = config.acceleration_max * float(self._ahead[-1])
         self._start: int | None = None
         self._state = Yaw(0.0, 0.0, 0.0)
         self._accelerations: Array = np.zeros(n)
@@ -52,26 +58,17 @@ class Heading:
         Without a solution the yaw planned before is kept.
         """
         state = self.at(now)
-        offset = targets - positions
-        flat = offset[:, 0] ** 2 + offset[:, 1] ** 2
+        last = _EVERY * self._n
+        offset = targets[_EVERY - 1 : last : _EVERY] - positions[_EVERY - 1 : last : _EVERY]
         bearings = np.arctan2(offset[:, 1], offset[:, 0])
-        if flat.min() < self._config.blind**2:
-            # Above or below the target no bearing is better than another.
-            bearings = np.where(flat < self._config.blind**2, state.yaw, bearings)
-        # The nearest turn of the first bearing, then without jumps of 2π.
-        bearings = np.unwrap(np.concatenate([[state.yaw], bearings]))[1:]
+        # Above or below the target no bearing is better than another.
+        blind = np.abs(offset[:, :2]).max(axis=1) < self._config.blind
+        if blind.any():
+            bearings[blind] = state.yaw
         free = state.yaw + self._ahead * state.rate
-        c = 2.0 * (self._S_x.T @ (free - bearings))
-        limit = np.full(self._n, self._config.acceleration_max)
-        slack = max(self._config.rate_max, abs(state.rate))
+        c = self._S_x.T @ (2.0 * (free - _unwrapped(state.yaw, bearings)))
         try:
-            self._accelerations = self._solver.solve(
-                c,
-                -limit,
-                limit,
-                np.full(self._n, -slack - state.rate),
-                np.full(self._n, slack - state.rate),
-            )
+            self._accelerations = self._solve(c, state.rate)
         except SolverError:
             return
         self._start, self._state = now, state
@@ -92,3 +89,25 @@ class Heading:
         s = elapsed - index * self._dt
         acceleration = float(a[index])
         return Yaw(yaw + s * rate + 0.5 * s * s * acceleration, rate + s * acceleration, acceleration)
+
+    def _solve(self, c: Array, rate: float) -> Array:
+        """The free minimiser if it keeps all bounds, or else by PIQP."""
+        limit, bound = self._limit, self._config.rate_max
+        a: Array = self._minimiser @ c
+        largest = float(np.abs(a).max())
+        if largest <= limit[0] and abs(rate) + largest * float(self._ahead[-1]) <= bound:
+            return a
+        if abs(rate) + self._swing <= bound:
+            return self._bounded.solve(c, -limit, limit)
+        # A rate that is too high already must be allowed, or there is no solution.
+        rows = np.full(self._n, max(bound, abs(rate)))
+        return self._limited.solve(c, -limit, limit, -rows - rate, rows - rate)
+
+
+def _unwrapped(start: float, angles: Array) -> Array:
+    """The angles (n,) without jumps of 2π, beginning with the turn nearest to ``start``."""
+    steps = np.empty_like(angles)
+    steps[0] = angles[0] - start
+    np.subtract(angles[1:], angles[:-1], out=steps[1:])
+    steps -= (2.0 * np.pi) * np.round(steps * (0.5 / np.pi))
+    return start + np.cumsum(steps)

@@ -124,11 +124,16 @@ class HorizonTable:
         if not self._rows:
             return np.zeros((len(senders), self._steps, 3)), np.zeros(len(senders), dtype=np.bool_)
         rows = np.array([self._rows.get(sender, -1) for sender in senders])
-        epochs, dts = self._epochs[rows], self._dts[rows]
+        epochs = self._epochs[rows]
         known: NDArray[np.bool_] = (rows >= 0) & (epochs >= oldest)
         elapsed = (start - epochs)[:, None] + self._ahead
-        index = np.minimum(np.maximum(elapsed // dts[:, None], 0), self._lasts[rows][:, None])
-        s = ((elapsed - index * dts[:, None]) * 1e-6)[:, :, None]
+        index = elapsed // self._dts[rows][:, None]
+        np.maximum(index, 0, out=index)
+        np.minimum(index, self._lasts[rows][:, None], out=index)
+        s = ((elapsed - index * self._dts[rows][:, None]) * 1e-6)[:, :, None]
         chosen = self._knots[rows[:, None], index]
-        result: Array = chosen[:, :, 0:3] + s * (chosen[:, :, 3:6] + (0.5 * s) * chosen[:, :, 6:9])
+        result: Array = chosen[:, :, 6:9] * (0.5 * s)
+        result += chosen[:, :, 3:6]
+        result *= s
+        result += chosen[:, :, 0:3]
         return result, known

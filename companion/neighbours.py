@@ -17,6 +17,8 @@ from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
 
+_MOST = 255
+"""System ids that there are."""
 _STRAYED = 1.0
 """A neighbour further than this (m) from its own plan is not where it says: its track counts."""
 
@@ -34,6 +36,8 @@ class Neighbours:
         self._states: Array = np.zeros((0, 6))
         self._times = np.zeros(0, dtype=np.int64)
         self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
+        self._d_min: Array = np.full(_MOST, config.field.d_min)
+        self._d_safe: Array = np.full(_MOST, config.field.d_safe)
         self.refused_plans = 0
 
     def hear_position(self, now: int, message: GlobalPosition) -> None:
@@ -51,7 +55,7 @@ class Neighbours:
         track.measure(now, position, ned_to_enu(message.velocity_ned))
         row = self._ids.index(system)
         self._states[row] = track.last
-        self._times[row] = track.time
+        self._times[row] = now if track.time is None else track.time
 
     def hear_plan(self, now: int, message: Tunnel) -> None:
         """A neighbour's horizon in a TUNNEL. One in another fleet frame, or from the future, is refused."""
@@ -77,13 +81,13 @@ class Neighbours:
         steps = config.horizon.steps + 1
         age = now - self._times
         fresh = age <= config.guard.neighbour_stale_us
-        ids = self._ids
+        ids, states = self._ids, self._states
         if not fresh.all():
             ids = tuple(system for system, is_fresh in zip(ids, fresh, strict=True) if is_fresh)
+            states, age = states[fresh], age[fresh]
         if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
-        states = self._states[fresh]
-        carried = np.minimum(np.maximum(age[fresh], 0), config.neighbour.extrapolate_us) * 1e-6
+        carried = np.minimum(np.maximum(age, 0), config.neighbour.extrapolate_us) * 1e-6
         here = states[:, 0:3] + carried[:, None] * states[:, 3:6]
         positions, trusted = self._table.positions(ids, now, now - config.guard.plan_stale_us)
         off = positions[:, 0] - here
@@ -94,8 +98,8 @@ class Neighbours:
             if config.neighbour_prediction == "velocity":
                 ahead = 1e-6 * config.horizon.dt_us * np.arange(steps)
                 positions[lost] += ahead[:, None] * states[lost, None, 3:6]
-        field, count = config.field, len(ids)
-        return Obstacles(ids, positions, np.full(count, field.d_min), np.full(count, field.d_safe))
+        count = len(ids)
+        return Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count])
 
     def ages(self, now: int) -> dict[int, int]:
         """Age (µs) of every neighbour's track."""

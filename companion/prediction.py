@@ -30,7 +30,11 @@ def prediction(steps: int, dt: float) -> Prediction:
     """For ``steps`` inputs of ``dt`` seconds each."""
     k = np.arange(steps)
     lower = (k[:, None] >= k).astype(np.float64)
-    parts = Prediction(dt * lower, np.asarray(dt**2 * (k[:, None] - k + 0.5) * lower), dt * (k + 1.0))
+    parts = Prediction(
+        dt * lower,
+        np.asarray(dt**2 * (k[:, None] - k + 0.5) * lower),
+        np.asarray(dt * (k + 1.0), dtype=np.float64),
+    )
     for part in parts:
         part.flags.writeable = False
     return parts

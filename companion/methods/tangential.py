@@ -14,6 +14,8 @@ lasts, otherwise it chatters when the bearing crosses zero.
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
 from companion.config import TangentialConfig
@@ -26,6 +28,8 @@ _ABEAM = 0.5
 _QUICK = 10.0
 """How much faster the force grows up to u_max than beyond."""
 _NEAR = 1e-6
+_RIGHT: Array = np.array([1.0])
+_LEFT: Array = np.array([-1.0])
 
 
 class Tangential:
@@ -44,34 +48,33 @@ class Tangential:
             self._sense.clear()
             return influence
         away = scene.position - obstacles.positions[:, 0]
-        flat = np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2) + _NEAR
-        weight = self._weights(scene, away)
+        square = away * away
+        flat = np.sqrt(square[:, 0] + square[:, 1]) + _NEAR
+        weight = self._weights(scene, away, np.sqrt(square.sum(axis=1)) + _NEAR)
         self._release(obstacles, weight)
-        sense = self._senses(obstacles, weight, away, scene.to_go)
         # α̂ = ± ẑ × α, horizontal: passing never costs height.
-        share = weight * sense / flat
+        share = weight * self._senses(obstacles, weight, away, scene.to_go) / flat
         total = np.array([-(share @ away[:, 1]), share @ away[:, 0], 0.0])
-        norm = float(np.sqrt(total @ total))
+        norm = sqrt(total @ total)
         if norm < _NEAR:
             return influence
         whole = min(norm, 1.0)
         config, u_max = self._config, self._u_max
         strength = min(
-            config.k_tang * float(np.sqrt(scene.gradient @ scene.gradient)),
+            config.k_tang * sqrt(scene.gradient @ scene.gradient),
             u_max * min(1.0, _QUICK * whole) + (config.force_max - u_max) * whole,
         )
         return Influence(influence.force + total * (strength / norm), config.omega_scale)
 
-    def _weights(self, scene: Scene, away: Array) -> Array:
-        """How much each obstacle's band acts, (M,) in 0…1."""
+    def _weights(self, scene: Scene, away: Array, distance: Array) -> Array:
+        """How much each obstacle's band acts, (M,) in 0…1; ``away`` (M, 3) and its norms ``distance``."""
         config, obstacles = self._config, scene.obstacles
-        distance = np.sqrt(np.einsum("ji,ji->j", away, away)) + _NEAR
         moving = (obstacles.positions[:, 1] - obstacles.positions[:, 0]) / self._dt
-        closing = np.maximum(0.0, -np.einsum("ji,ji->j", away, scene.velocity - moving) / distance)
+        closing = np.maximum(np.einsum("ji,ji->j", away, moving - scene.velocity) / distance, 0.0)
         edge = obstacles.d_safe + config.d_band + config.reach_s * closing
         depth = _share((edge - distance) / (edge - config.d_full))
         to_go = scene.to_go
-        length = float(np.sqrt(to_go @ to_go)) + _NEAR
+        length = sqrt(to_go @ to_go) + _NEAR
         along = -(away @ to_go) / length
         ahead = _share(along / (_ABEAM * distance))
         before = _share(1.0 + (length - along) / obstacles.d_safe)
@@ -91,7 +94,7 @@ class Tangential:
         clockwise."""
         config = self._config
         if config.turning_sense != "own":
-            return np.full(len(weight), 1.0 if config.turning_sense == "right" else -1.0)
+            return _RIGHT if config.turning_sense == "right" else _LEFT
         senses = np.zeros(len(weight))
         for j in np.flatnonzero(weight > 0.0):
             name = obstacles.ids[j]

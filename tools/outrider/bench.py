@@ -1,5 +1,5 @@
-"""``outrider bench``: what this machine makes of each part. CPU time, medians over rounds; what is compared is
-interleaved, so that a machine that slows down slows all of it."""
+"""``outrider bench``: what this machine makes of each part. CPU time, medians over rounds; what is compared
+is interleaved, so that a machine that slows down slows all of it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ class Scene(NamedTuple):
 
 
 def measure(progress: Progress, *, quick: bool) -> dict[str, object]:
-    """All figures that exist; keys as in the design. ``quick`` leaves out the flights and takes fewer rounds."""
+    """All figures that exist; keys as in the design. ``quick`` leaves out the flights and takes fewer
+    rounds."""
     rounds = 3 if quick else 9
     progress("plan step", 0.0)
     steps, piqp = plan_step(rounds)
@@ -74,10 +75,12 @@ def measure(progress: Progress, *, quick: bool) -> dict[str, object]:
 
 
 def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
-    """CPU ms of (World in → Plan and set-point out), and of its three QPs solved once more, over crowded scenes."""
+    """CPU ms of (World in → Plan and set-point out), and of its three QPs solved once more, over crowded
+    scenes."""
     config = load(find("scenarios", "antipodal-8"), Scenario).companion
     scenes = [_scene(config, seed) for seed in range(60)]
-    planner, heading = Planner(config), Heading(config.heading, config.horizon)
+    planner = Planner(config)
+    headings = [Heading(config.heading, config.horizon) for _ in scenes]
     fleet = scenes[0].world.fleet
     local = fleet.local(fleet.latitude, fleet.longitude, fleet.altitude)
     steps, solving = [], []
@@ -85,7 +88,7 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
     ahead = 1e-6 * horizon.dt_us * np.arange(1, horizon.steps + 2)
     now = 1_000_000
     for turn in range(rounds + 1):
-        for world, position, velocity, aim in scenes:
+        for (world, position, velocity, aim), heading in zip(scenes, headings, strict=True):
             prediction = position + np.vstack([np.zeros(1), ahead[:-1, None]]) * velocity
             started = time.thread_time_ns()
             obstacles = world.obstacles(now, world.at(now))
@@ -167,7 +170,7 @@ def real_time_factor(replan_hz: float | None) -> float:
         flight.run()
         spent = time.process_time() - started
     times = flight.truth.samples().time
-    return round((times[-1] - times[0]) * 1e-6 / spent, 2)
+    return round(float(times[-1] - times[0]) * 1e-6 / spent, 2)
 
 
 def _scene(config: CompanionConfig, seed: int) -> Scene:
