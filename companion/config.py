@@ -72,6 +72,10 @@ class FieldConfig(Settings):
         description="m/s², relative deceleration to count on when closing; null is the paper's bare field",
     )
 
+    smoothing_us: int = Field(
+        50_000, ge=0, le=2_000_000, description="time constant of the field's low-pass, µs; 0 for none"
+    )
+
     @model_validator(mode="after")
     def _order(self) -> FieldConfig:
         if self.d_safe <= self.d_min:
@@ -183,4 +187,11 @@ class CompanionConfig(Settings):
             raise ValueError("tangential.force_max must exceed u_max, or the input cancels it")
         if (self.target_d_min is None) != (self.target_d_safe is None):
             raise ValueError("target_d_min and target_d_safe come together")
+        nearest = self.field.d_safe
+        if self.target_d_min is not None and self.target_d_safe is not None:
+            if self.target_d_safe <= self.target_d_min:
+                raise ValueError("target_d_safe must be larger than target_d_min")
+            nearest = min(nearest, self.target_d_safe)
+        if self.tangential.d_full >= nearest + self.tangential.d_band:
+            raise ValueError("tangential.d_full must lie inside the band, below d_safe + d_band")
         return self

@@ -156,15 +156,16 @@ class Dqmpc:
         solvers = self._solvers(omega_scale)
         c, x_l, x_u, h_l, h_u = problem
         a: Array = solvers.minimiser @ c.T
-        outside = ((a < x_l.T) | (a > x_u.T)).any(axis=0)
-        for i in np.flatnonzero(outside):
+        # Asked so that a NaN anywhere fails both questions, and reaches a solver that refuses it.
+        inside = ((a >= x_l.T) & (a <= x_u.T)).all(axis=0)
+        for i in np.flatnonzero(~inside):
             a[:, i] = solvers.bounded.solve(c[i], x_l[i], x_u[i])
         rows = self.G @ a
-        broken = ((rows < h_l.T - _TOLERANCE) | (rows > h_u.T + _TOLERANCE)).any(axis=0)
+        kept = ((rows >= h_l.T - _TOLERANCE) & (rows <= h_u.T + _TOLERANCE)).all(axis=0)
         relaxed = 0
-        if broken.any():
+        if not kept.all():
             _, _, _, h_l, h_u = self.reachable(problem)
-        for i in np.flatnonzero(broken):
+        for i in np.flatnonzero(~kept):
             try:
                 a[:, i] = solvers.limited.solve(c[i], x_l[i], x_u[i], h_l[i], h_u[i])
             except SolverError:

@@ -132,7 +132,8 @@ class HorizonTable:
         np.minimum(index, self._lasts[rows][:, None], out=index)
         s = ((elapsed - index * self._dts[rows][:, None]) * 1e-6)[:, :, None]
         chosen = self._knots[rows[:, None], index]
-        result: Array = chosen[:, :, 6:9] * (0.5 * s)
+        # Before its first knot a horizon has no acceleration.
+        result: Array = chosen[:, :, 6:9] * (0.5 * np.maximum(s, 0.0))
         result += chosen[:, :, 3:6]
         result *= s
         result += chosen[:, :, 0:3]

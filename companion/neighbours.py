@@ -45,14 +45,15 @@ class Neighbours:
         system = message.source.system
         if system == self._system:
             return
+        position = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
+        track = self._tracks.get(system) or Track(self._config.neighbour)
+        if not track.measure(now, position, ned_to_enu(message.velocity_ned)):
+            return
         if system not in self._tracks:
-            self._tracks[system] = Track(self._config.neighbour)
+            self._tracks[system] = track
             self._ids = tuple(self._tracks)
             self._states = np.vstack([self._states, np.zeros(6)])
             self._times = np.append(self._times, now)
-        position = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
-        track = self._tracks[system]
-        track.measure(now, position, ned_to_enu(message.velocity_ned))
         row = self._ids.index(system)
         self._states[row] = track.last
         self._times[row] = now if track.time is None else track.time

@@ -29,6 +29,10 @@ COMPONENT = 195
 """MAV_COMP_ID_PATHPLANNER."""
 DO_REPOSITION = 192
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
+_GLOBAL = (0, 5)
+"""MAV_FRAME_GLOBAL and its INT twin."""
+_HIGHEST = 1e5
+"""m; a NaN is not below it either."""
 _WANTED = {
     "autopilot": {0, 1, 30, 32, 49, 77, 245, 253},
     "swarm": {33, 385},
@@ -107,14 +111,10 @@ class Companion:
         commands = self.pilot.step(now, view)
         self._fly(now, view)
         setpoints = self._setpoints(now, view)
-        shared = self._sharing.due(now, view, self.guard.horizon if self._airborne else None)
+        shared = self._sharing.due(now, view, self.guard.horizon)
         return self._encode(
             autopilot=[*commands, *setpoints, *shared.autopilot], swarm=shared.swarm, ground=answers
         )
-
-    @property
-    def _airborne(self) -> bool:
-        return self.pilot.phase in (Phase.ESCORT, Phase.SETTLE) or self.pilot.streaming
 
     def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
         answers: list[Message] = []
@@ -135,8 +135,7 @@ class Companion:
         if (message.target_system, message.target_component) != self._source:
             return []
         if isinstance(message, CommandInt) and message.command == DO_REPOSITION:
-            self._goal = self._fleet.to_enu(message.x * 1e-7, message.y * 1e-7, message.z)
-            taken = True
+            taken = self._aim_at(message)
         elif isinstance(message, CommandLong) and message.command == NAV_TAKEOFF:
             taken = self.pilot.go(message.params[6])
         elif isinstance(message, CommandLong) and message.command == NAV_LAND:
@@ -145,12 +144,22 @@ class Companion:
             return [self._ack(message, UNSUPPORTED)]
         return [self._ack(message, ACCEPTED if taken else DENIED)]
 
+    def _aim_at(self, order: CommandInt) -> bool:
+        """DO_REPOSITION to a place on the globe, its altitude above mean sea level; others are refused."""
+        latitude, longitude = order.x * 1e-7, order.y * 1e-7
+        if order.frame not in _GLOBAL or abs(latitude) > 90.0 or abs(longitude) > 180.0:
+            return False
+        if not abs(order.z) < _HIGHEST:
+            return False
+        self._goal = self._fleet.to_enu(latitude, longitude, order.z)
+        return True
+
     def _ack(self, message: CommandInt | CommandLong, result: int) -> CommandAck:
         return CommandAck(self._source, message.command, result, 0, 0, *message.source)
 
     def _fly(self, now: int, view: View) -> None:
         """Plan when due; start from the measured state each time the vehicle becomes ours."""
-        if not self._airborne or view.own is None or view.local is None:
+        if not self.pilot.streaming or view.own is None or view.local is None:
             self.guard.horizon = None
             return
         measured = Motion(view.own.position, view.own.velocity, _ZERO)

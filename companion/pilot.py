@@ -29,8 +29,11 @@ ACCEPTED, IN_PROGRESS = 0, 5
 ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
 _RETRY = 500_000
 _NAN = float("nan")
-_NEEDED = {32: 20_000, 30: 20_000, 1: 1_000_000, 245: 500_000}
-"""Message id → interval (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
+_NEEDED = tuple(
+    (SET_MESSAGE_INTERVAL, (identifier, interval, 0.0, 0.0, 0.0, 0.0, 0.0))
+    for identifier, interval in ((32.0, 20_000.0), (30.0, 20_000.0), (1.0, 1_000_000.0), (245.0, 500_000.0))
+)
+"""Message id and interval (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
 EXTENDED_SYS_STATE."""
 
 _Call = tuple[int, tuple[float, ...]]
@@ -68,6 +71,7 @@ class Pilot:
         self._step = 0
         self._acknowledged: set[_Call] = set()
         self._sent: dict[_Call, int] = {}
+        self._asked: dict[int, _Call] = {}
 
     @property
     def guided(self) -> bool:
@@ -100,12 +104,13 @@ class Pilot:
         elif isinstance(message, SysStatus):
             self._status = message
         elif isinstance(message, CommandAck):
-            for call in self._sent:
-                if call[0] == message.command:
-                    if message.result in (ACCEPTED, IN_PROGRESS):
-                        self._acknowledged.add(call)
-                    else:
-                        self.refusals.append(f"command {message.command}: result {message.result}")
+            call = self._asked.pop(message.command, None)
+            if call is None:
+                return
+            if message.result in (ACCEPTED, IN_PROGRESS):
+                self._acknowledged.add(call)
+            else:
+                self.refusals.append(f"command {message.command}: result {message.result}")
 
     def go(self, height: float) -> bool:
         """The operator's go: climb to ``height`` metres above the start. Whether it is taken."""
@@ -147,10 +152,8 @@ class Pilot:
         calls: list[Message] = []
         self.waiting_for = self._missing(view)
         if self._heartbeat is not None:
-            for identifier, interval in _NEEDED.items():
-                calls += self._call(
-                    now, SET_MESSAGE_INTERVAL, (identifier, interval, 0.0, 0.0, 0.0, 0.0, 0.0)
-                )
+            for command, params in sorted(_NEEDED, key=lambda call: self._sent.get(call, 0)):
+                calls += self._call(now, command, params)
             if view.local is None:
                 calls += self._call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
         if not self.waiting_for and view.own is not None and view.local is not None:
@@ -179,9 +182,6 @@ class Pilot:
         profile, beat, height = self.profile, self._heartbeat, self._height
         if profile is None or beat is None or height is None or view.own is None:
             return []
-        if self._step >= len(profile.steps):
-            self.phase = Phase.ESCORT
-            return []
         step = profile.steps[self._step]
         if step is Step.MODE:
             done = is_guided(profile, beat)
@@ -198,19 +198,26 @@ class Pilot:
         if done:
             self._step += 1
             self._forget()
+            if self._step == len(profile.steps):
+                self.phase = Phase.ESCORT
             return []
         self.waiting_for = step.value
         return call
 
+    def _recent(self, now: int, call: _Call | None) -> bool:
+        return call is not None and now - self._sent.get(call, -_RETRY) < _RETRY
+
     def _forget(self) -> None:
         self._sent.clear()
+        self._asked.clear()
         self._acknowledged.clear()
 
     def _call(self, now: int, command: int, params: tuple[float, ...]) -> list[Message]:
-        """The command, unless it was acknowledged or sent less than half a second ago."""
+        """The command, unless it was acknowledged, sent less than half a second ago, or must wait for its
+        turn: COMMAND_ACK names the command alone, so that one of a kind may be open at a time."""
         key = (command, tuple(p for p in params if p == p))
-        if key in self._acknowledged or now - self._sent.get(key, -_RETRY) < _RETRY:
+        if key in self._acknowledged or self._recent(now, key) or self._recent(now, self._asked.get(command)):
             return []
-        self._sent[key] = now
+        self._sent[key], self._asked[command] = now, key
         p1, p2, p3, p4, p5, p6, p7 = params
         return [CommandLong(self._own, self._own.system, 1, command, 0, (p1, p2, p3, p4, p5, p6, p7))]

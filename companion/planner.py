@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import expm1
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +43,8 @@ class Planner:
         self.dqmpc = Dqmpc(config.horizon, config.cost, config.limits)
         self._methods = build(config)
         self._gradient: Array = np.zeros(3)
+        self._force: Array = np.zeros((config.horizon.steps + 1, 3))
+        self._smooth_at: int | None = None
 
     def plan(
         self, now: int, position: Array, velocity: Array, prediction: Array, aim: Aim, obstacles: Obstacles
@@ -62,7 +65,7 @@ class Planner:
             obstacles,
             self._gradient,
         )
-        influence = self._influence(scene)
+        influence = self._influence(now, scene)
         problem = self.dqmpc.problem(
             position, velocity, influence.force, aim.destination, aim.velocity, influence.omega_scale
         )
@@ -76,7 +79,7 @@ class Planner:
             horizon, aim, influence.force, self._gradient, influence.omega_scale, solution.relaxed, problem
         )
 
-    def _influence(self, scene: Scene) -> Influence:
+    def _influence(self, now: int, scene: Scene) -> Influence:
         config = self.config
         a_total = config.limits.a_total
         field = repulsion(
@@ -88,7 +91,16 @@ class Planner:
         force = influence.force
         if config.planar:
             force = force * _FLAT
-        return influence._replace(force=limit(force, a_total))
+        return influence._replace(force=self._smoothed(now, limit(force, a_total)))
+
+    def _smoothed(self, now: int, force: Array) -> Array:
+        """The field without its steps: neighbours' plans arrive at 10 Hz and would jolt the attitude."""
+        last, self._smooth_at = self._smooth_at, now
+        if last is not None and self.config.field.smoothing_us > 0:
+            share = -expm1(-(now - last) / self.config.field.smoothing_us)
+            force = self._force + share * (force - self._force)
+        self._force = force
+        return force
 
 
 _FLAT = np.array([1.0, 1.0, 0.0])

@@ -19,6 +19,8 @@ from companion.horizon import Array
 
 _WITNESSES = 2
 """Consecutive measurements that agree with each other before a jump is believed."""
+_FAR, _FAST = 1e5, 100.0
+"""m and m/s; beyond these a state is garbage, soundly framed though it may be."""
 
 
 class State(NamedTuple):
@@ -50,10 +52,13 @@ class Track:
     def measure(self, received: int, position: Array, velocity: Array) -> bool:
         """Take a measurement that arrived at ``received`` (µs); whether it was accepted.
 
-        One that lies more than ``jump`` metres from the prediction needs a second witness near it: a teleport
-        of one message is noise, a persistent one is real and starts the track anew. Late ones (older than the
-        state) are rejected.
+        One that lies more than ``jump`` metres from the prediction, or would in a second, needs a second
+        witness near it: a teleport of one message is noise, a persistent one is real and starts the track
+        anew. Late ones (older than the state) and absurd ones are rejected.
         """
+        if not (position @ position <= _FAR**2 and velocity @ velocity <= _FAST**2):
+            self.rejected += 1
+            return False
         time = received - self._config.delay_us
         z = np.concatenate([position, velocity])
         if self._time is None:
@@ -62,8 +67,8 @@ class Track:
         if time < self._time:
             self.rejected += 1
             return False
-        predicted, _ = self._extrapolate(time)
-        if float(np.linalg.norm(position - predicted)) > self._config.jump:
+        off, turn = (z - np.concatenate(self._extrapolate(time))).reshape(2, 3)
+        if max(float(off @ off), float(turn @ turn)) > self._config.jump**2:
             return self._witness(time, z)
         self._doubt.clear()
         if time > self._time:

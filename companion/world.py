@@ -98,6 +98,8 @@ class World:
             if origin != self._origin:
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
+                # Where the vehicle was in the old frame must not be flown to in the new one.
+                self._own = Track(self.config.own)
 
     def _hear_target(self, now: int, message: GlobalPosition) -> None:
         if message.source.system != self._target_system:

@@ -72,24 +72,28 @@ class Sighting(NamedTuple):
 
 
 def fly(
-    config: CompanionConfig, starts: Array, goals: Array, seconds: float, period: int = 100_000
+    config: CompanionConfig,
+    starts: Array,
+    goals: Array,
+    seconds: float,
+    period: int = 100_000,
+    still: int = 0,
 ) -> Iterator[Sighting]:
     """Point masses that fly exactly what they plan and know each other's last horizons, from ``starts`` to
-    ``goals`` (K, 3)."""
+    ``goals`` (K, 3); the last ``still`` of them never move."""
     steps, dt = config.horizon.steps + 1, config.horizon.dt_us
     count = len(starts)
     planners = [Planner(config) for _ in range(count)]
-    still = np.zeros((steps + 1, 9))
     horizons = []
     for start in starts:
-        knots = still.copy()
+        knots = np.zeros((steps + 1, 9))
         knots[:, 0:3] = start
         horizons.append(Horizon(0, dt, knots))
     field = config.field
     for now in range(0, round(seconds * 1e6), period):
         predictions = np.array([h.positions(now, steps, dt) for h in horizons])
         fresh = []
-        for k in range(count):
+        for k in range(count - still):
             others = [j for j in range(count) if j != k]
             seen = Obstacles(
                 tuple(others),
@@ -102,7 +106,7 @@ def fly(
             plan = planners[k].plan(now, motion.position, motion.velocity, predictions[k], aim, seen)
             fresh.append(plan.horizon)
             yield Sighting(now, k, planners[k], motion.position, motion.velocity, plan)
-        horizons = fresh
+        horizons[: len(fresh)] = fresh
 
 
 def ring(count: int, radius: float, height: float, seed: int = 1) -> Array:

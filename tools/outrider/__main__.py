@@ -88,8 +88,8 @@ def main() -> None:
         sys.exit(BAD_INPUT)
     except _UsageError as error:
         said = error.format_message()
-        if said and error.ctx is not None:
-            command = error.ctx.command_path
+        if said:
+            command = "outrider" if error.ctx is None else error.ctx.command_path
             line = f"{command}: {said.rstrip('.')}; see {command} --help"
             sys.stderr.write(f"{InputError(line)}\n")
         sys.exit(BAD_INPUT)

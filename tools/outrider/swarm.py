@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
 import yaml
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from mavlink_bridge.frames import FleetFrame
 from outrider import figures
@@ -73,8 +73,8 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
     if options.sensors is not None:
         changes["sensors"] = options.sensors
     if options.replan_hz is not None:
-        if not 0.0 < options.replan_hz < inf:
-            raise InputError(f"--replan-hz {options.replan_hz}: allowed are numbers above 0")
+        if not 0.1 <= options.replan_hz <= 1000.0:
+            raise InputError(f"--replan-hz {options.replan_hz}: allowed are 0.1 to 1000")
         companion["rates"] = {
             **scenario.companion.rates.model_dump(),
             "replan_us": round(1e6 / options.replan_hz),
@@ -94,9 +94,16 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
     try:
         return Scenario.model_validate({**scenario.model_dump(), **changes})
     except ValidationError as error:
-        raise InputError(
-            *(f"{'.'.join(map(str, fault['loc'])) or 'options'}: {fault['msg']}" for fault in error.errors())
-        ) from None
+        # An option may stand for several links: its fault is one.
+        raise InputError(*dict.fromkeys(map(_option_fault, error.errors()))) from None
+
+
+def _option_fault(error: ErrorDetails) -> str:
+    if not error["loc"]:
+        return f"options: {error['msg']}"
+    name = str(error["loc"][-1])
+    option = "--replan-hz" if name == "replan_us" else f"--{name.replace('_', '-')}"
+    return f"{option} ({name} = {error['input']!r}): {error['msg']}"
 
 
 def fly(prepared: Prepared, seed: int, directory: Path, progress: Progress) -> dict[str, Value]:

@@ -1,0 +1,52 @@
+"""Settings that contradict each other are refused at load, with the reason; what is loaded stays as it is."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from companion.config import CompanionConfig
+
+WRONG = {
+    "an unknown key": ({"feild": {"gain": 1.0}}, "feild"),
+    "an unknown key below": ({"field": {"d_max": 1.0}}, "d_max"),
+    "a negative gain": ({"field": {"gain": -1.0}}, "gain"),
+    "NaN": ({"field": {"gain": float("nan")}}, "gain"),
+    "infinity": ({"surface": {"radius": float("inf")}}, "radius"),
+    "d_safe below d_min": ({"field": {"d_min": 2.0, "d_safe": 1.5}}, "d_safe"),
+    "a box without inside": ({"limits": {"box_min": (0.0, 0.0, 5.0), "box_max": (1.0, 1.0, 5.0)}}, "box_min"),
+    "less than u_max": ({"limits": {"u_max": (3.0, 2.0, 2.0), "a_total": 2.5}}, "a_total"),
+    "a band that a step skips": ({"tangential": {"d_band": 0.4}}, "d_band"),
+    "a tangential force that is cancelled": ({"tangential": {"force_max": 2.0}}, "force_max"),
+    "full outside the band": ({"tangential": {"d_full": 4.0}}, "d_full"),
+    "half a target": ({"target_d_min": 1.0}, "target_d_safe"),
+    "a target's d_safe below its d_min": ({"target_d_min": 3.0, "target_d_safe": 1.0}, "target_d_safe"),
+    "full outside the target's band": (
+        {"target_d_min": 0.2, "target_d_safe": 0.3, "tangential": {"d_full": 1.5}},
+        "d_full",
+    ),
+    "a period off the grid": ({"rates": {"replan_us": 10_001}}, "replan_us"),
+    "a plan too long for the wire": ({"horizon": {"steps": 16}}, "steps"),
+    "steps too long for the wire": ({"horizon": {"dt_us": 262_144}}, "dt_us"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_contradiction_is_refused_and_named(name):
+    settings, word = WRONG[name]
+    with pytest.raises(ValidationError, match=word):
+        CompanionConfig.model_validate(settings)
+
+
+def test_settings_are_frozen():
+    config = CompanionConfig()
+    with pytest.raises(ValidationError):
+        config.planar = True
+    with pytest.raises(ValidationError):
+        config.field.gain = 1.0
+
+
+def test_what_is_written_is_what_is_read():
+    config = CompanionConfig.model_validate({"planar": True, "field": {"gain": 20.0}})
+    assert CompanionConfig.model_validate(config.model_dump()) == config
+    assert CompanionConfig.model_validate_json(config.model_dump_json()) == config

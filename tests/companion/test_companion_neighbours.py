@@ -1,0 +1,238 @@
+"""Neighbours: whom to believe, for how long, and where their plans say that they will be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from companion_rig import LAWS, ZERO, numbers, vectors
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.config import CompanionConfig
+from companion.horizon import roll_out
+from companion.neighbours import Neighbours
+from mavlink_bridge.frames import FleetFrame, enu_to_ned
+from mavlink_bridge.messages import GlobalPosition, Source, Tunnel
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
+
+FLEET = FleetFrame(47.397742, 8.545594, 488.0)
+ELSEWHERE = FleetFrame(47.5, 8.545594, 488.0)
+CONFIG = CompanionConfig()
+OWN, OTHER = 11, 12
+NOW = 1_767_225_600_000_000
+DELAY = CONFIG.neighbour.delay_us
+DT, N = CONFIG.horizon.dt_us, CONFIG.horizon.steps + 1
+AHEAD = 1e-6 * DT * np.arange(N)[:, None]
+GRAIN = 0.02
+"""m; half a step of degE7, plus what the filter makes of it."""
+
+
+def position(x, v=ZERO, system=OTHER):
+    latitude, longitude, altitude = FLEET.to_geodetic(x)
+    ned = tuple(float(part) for part in enu_to_ned(v))
+    return GlobalPosition(Source(system, 195), 0, latitude, longitude, altitude, 0.0, ned, None)
+
+
+def plan(x, v=ZERO, a=None, epoch=NOW, dt=DT, system=OTHER, fleet=FLEET):
+    accelerations = np.zeros((16, 3)) if a is None else a
+    payload = pack(quantise(epoch, dt, x, v, accelerations, fleet.fingerprint))
+    return Tunnel(Source(system, 195), 0, 0, PAYLOAD_TYPE, payload)
+
+
+def hearing(*messages, now=NOW, config=CONFIG):
+    """Neighbours that have heard positions (true at ``now``) and plans."""
+    neighbours = Neighbours(config, OWN, FLEET)
+    for message in messages:
+        if isinstance(message, Tunnel):
+            neighbours.hear_plan(now, message)
+        else:
+            neighbours.hear_position(now + config.neighbour.delay_us, message)
+    return neighbours
+
+
+X = np.array([10.0, -4.0, 6.0])
+V = np.array([2.0, 1.0, -0.5])
+
+
+def test_nobody_heard_is_nobody_there():
+    obstacles = hearing().obstacles(NOW)
+    assert obstacles.ids == ()
+    assert obstacles.positions.shape == (0, N, 3)
+
+
+def test_a_neighbour_round_the_earth_is_none():
+    absurd = position(X)._replace(latitude=-47.0, longitude=-171.0)
+    neighbours = hearing(absurd, absurd, plan(X, V))
+    assert neighbours.obstacles(NOW).ids == ()
+    neighbours.hear_position(NOW + DELAY, position(X, V))
+    assert neighbours.obstacles(NOW).ids == (OTHER,)
+    neighbours.hear_position(NOW + DELAY, absurd)
+    np.testing.assert_allclose(neighbours.obstacles(NOW).positions[0, 0], X, atol=GRAIN)
+
+
+def test_the_own_echo_is_ignored():
+    neighbours = hearing(position(X, system=OWN), plan(X, system=OWN))
+    assert neighbours.obstacles(NOW).ids == ()
+    assert neighbours.ages(NOW) == {}
+    assert neighbours.refused_plans == 0
+
+
+@LAWS
+@given(x=vectors(50.0), v=vectors(5.0))
+def test_without_a_plan_a_neighbour_is_held_where_it_is_now(x, v):
+    obstacles = hearing(position(x, v)).obstacles(NOW)
+    assert obstacles.ids == (OTHER,)
+    np.testing.assert_array_equal(obstacles.positions[0], np.tile(obstacles.positions[0, 0], (N, 1)))
+    np.testing.assert_allclose(obstacles.positions[0, 0], x, atol=GRAIN)
+    assert (obstacles.d_min, obstacles.d_safe) == (CONFIG.field.d_min, CONFIG.field.d_safe)
+
+
+@LAWS
+@given(x=vectors(50.0), v=vectors(5.0), later=st.integers(0, 900_000))
+def test_without_a_plan_it_may_be_carried_on_at_constant_velocity(x, v, later):
+    config = CompanionConfig(neighbour_prediction="velocity")
+    obstacles = hearing(position(x, v), config=config).obstacles(NOW + later)
+    np.testing.assert_allclose(
+        obstacles.positions[0], x + (1e-6 * later + AHEAD) * v, atol=GRAIN + 0.01 * (1 + 1e-6 * later + 1.5)
+    )
+
+
+@LAWS
+@given(
+    x=vectors(50.0),
+    v=vectors(4.0),
+    a=st.lists(vectors(2.0), min_size=16, max_size=16).map(np.array),
+    delay=st.integers(0, CONFIG.guard.plan_stale_us),
+)
+def test_a_plan_is_aligned_by_time_however_late_it_comes(x, v, a, delay):
+    """Made ``delay`` ago, at n = 0 it says where the neighbour is now."""
+    horizon = roll_out(NOW, DT, x, v, a)
+    now = NOW + delay
+    motion = horizon.at(now)
+    neighbours = Neighbours(CONFIG, OWN, FLEET)
+    neighbours.hear_plan(now, plan(x, v, a))
+    neighbours.hear_position(now + DELAY, position(motion.position, motion.velocity))
+    obstacles = neighbours.obstacles(now)
+    np.testing.assert_allclose(obstacles.positions[0], horizon.positions(now, N, DT), atol=0.01)
+
+
+@pytest.mark.parametrize("dt", [20_000, 80_000, 262_140])
+def test_a_plan_of_other_steps_is_sampled_at_ours(dt):
+    horizon = roll_out(NOW, dt, X, V, np.full((16, 3), 0.3))
+    neighbours = hearing(position(X, V), plan(X, V, np.full((16, 3), 0.3), dt=dt))
+    np.testing.assert_allclose(
+        neighbours.obstacles(NOW).positions[0], horizon.positions(NOW, N, DT), atol=0.01
+    )
+
+
+def assert_held(neighbours, now=NOW):
+    """The position counts, not the plan."""
+    positions = neighbours.obstacles(now).positions[0]
+    np.testing.assert_array_equal(positions, np.tile(positions[0], (N, 1)))
+
+
+def test_an_old_plan_falls_back_to_the_position():
+    neighbours = hearing(plan(X, V))
+    stale = CONFIG.guard.plan_stale_us
+    for late, held in ((stale, False), (stale + 1, True)):
+        now = NOW + late
+        neighbours.hear_position(now + DELAY, position(X + V * late * 1e-6, V))
+        positions = neighbours.obstacles(now).positions[0]
+        assert (np.ptp(positions, axis=0) < 1e-12).all() == held
+
+
+def test_a_neighbour_that_is_not_where_it_planned_to_be_is_where_it_is():
+    assert_held(hearing(position(X + np.array([1.5, 0.0, 0.0]), V), plan(X, V)))
+
+
+def test_a_newer_plan_counts_whatever_arrives_last():
+    new = plan(X, V, np.full((16, 3), 1.0))
+    old = plan(X - V * 0.1, V, epoch=NOW - 100_000)
+    expected = hearing(position(X, V), new).obstacles(NOW).positions
+    for order in ((old, new), (new, old)):
+        np.testing.assert_array_equal(hearing(position(X, V), *order).obstacles(NOW).positions, expected)
+
+
+@pytest.mark.parametrize(
+    "refused",
+    [
+        plan(X, V, fleet=ELSEWHERE),
+        plan(X, V, epoch=NOW + DT + 4),
+        plan(X, V, epoch=NOW + 3_600_000_000),
+        plan(X, V, a=np.zeros((0, 3))),
+        plan(X, V)._replace(payload=b""),
+        plan(X, V)._replace(payload=plan(X, V).payload[:-1]),
+        plan(X, V)._replace(payload=b"\x02" + plan(X, V).payload[1:]),
+        plan(X, V)._replace(payload=bytes(128)),
+    ],
+    ids=["another frame", "from the future", "from far ahead", "empty", "nothing", "cut", "kind", "zeros"],
+)
+def test_a_plan_that_makes_no_sense_is_refused_and_counted(refused):
+    neighbours = hearing(position(X, V), refused)
+    assert neighbours.refused_plans == 1
+    assert_held(neighbours)
+
+
+@LAWS
+@given(payload=st.binary(max_size=128))
+def test_no_payload_whatever_raises_or_makes_anything_but_finite_obstacles(payload):
+    neighbours = hearing(position(X, V), plan(X, V)._replace(payload=payload))
+    obstacles = neighbours.obstacles(NOW)
+    assert np.isfinite(obstacles.positions).all()
+    assert np.linalg.norm(obstacles.positions[0, 0] - X) < 1.1
+
+
+@LAWS
+@given(position_bytes=st.binary(min_size=21, max_size=21), knots=st.binary(min_size=96, max_size=96))
+def test_a_well_formed_plan_of_nonsense_is_not_believed(position_bytes, knots):
+    """Header as it must be, contents random: either it starts where the neighbour is, or it is not used."""
+    header = plan(X, V).payload[:11]
+    neighbours = hearing(position(X, V), plan(X, V)._replace(payload=header + position_bytes + knots))
+    obstacles = neighbours.obstacles(NOW)
+    assert np.isfinite(obstacles.positions).all()
+    assert np.linalg.norm(obstacles.positions[0, 0] - X) < 1.1
+
+
+def test_another_payload_type_is_somebody_elses():
+    neighbours = hearing(position(X, V), plan(X, V)._replace(payload_type=PAYLOAD_TYPE + 1, payload=b"x"))
+    assert neighbours.refused_plans == 0
+    assert_held(neighbours)
+
+
+def test_a_plan_alone_is_no_neighbour():
+    """Only who says where it is can be avoided; the plan counts once it does."""
+    assert hearing(plan(X, V)).obstacles(NOW).ids == ()
+
+
+def test_who_is_silent_for_too_long_is_left_out_and_comes_back():
+    neighbours = hearing(position(X), position(-X, system=13))
+    stale = CONFIG.guard.neighbour_stale_us
+    neighbours.hear_position(NOW + stale, position(-X, system=13))
+    assert neighbours.obstacles(NOW + stale).ids == (OTHER, 13)
+    assert neighbours.obstacles(NOW + stale + 1).ids == (13,)
+    assert neighbours.ages(NOW + stale)[OTHER] == stale
+    neighbours.hear_position(NOW + stale + DELAY + 1, position(X))
+    assert neighbours.obstacles(NOW + stale + 1).ids == (OTHER, 13)
+
+
+@LAWS
+@given(shift=st.integers(0, 10**12), late=st.integers(0, 600_000), speed=numbers(-3.0, 3.0))
+def test_only_differences_of_time_matter(shift, late, speed):
+    v = speed * V
+    results = []
+    for epoch in (NOW, NOW + shift):
+        neighbours = Neighbours(CONFIG, OWN, FLEET)
+        neighbours.hear_plan(epoch, plan(X, v, epoch=epoch))
+        neighbours.hear_position(epoch + DELAY, position(X, v))
+        results.append(neighbours.obstacles(epoch + late).positions)
+    np.testing.assert_array_equal(results[0], results[1])
+
+
+def test_each_neighbour_keeps_its_own_plan():
+    messages = [
+        m for k in range(5) for m in (position(k * X, k * V, 20 + k), plan(k * X, k * V, system=20 + k))
+    ]
+    obstacles = hearing(*messages).obstacles(NOW)
+    for k, system in enumerate(obstacles.ids):
+        assert system == 20 + k
+        np.testing.assert_allclose(obstacles.positions[k], k * X + AHEAD * (k * V), atol=0.01)

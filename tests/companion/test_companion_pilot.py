@@ -1,0 +1,327 @@
+"""The way into the air and back, for both autopilots, driven by messages as a table."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from companion_bench import (
+    ARM,
+    ARMED,
+    AUTOPILOT,
+    FLEET,
+    INTERVAL,
+    LAND,
+    MODE,
+    PREARM_OK,
+    PROFILES,
+    REQUEST,
+    START,
+    TAKEOFF,
+    TICK,
+)
+
+from companion.config import CompanionConfig
+from companion.pilot import Phase, Pilot
+from companion.tracks import State
+from companion.world import View
+from mavlink_bridge.messages import CommandAck, Heartbeat, Message, Source, SysStatus
+
+OWN = Source(11, 195)
+HEIGHT, GROUND = 6.0, 2.5
+HALF = 500_000
+LOCAL = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
+FLAVOURS = tuple(PROFILES)
+HEALTHY = SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, None, None)
+ILL = SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, 0, None, None)
+
+
+def state(height=0.0, speed=0.0, age=5_000):
+    return State(np.array([0.0, 0.0, GROUND + height]), np.array([0.0, 0.0, speed]), age)
+
+
+def beat(flavour, armed=False, guided=False, autopilot=None):
+    profile = PROFILES[flavour]
+    mode = profile.guided_custom_mode if guided else 0
+    kind = profile.autopilot if autopilot is None else autopilot
+    return Heartbeat(AUTOPILOT, 2, kind, ARMED * armed, mode, 4)
+
+
+def ack(command, result=0):
+    return CommandAck(AUTOPILOT, command, result, 0, 0, *OWN)
+
+
+NOTHING = View(None, None, None, None)
+READY = View(state(), 0.3, None, LOCAL)
+
+
+class Rig:
+    """A pilot, the time, and what it sees and has sent."""
+
+    def __init__(self, flavour="ardupilot", view=READY):
+        self.flavour = flavour
+        self.pilot = Pilot(CompanionConfig(), OWN, FLEET.altitude)
+        self.now, self.view = START, view
+        self.sent = []
+
+    def tick(self, *heard: Message):
+        """One step: the commands sent, as (command, parameters without NaN)."""
+        for message in heard:
+            self.pilot.hear(message)
+        sent = [
+            (m.command, tuple(p for p in m.params if p == p)) for m in self.pilot.step(self.now, self.view)
+        ]
+        self.sent += [(self.now, *call) for call in sent]
+        self.now += TICK
+        return sent
+
+    def run(self, seconds, *every, acks=False):
+        """Steps; with ``acks`` every command is accepted at once."""
+        sent, answers = [], []
+        for _ in range(round(seconds * 1e6 / TICK)):
+            new = self.tick(*every, *answers)
+            answers = [ack(command) for command, _ in new] if acks else []
+            sent += new
+        return sent
+
+    def prepared(self):
+        """Connected, given the go, intervals asked for."""
+        self.run(0.2, beat(self.flavour), HEALTHY, acks=True)
+        assert self.pilot.go(HEIGHT)
+        self.tick()
+        assert self.pilot.phase is Phase.PREPARE
+        return self
+
+    def escorting(self):
+        self.prepared()
+        self.view = READY._replace(own=state(HEIGHT))
+        self.run(0.2, beat(self.flavour, armed=True, guided=True))
+        assert self.pilot.phase is Phase.ESCORT
+        return self
+
+
+class Want(NamedTuple):
+    """What is known to the pilot, and what it must then name as missing ("": nothing is)."""
+
+    heard: tuple[Message, ...]
+    view: View
+    go: bool
+    missing: str
+
+
+BEAT = beat("ardupilot")
+MISSING = {
+    "nothing heard": Want((), NOTHING, True, "a heartbeat of the autopilot"),
+    "a companion's own echo": Want((beat("px4", autopilot=8),), READY, True, "a heartbeat of the autopilot"),
+    "another firmware": Want((beat("px4", autopilot=4), HEALTHY), READY, True, "an autopilot that is known"),
+    "no origin": Want((BEAT, HEALTHY), READY._replace(local=None), True, "GPS_GLOBAL_ORIGIN"),
+    "no position": Want((BEAT, HEALTHY), READY._replace(own=None), True, "LOCAL_POSITION_NED"),
+    "an old position": Want(
+        (BEAT, HEALTHY), READY._replace(own=state(age=500_001)), True, "LOCAL_POSITION_NED"
+    ),
+    "no attitude": Want((BEAT, HEALTHY), READY._replace(yaw=None), True, "ATTITUDE"),
+    "no status": Want((BEAT,), READY, True, "pre-arm checks"),
+    "not ready to arm": Want((BEAT, ILL), READY, True, "pre-arm checks"),
+    "no go": Want((BEAT, HEALTHY), READY, False, "the operator's go"),
+    "everything": Want((BEAT, HEALTHY), READY, True, ""),
+}
+
+
+@pytest.mark.parametrize("name", MISSING)
+def test_connecting_waits_and_names_what_is_missing(name):
+    want = MISSING[name]
+    rig = Rig(view=want.view)
+    if want.go:
+        assert rig.pilot.go(HEIGHT)
+    sent = rig.run(3.0, *want.heard)
+    if want.missing:
+        assert rig.pilot.phase is Phase.CONNECT
+        assert want.missing in rig.pilot.waiting_for
+        assert {command for command, _ in sent} <= {INTERVAL, REQUEST}
+        assert not rig.pilot.streaming
+    else:
+        assert rig.pilot.phase is Phase.PREPARE
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_nothing_is_armed_without_a_go(flavour):
+    rig = Rig(flavour)
+    sent = rig.run(20.0, beat(flavour), HEALTHY, acks=True)
+    assert {command for command, _ in sent} == {INTERVAL}
+    assert rig.pilot.phase is Phase.CONNECT
+
+
+ORDER = {
+    # Command, parameters, what it waits for, whether set-points flow once it is done.
+    "ardupilot": (
+        (MODE, (1.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0), "guided mode", False),
+        (ARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "arm", False),
+        (TAKEOFF, (0.0, 0.0, 0.0, HEIGHT), "take-off", True),
+    ),
+    "px4": (
+        (ARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "arm", False),
+        # PX4 wants its take-off altitude above mean sea level.
+        (TAKEOFF, (0.0, 0.0, 0.0, FLEET.altitude + GROUND + HEIGHT), "take-off", True),
+        (MODE, (1.0, 6.0, 0.0, 0.0, 0.0, 0.0, 0.0), "guided mode", True),
+    ),
+}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_the_steps_into_the_air_come_in_the_autopilots_order_each_when_the_last_is_done(flavour):
+    rig = Rig(flavour).prepared()
+    rig.sent.clear()
+    armed = guided = False
+    for command, params, name, streams in ORDER[flavour]:
+        # Acknowledged but not done: it waits, and asks nothing else.
+        assert rig.run(2.0, beat(flavour, armed, guided), acks=True) == [(command, params)]
+        assert rig.pilot.waiting_for == name
+        assert rig.pilot.phase is Phase.PREPARE
+        # Set-points flow before the mode is granted where the autopilot wants that, else not.
+        assert rig.pilot.streaming == (flavour == "px4" and command == MODE)
+        if command == TAKEOFF:
+            for height, speed in ((0.5 * HEIGHT, 1.0), (HEIGHT, 1.0), (0.5 * HEIGHT, 0.0)):
+                rig.view = READY._replace(own=state(height, speed))
+                assert rig.run(0.5, beat(flavour, armed, guided)) == []
+            rig.view = READY._replace(own=state(HEIGHT))
+        armed, guided = armed or command == ARM, guided or command == MODE
+        assert rig.tick(beat(flavour, armed, guided)) == []
+        # Between two steps, too, this can be asked.
+        assert rig.pilot.streaming == streams
+    assert rig.pilot.phase is Phase.ESCORT
+    assert rig.pilot.streaming
+    assert rig.run(5.0, beat(flavour, True, True)) == []
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_command_is_repeated_every_half_second_until_acknowledged(flavour):
+    rig = Rig(flavour).prepared()
+    rig.run(2.0 - 1e-6 * TICK, beat(flavour))
+    first = ORDER[flavour][0]
+    times = [now for now, command, params in rig.sent if (command, params) == first[:2]]
+    assert np.diff(times).tolist() == [HALF] * 3
+    rig.tick(ack(first[0]))
+    assert rig.run(5.0, beat(flavour)) == []
+
+
+def test_a_refused_command_is_noted_and_tried_again():
+    rig = Rig().prepared()
+    rig.sent.clear()
+    for _ in range(200):
+        rig.tick(beat("ardupilot"), *[ack(MODE, 4)] * (rig.now % HALF == 0))
+    assert rig.pilot.refusals
+    assert set(rig.pilot.refusals) == {f"command {MODE}: result 4"}
+    assert len([1 for _, command, _ in rig.sent if command == MODE]) >= 3
+
+
+def test_an_acknowledgement_of_something_else_settles_nothing():
+    rig = Rig().prepared()
+    rig.run(0.6, beat("ardupilot"))
+    rig.tick(ack(ARM), ack(TAKEOFF), ack(INTERVAL))
+    assert rig.run(1.0, beat("ardupilot"))
+    assert rig.pilot.refusals == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_stream_is_asked_for_until_the_autopilot_has_heard_it(seed):
+    """Half of the requests and a third of the answers are lost; an acknowledgement names no stream."""
+    lossy = random.Random(seed)
+    rig = Rig(view=READY._replace(local=None))
+    heard, answers = set(), []
+    for _ in range(3000):
+        new = rig.tick(beat("ardupilot"), *answers)
+        arrived = [call for call in new if lossy.random() > 0.5]
+        heard |= {params[0] for command, params in arrived if command == INTERVAL}
+        answers = [ack(command) for command, _ in arrived if lossy.random() > 0.33]
+    assert heard == {32.0, 30.0, 1.0, 245.0}
+
+
+def test_an_autopilot_that_answers_no_request_is_asked_for_every_stream():
+    rig = Rig(view=NOTHING)
+    sent = rig.run(4.0, beat("ardupilot"))
+    assert {params[0] for command, params in sent if command == INTERVAL} == {32.0, 30.0, 1.0, 245.0}
+    assert any(command == REQUEST and params[0] == 49.0 for command, params in sent)
+
+
+class Order(NamedTuple):
+    """An operator's order in a phase: whether it is taken, and the phase afterwards."""
+
+    phase: Phase
+    order: str
+    height: float
+    taken: bool
+    after: Phase
+
+
+ORDERS = [
+    Order(Phase.CONNECT, "go", 6.0, True, Phase.CONNECT),
+    Order(Phase.CONNECT, "go", 0.49, False, Phase.CONNECT),
+    Order(Phase.CONNECT, "go", 121.0, False, Phase.CONNECT),
+    Order(Phase.CONNECT, "go", math.nan, False, Phase.CONNECT),
+    Order(Phase.CONNECT, "go", math.inf, False, Phase.CONNECT),
+    Order(Phase.CONNECT, "land", 0.0, False, Phase.CONNECT),
+    Order(Phase.PREPARE, "go", 6.0, True, Phase.PREPARE),
+    Order(Phase.PREPARE, "land", 0.0, True, Phase.LAND),
+    Order(Phase.ESCORT, "go", 6.0, True, Phase.ESCORT),
+    Order(Phase.ESCORT, "land", 0.0, True, Phase.SETTLE),
+    Order(Phase.SETTLE, "land", 0.0, True, Phase.SETTLE),
+    Order(Phase.SETTLE, "go", 6.0, False, Phase.SETTLE),
+    Order(Phase.LAND, "land", 0.0, True, Phase.LAND),
+    Order(Phase.LAND, "go", 6.0, False, Phase.LAND),
+    Order(Phase.DONE, "go", 6.0, False, Phase.DONE),
+    Order(Phase.DONE, "land", 0.0, True, Phase.DONE),
+]
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("case", ORDERS, ids=lambda c: f"{c.phase.value} {c.order} {c.height:g}")
+def test_orders(flavour, case):
+    rig = Rig(flavour)
+    rig.pilot.phase = case.phase
+    taken = rig.pilot.go(case.height) if case.order == "go" else rig.pilot.land()
+    assert (taken, rig.pilot.phase) == (case.taken, case.after)
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_landing_goes_through_settling_and_ends_disarmed(flavour):
+    rig = Rig(flavour).escorting()
+    flying = beat(flavour, armed=True, guided=True)
+    assert rig.pilot.land()
+    assert rig.pilot.phase is Phase.SETTLE
+    # Until it has settled it is steered, and nothing is ordered.
+    assert rig.run(3.0, flying) == []
+    assert rig.pilot.streaming
+    rig.pilot.settled()
+    assert not rig.pilot.streaming
+    sent = rig.run(1.0, flying)
+    assert [command for command, _ in sent] == [LAND, LAND]
+    rig.run(2.0, beat(flavour, armed=True), acks=True)
+    assert rig.pilot.phase is Phase.LAND
+    rig.tick(beat(flavour))
+    assert rig.pilot.phase is Phase.DONE
+    assert rig.run(5.0, beat(flavour)) == []
+
+
+@pytest.mark.parametrize("phase", [p for p in Phase if p is not Phase.SETTLE])
+def test_only_who_settles_can_have_settled(phase):
+    rig = Rig()
+    rig.pilot.phase = phase
+    rig.pilot.settled()
+    assert rig.pilot.phase is phase
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize(
+    ("armed", "guided", "streams"),
+    [(True, True, True), (True, False, False), (False, True, False), (False, False, False)],
+)
+def test_in_flight_set_points_are_for_an_armed_vehicle_in_our_mode(flavour, armed, guided, streams):
+    """Somebody takes the vehicle over by its mode switch: nothing is sent, nothing is ordered back."""
+    rig = Rig(flavour).escorting()
+    assert rig.run(2.0, beat(flavour, armed, guided)) == []
+    assert rig.pilot.streaming == streams
+    rig.tick(beat(flavour, True, True))
+    assert rig.pilot.streaming

@@ -1,0 +1,150 @@
+"""The world picture: frames and signs of what arrives, and who may say it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from companion_rig import LAWS, ZERO, vectors
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.config import CompanionConfig
+from companion.world import World
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import Attitude, GlobalPosition, GpsGlobalOrigin, LocalPosition, Source
+
+FLEET = FleetFrame(47.397742, 8.545594, 488.0)
+AUTOPILOT, TARGET = Source(11, 1), Source(1, 1)
+NOW = 1_767_225_600_000_000
+CONFIG = CompanionConfig()
+AT_FLEET_ZERO = GpsGlobalOrigin(AUTOPILOT, 47.397742, 8.545594, 488.0, 0)
+
+
+def local(ned, velocity_ned=(0.0, 0.0, 0.0), source=AUTOPILOT):
+    return LocalPosition(source, 0, tuple(map(float, ned)), tuple(map(float, velocity_ned)))
+
+
+def attitude(yaw, source=AUTOPILOT):
+    return Attitude(source, 0, 0.0, 0.0, yaw, (0.0, 0.0, 0.0))
+
+
+def target(x, velocity_ned=(0.0, 0.0, 0.0), source=TARGET):
+    latitude, longitude, altitude = FLEET.to_geodetic(x)
+    return GlobalPosition(source, 0, latitude, longitude, altitude, 0.0, velocity_ned, None)
+
+
+def world(*heard, config=CONFIG):
+    """A world that heard (link, message) pairs at ``NOW``."""
+    picture = World(config, AUTOPILOT.system, TARGET.system, FLEET)
+    for link, message in heard:
+        picture.hear(NOW, link, message)
+    return picture
+
+
+def test_at_first_nothing_is_known():
+    view = world().at(NOW)
+    assert view == (None, None, None, None)
+
+
+def test_without_an_origin_a_local_position_means_nothing():
+    view = world(("autopilot", local((1, 2, -3))), ("autopilot", attitude(0.5))).at(NOW)
+    assert (view.own, view.yaw) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("ned", "enu"), [((1, 0, 0), (0, 1, 0)), ((0, 1, 0), (1, 0, 0)), ((0, 0, 1), (0, 0, -1))]
+)
+def test_ned_becomes_enu(ned, enu):
+    heard = local(np.multiply(ned, 7), np.multiply(ned, 2))
+    view = world(("autopilot", AT_FLEET_ZERO), ("autopilot", heard)).at(NOW - CONFIG.own.delay_us)
+    np.testing.assert_allclose(view.own.position, np.multiply(enu, 7), atol=1e-6)
+    np.testing.assert_allclose(view.own.velocity, np.multiply(enu, 2), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("north", "east"),
+    [(0.0, math.pi / 2), (math.pi / 2, 0.0), (math.pi, -math.pi / 2), (-math.pi / 2, math.pi)],
+)
+def test_yaw_from_north_becomes_yaw_from_east(north, east):
+    view = world(("autopilot", AT_FLEET_ZERO), ("autopilot", attitude(north))).at(NOW)
+    assert math.remainder(view.yaw - east, math.tau) == pytest.approx(0.0, abs=1e-9)
+
+
+@LAWS
+@given(place=vectors(300.0), ned=vectors(30.0))
+def test_the_own_origin_makes_no_difference(place, ned):
+    """Vehicles that were switched on at different places agree about one point."""
+    latitude, longitude, altitude = FLEET.to_geodetic(place)
+    origin = GpsGlobalOrigin(AUTOPILOT, latitude, longitude, altitude, 0)
+    view = world(("autopilot", origin), ("autopilot", local(ned))).at(NOW)
+    point = FLEET.to_geodetic(view.own.position)
+    frame = FLEET.local(latitude, longitude, altitude)
+    np.testing.assert_allclose(frame.position_to_local(FLEET.to_enu(*point)), ned, atol=1e-4)
+
+
+@pytest.mark.parametrize("link", ["swarm", "target", "ground"])
+def test_the_own_state_comes_from_the_autopilots_link_alone(link):
+    heard = [(link, AT_FLEET_ZERO), (link, local((1, 2, -3))), (link, attitude(0.5))]
+    assert world(*heard).at(NOW) == (None, None, None, None)
+
+
+def test_another_systems_state_is_not_the_own():
+    other = Source(12, 1)
+    heard = [
+        ("autopilot", AT_FLEET_ZERO),
+        ("autopilot", local((1, 2, -3), source=other)),
+        ("autopilot", attitude(0.5, other)),
+    ]
+    view = world(*heard).at(NOW)
+    assert (view.own, view.yaw) == (None, None)
+
+
+@LAWS
+@given(x=vectors(50.0), down=st.floats(-3.0, 3.0), up=st.booleans())
+def test_the_targets_vertical_speed_has_the_sign_it_is_configured_to_have(x, down, up):
+    config = CompanionConfig.model_validate({"target": {"velocity_up": up}})
+    view = world(("target", target(x, (1.0, 2.0, down))), config=config).at(NOW)
+    np.testing.assert_allclose(view.target.velocity, [2.0, 1.0, down if up else -down], atol=1e-9)
+
+
+def test_a_target_is_who_is_named_and_only_on_its_link():
+    for link, source in (("target", Source(2, 1)), ("swarm", TARGET), ("autopilot", TARGET)):
+        assert world((link, target(ZERO, source=source))).at(NOW).target is None
+
+
+def test_the_target_is_an_obstacle_only_if_told_so():
+    x, v = np.array([3.0, 1.0, 5.0]), (0.5, -1.0, 0.0)
+    picture = world(("target", target(x, v)))
+    assert picture.obstacles(NOW, picture.at(NOW)).ids == ()
+    config = CompanionConfig(target_d_min=1.0, target_d_safe=4.0)
+    picture = world(("target", target(x, v)), ("swarm", target(-x, source=Source(12, 1))), config=config)
+    view = picture.at(NOW)
+    obstacles = picture.obstacles(NOW, view)
+    assert obstacles.ids == (12, 1)
+    np.testing.assert_array_equal(obstacles.d_min, [config.field.d_min, 1.0])
+    np.testing.assert_array_equal(obstacles.d_safe, [config.field.d_safe, 4.0])
+    ahead = 0.1 * np.arange(16)[:, None]
+    np.testing.assert_allclose(
+        obstacles.positions[1], view.target.position + ahead * np.array([-1.0, 0.5, 0.0]), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    "nonsense",
+    [
+        local((1e30, 0, 0)),
+        local((0, 0, 0), (0, -3e38, 0)),
+        local((2e7, 0, 0)),
+        local((0, 0, 0), (2e3, 0, 0)),
+    ],
+    ids=["far beyond everything", "faster than everything", "round the earth", "a bullet"],
+)
+def test_a_state_that_no_vehicle_can_have_is_not_taken(nonsense):
+    """Numbers that are finite, soundly framed and absurd."""
+    first = [("autopilot", AT_FLEET_ZERO)]
+    assert world(*first, *[("autopilot", nonsense)] * 3).at(NOW).own is None
+    known = world(*first, ("autopilot", local((1, 2, -3))), *[("autopilot", nonsense)] * 3).at(NOW).own
+    np.testing.assert_allclose(known.position, [2.0, 1.0, 3.0], atol=1e-6)
+    np.testing.assert_allclose(known.velocity, ZERO, atol=1e-6)

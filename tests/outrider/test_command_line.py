@@ -1,0 +1,280 @@
+"""The command ``outrider`` as a script sees it: exit status, what it prints where, and what it leaves."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from shipped import LOGS, SCENARIOS
+
+from outrider import swarm
+from outrider.__main__ import main
+from outrider.errors import InputError, OutriderError
+from outrider.flight import Flight
+
+ANTIPODAL, ESCORT = SCENARIOS["antipodal-8"].read_text(), SCENARIOS["escort"].read_text()
+
+
+class Ended(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Ended]
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Runs ``outrider`` with arguments in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["outrider", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        code = ended.value.code
+        assert code is None or isinstance(code, int)
+        return Ended(code or 0, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def refused(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
+    """Runs it with bad input, and gives the lines that say so. It must neither fly nor leave anything."""
+
+    def fly(flight: Flight) -> None:
+        raise AssertionError("it took off")
+
+    monkeypatch.setattr(Flight, "run", fly)
+
+    def call(*arguments: str) -> list[str]:
+        before = {path: path.stat().st_size for path in tmp_path.rglob("*")}
+        ended = run(*arguments)
+        assert ended.status == 2
+        assert ended.out == ""
+        assert ended.err.endswith("\n")
+        assert "Traceback" not in ended.err
+        lines = ended.err[:-1].split("\n")
+        assert all(line and line.isprintable() for line in lines)
+        assert {path: path.stat().st_size for path in tmp_path.rglob("*")} == before
+        return lines
+
+    return call
+
+
+# Bad input
+
+
+def test_an_unknown_scenario(refused: Callable[..., list[str]]) -> None:
+    (line,) = refused("swarm", "antipodal-9", "--json")
+    assert line.startswith("antipodal-9: ")
+    assert all(name in line for name in SCENARIOS)
+    assert "did you mean 'antipodal-8'?" in line
+
+
+@pytest.mark.parametrize("name", ["nowhere.yaml", "nowhere/scenario.yaml", "a folder/x.yml"])
+def test_a_missing_file(name: str, refused: Callable[..., list[str]], tmp_path: Path) -> None:
+    (tmp_path / "a folder").mkdir()
+    (line,) = refused("swarm", name)
+    assert line.startswith(f"{name}: ")
+    assert "no such file" in line
+
+
+class Wrong(NamedTuple):
+    """A shipped text with ``old`` replaced by ``new``, and the places and words of its faults."""
+
+    text: str
+    old: str
+    new: str
+    faults: tuple[tuple[str, str], ...]
+
+
+def place(text: str, word: str) -> str:
+    """line:column of a word that is there once."""
+    assert text.count(word) == 1
+    before = text[: text.index(word)]
+    return f"{before.count(chr(10)) + 1}:{len(before) - before.rfind(chr(10))}"
+
+
+WRONG = {
+    "unknown key": Wrong(ANTIPODAL, "description:", "descripton:", (("descripton", "'description'?"),)),
+    "unknown inner key": Wrong(ANTIPODAL, "jitter: 0.3", "jiter: 0.3", (("jiter", "'jitter'?"),)),
+    "wrong type": Wrong(ANTIPODAL, "vehicles: 8", "vehicles: eighty", (("eighty", "vehicles"),)),
+    "text for a number": Wrong(ANTIPODAL, "radius: 8.0", "radius: '8.25'", (("'8.25'", "starts.radius"),)),
+    "impossible value": Wrong(ANTIPODAL, "vehicles: 8", "vehicles: -81", (("-81", "vehicles"),)),
+    "not a number": Wrong(ANTIPODAL, "radius: 8.0", "radius: .nan", ((".nan", "finite"),)),
+    "no such word": Wrong(ANTIPODAL, "task: goto", "task: gotoo", (("gotoo", "did you mean 'goto'?"),)),
+    "no such kind": Wrong(ESCORT, "kind: recorded", "kind: recordet", (("recordet", "'recorded'"),)),
+    "syntax": Wrong(ANTIPODAL, "radius: 8.0,", "radius: 8.0, ]", (("] height", "not YAML"),)),
+    "a rule": Wrong(
+        ESCORT, "box_min: [-60.0", "box_min: [-60.0, 0.0, 99.0] #", (("u_max: [4", "box_min must lie below"),)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_fault_in_a_file_is_named_with_its_place(
+    name: str, refused: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    wrong = WRONG[name]
+    assert wrong.text.count(wrong.old) == 1
+    text = wrong.text.replace(wrong.old, wrong.new)
+    (tmp_path / "my.yaml").write_text(text)
+    lines = refused("swarm", "my.yaml", "--json")
+    assert len(lines) == len(wrong.faults)
+    for line, (word, said) in zip(lines, wrong.faults, strict=True):
+        assert line.startswith(f"my.yaml:{place(text, word)}: ")
+        assert said in line
+
+
+def test_every_fault_of_a_file_is_a_line_in_the_order_of_the_file(
+    refused: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    text = ANTIPODAL.replace("vehicles: 8", "vehicels: 8").replace("radius: 8.0", "radius: big")
+    (tmp_path / "my.yaml").write_text(text)
+    lines = refused("swarm", "my.yaml")
+    places = [tuple(map(int, line.split(":")[1:3])) for line in lines]
+    # The mistyped key is unknown, and the one that was meant is missing.
+    assert len(lines) == 3
+    assert places == sorted(places)
+
+
+def test_an_empty_file(refused: Callable[..., list[str]], tmp_path: Path) -> None:
+    (tmp_path / "my.yaml").touch()
+    (line,) = refused("swarm", "my.yaml")
+    assert line.startswith("my.yaml:1:1: is empty")
+
+
+def test_a_vehicle_that_does_not_exist(refused: Callable[..., list[str]], tmp_path: Path) -> None:
+    (tmp_path / "my.yaml").write_text(ANTIPODAL + "vehicle: firefli\n")
+    (line,) = refused("swarm", "my.yaml")
+    assert "firefli: " in line
+    assert "did you mean 'firefly'?" in line
+
+
+@pytest.mark.parametrize("damage", ["cut", "missing", "noise", "other system"])
+def test_a_log_that_cannot_be_flown(damage: str, refused: Callable[..., list[str]], tmp_path: Path) -> None:
+    log, text = tmp_path / "target.tlog", ESCORT
+    good = (LOGS / "escort-target.tlog").read_bytes()
+    if damage == "cut":
+        log.write_bytes(good[: len(good) // 2 + 3])
+    elif damage == "noise":
+        log.write_bytes(b"\0\1\2\3" * 1000)
+    elif damage == "other system":
+        log.write_bytes(good)
+        text = text.replace("system: 1,", "system: 7,")
+    (tmp_path / "my.yaml").write_text(text.replace("escort-target.tlog,", f"{json.dumps(str(log))},"))
+    for options in ([], ["--out", "run"], ["--json"]):
+        (line,) = refused("swarm", "my.yaml", *options)
+        assert line.startswith(f"{log}: ")
+
+
+def test_an_out_that_holds_something(refused: Callable[..., list[str]], tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "notes.txt").write_text("mine")
+    (line,) = refused("swarm", "antipodal-8", "--out", "run")
+    assert line.startswith("--out run: ")
+    (line,) = refused("swarm", "antipodal-8", "--out", "run/notes.txt")
+    assert line.startswith("--out run/notes.txt: ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--vehicles", "0"], "--vehicles"),
+        (["--vehicles", "many"], "--vehicles"),
+        (["--seed", "-1"], "--seed"),
+        (["--loss", "1.5"], "--loss"),
+        (["--loss", "nan"], "--loss"),
+        (["--delay-ms", "-5"], "--delay-ms"),
+        (["--method", "tangentail"], "'tangentail'"),
+        (["--avoidance", "certifed"], "--avoidance"),
+        (["--sensors", "gps"], "--sensors"),
+        (["--replan-hz", "nan"], "--replan-hz"),
+        (["--replan-hz", "33"], "--replan-hz"),
+        (["--sed", "1"], "--seed"),
+        (["--seed"], "--seed"),
+        (["a second scenario"], "a second scenario"),
+    ],
+)
+def test_a_bad_option(arguments: list[str], said: str, refused: Callable[..., list[str]]) -> None:
+    (line,) = refused("swarm", "antipodal-8", *arguments)
+    assert said in line
+
+
+@pytest.mark.parametrize("arguments", [["swarm"], ["swrm", "escort"], ["--nonsense"]])
+def test_a_bad_command(arguments: list[str], refused: Callable[..., list[str]]) -> None:
+    (line,) = refused(*arguments)
+    assert re.match(r"outrider( swarm)?: ", line)
+
+
+def test_control_characters_of_an_argument_do_not_reach_the_terminal(
+    refused: Callable[..., list[str]],
+) -> None:
+    (line,) = refused("swarm", "no\nsuch\x1b[31m")
+    assert line.startswith(r"no\nsuch\x1b[31m: ")
+
+
+# Other ends
+
+
+def test_help_is_no_error(run: Run) -> None:
+    for arguments in (["--help"], ["swarm", "--help"]):
+        ended = run(*arguments)
+        assert (ended.status, ended.err) == (0, "")
+        assert "Usage" in ended.out
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "said"),
+    [
+        (InputError("a: wrong", "b: wrong"), 2, "a: wrong\nb: wrong\n"),
+        (OutriderError("broken"), 3, "outrider: broken\n"),
+        (OSError("no space"), 3, "outrider: no space\n"),
+    ],
+)
+def test_what_ends_how(
+    error: Exception, status: int, said: str, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(swarm, "fly", fail)
+    assert run("swarm", "antipodal-8") == Ended(status, "", said)
+
+
+LONELY = ("swarm", "antipodal-8", "--vehicles", "1", "--replan-hz", "10", "--out", "run")
+
+
+def test_a_flight_ends_with_one_json_object_and_a_full_directory(run: Run, tmp_path: Path) -> None:
+    ended = run(*LONELY, "--json")
+    assert (ended.status, ended.err) == (0, "")
+    assert ended.out.count("\n") == 1
+    summary = json.loads(ended.out)
+    assert (summary["vehicles"], summary["converged"], summary["run_dir"]) == (1, True, "run")
+    assert summary["min_separation_m"] is None
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == [
+        "configuration.yaml",
+        "flight.png",
+        "summary.json",
+        "vehicle-11.tlog",
+    ]
+    assert json.loads((tmp_path / "run" / "summary.json").read_text()) == summary
+    assert (tmp_path / "run" / "flight.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_goal_that_is_not_reached_ends_with_1_and_a_table(run: Run, tmp_path: Path) -> None:
+    text = ANTIPODAL.replace("vehicles: 8", "vehicles: 1\ncap_s: 1")
+    (tmp_path / "my.yaml").write_text(text)
+    ended = run("swarm", "my.yaml", "--replan-hz", "10", "--planar", "--seed", "3")
+    assert (ended.status, ended.err) == (1, "")
+    assert "antipodal-8 · tangential · seed 3" in ended.out
+    assert "{" not in ended.out
+    assert [path.name for path in (tmp_path / "runs").iterdir()] == ["antipodal-8-tangential-seed3"]
