@@ -39,6 +39,10 @@ _WANTED = {
     "target": {33},
     "ground": {75, 76},
 }
+_ASIDE = 0.5
+"""m further than the clearance, when moving aside to land."""
+_NEAR = 1e-3
+_EAST = np.array([1.0, 0.0])
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
 
@@ -233,15 +237,23 @@ class Companion:
         if self._rest is None:
             reach = float(np.linalg.norm(measured.velocity)) / (2.0 * min(self.config.limits.u_max))
             self._rest = measured.position + reach * measured.velocity
-        calm = float(np.linalg.norm(measured.velocity)) < self.config.guard.landing_speed
-        if calm and self._clearance(measured.position) > self.config.guard.landing_clearance:
-            self.pilot.settled()
+        if float(np.linalg.norm(measured.velocity)) < self.config.guard.landing_speed:
+            self._make_room(measured.position)
         return Aim(self._rest, _ZERO, self._rest if target is None else target.position)
 
-    def _clearance(self, position: Array) -> float:
-        """Horizontal distance to the nearest neighbour: landing is straight down."""
-        apart = self._obstacles.positions[:, 0, :2] - position[:2]
-        return float(np.sqrt(np.einsum("ji,ji->j", apart, apart).min(initial=np.inf)))
+    def _make_room(self, position: Array) -> None:
+        """Landing is straight down: land if no neighbour is near horizontally, or else move aside of it,
+        because a landed one will not go away."""
+        clearance = self.config.guard.landing_clearance
+        apart = position[:2] - self._obstacles.positions[:, 0, :2]
+        distance = np.sqrt(np.einsum("ji,ji->j", apart, apart))
+        if distance.min(initial=np.inf) > clearance:
+            self.pilot.settled()
+            return
+        nearest = int(np.argmin(distance))
+        away = apart[nearest] / distance[nearest] if distance[nearest] > _NEAR else _EAST
+        beside = self._obstacles.positions[nearest, 0, :2] + (clearance + _ASIDE) * away
+        self._rest = np.append(beside, position[2])
 
     def _setpoints(self, now: int, view: View) -> list[Message]:
         if now < self._next_setpoint:

@@ -109,6 +109,17 @@ def _goes_on(data: bytes, at: int) -> bool:
     return at == len(data) or STARTS.match(data, at) is not None
 
 
+def _is_gzip(head: bytes) -> bool:
+    """Whether a file begins as gzip does and can be unpacked so far: garbage may have the first two bytes."""
+    if not head.startswith(b"\x1f\x8b\x08"):
+        return False
+    try:
+        zlib.decompressobj(wbits=31).decompress(head)
+    except zlib.error:
+        return False
+    return True
+
+
 class TlogReader:
     """The records of a log, in the order of the file; each iteration reads it again, in bounded memory."""
 
@@ -119,7 +130,7 @@ class TlogReader:
     def __iter__(self) -> Generator[Record, None, None]:
         try:
             with self.path.open("rb") as raw:
-                compressed = raw.peek(2)[:2] == b"\x1f\x8b"
+                compressed = _is_gzip(raw.peek(_CHUNK))
                 self._pass = _Pass(gzip.GzipFile(fileobj=raw) if compressed else raw)
                 yield from self._pass.records()
         except OSError as error:

@@ -23,6 +23,8 @@ from sitl.vehicle import Reference, VehicleState
 
 NAN = float("nan")
 LEAST = 0.5
+MIDDLE = 0.5025
+"""s; a physics step, but not the last one of a tick of 5 ms."""
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 
 # Encounters
@@ -152,8 +154,8 @@ def watch(vehicles: Sequence[OnRails], seen: Truth, seconds: float, tick: int = 
 
 
 def passing(offset: float, speed: float) -> Any:
-    """Along x through the middle at 0.5 s, ``offset`` aside."""
-    return lambda time: (speed * (time - 0.5), offset, 5.0)
+    """Along x through the middle, ``offset`` aside, between two looks at it."""
+    return lambda time: (speed * (time - MIDDLE), offset, 5.0)
 
 
 def test_a_fast_pass_between_two_samples_is_seen() -> None:
@@ -195,7 +197,7 @@ def test_samples_are_in_fleet_enu_and_nan_where_there_is_nothing() -> None:
     for part in (samples.position, samples.velocity, samples.acceleration, samples.reference):
         assert part.shape == (count, 2, 3)
     assert samples.yaw.shape == samples.tilt.shape == (count, 2)
-    assert np.allclose(samples.position[:, 0, 0], 2.0 * (samples.time * 1e-6 - 0.5))
+    assert np.allclose(samples.position[:, 0, 0], 2.0 * (samples.time * 1e-6 - MIDDLE))
     assert np.allclose(samples.position[:, 1], (1.0, 2.0, 3.0))
     assert np.allclose(samples.velocity, (1.0, 0.0, 0.0))
     # Nose to the north.
@@ -239,7 +241,7 @@ def test_separation_is_the_least_of_every_step(offset: float, speed: float) -> N
     seen = truth(vehicles)
     watch(vehicles, seen, 1.0)
     steps = np.arange(1, 401) * 2_500e-6
-    exact = np.hypot(speed * (steps - 0.5), offset)
+    exact = np.hypot(speed * (steps - MIDDLE), offset)
     assert seen.vehicles.minimum == pytest.approx(exact.min())
     assert seen.samples().separation.min() == pytest.approx(exact.min())
     assert seen.vehicles.count == bool(exact.min() < LEAST)

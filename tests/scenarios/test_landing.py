@@ -13,7 +13,6 @@ from outrider.flight import Flight, Stage
 from outrider.operator import Operator
 
 
-@pytest.mark.xfail(reason="who hovers above a landed vehicle waits there for ever", strict=True)
 def test_who_hovers_above_a_landed_vehicle_lands_beside_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

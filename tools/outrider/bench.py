@@ -117,7 +117,9 @@ def physics(rounds: int) -> dict[str, float]:
         places[:, 0] = np.arange(count)
         places[:, 2] = -5.0
         states = initial_states(config, places, np.zeros(count), 0.0)
-        commands = np.array([command_row(Reference.hover(place + (1.0, 0.0, 0.0))) for place in places])
+        commands = np.array(
+            [command_row(Reference.hover(place + np.array([1.0, 0.0, 0.0]))) for place in places]
+        )
         fleets[count] = states, commands
         advance_many(states, commands, record, _STEPS_A_CALL)
     for _ in range(rounds):
