@@ -106,7 +106,7 @@ def test_every_qp_of_a_flight_has_daqps_solution(flight):
 def test_state_limits_are_given_up_only_where_they_contradict_each_other(flight):
     given_up = [gone for _, _, gone in qps(flight)]
     assert sum(given_up) == sum(s.plan.relaxed for s in flight)
-    assert sum(given_up) < 0.01 * len(given_up)
+    assert sum(given_up) < 0.03 * len(given_up)
 
 
 def test_a_flight_keeps_the_vehicles_acceleration(flight):

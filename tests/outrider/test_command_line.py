@@ -114,7 +114,10 @@ WRONG = {
     "no such kind": Wrong(ESCORT, "kind: recorded", "kind: recordet", (("recordet", "'recorded'"),)),
     "syntax": Wrong(ANTIPODAL, "radius: 8.0,", "radius: 8.0, ]", (("] height", "not YAML"),)),
     "a rule": Wrong(
-        ESCORT, "box_min: [-60.0", "box_min: [-60.0, 0.0, 99.0] #", (("u_max: [3", "box_min must lie below"),)
+        ANTIPODAL,
+        "task: goto",
+        "task: goto\n  limits: {a_total: 1.0}",
+        (("{a_total", "a_total must be at least the largest u_max"),),
     ),
 }
 

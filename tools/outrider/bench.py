@@ -17,6 +17,7 @@ from companion.forces import Obstacles
 from companion.heading import Heading
 from companion.planner import Aim, Planner
 from companion.setpoint import setpoint
+from companion.surface import bearing
 from companion.world import World
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, enu_to_ned
@@ -81,6 +82,9 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
     scenes = [_scene(config, seed) for seed in range(60)]
     planner = Planner(config)
     headings = [Heading(config.heading, config.horizon) for _ in scenes]
+    for scene, heading in zip(scenes, headings, strict=True):
+        # As in flight, the nose is on the target when the planning begins.
+        heading.reset(bearing(scene.position, scene.aim.target))
     fleet = scenes[0].world.fleet
     local = fleet.local(fleet.latitude, fleet.longitude, fleet.altitude)
     steps, solving = [], []
@@ -181,10 +185,10 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
     fleet = FleetFrame(47.397742, 8.545594, 488.0)
     world = World(config, 1, 101, fleet)
     position = np.array([0.0, 0.0, 5.0])
-    bearing = 2.0 * np.pi * (np.arange(_NEIGHBOURS) + random.uniform(-0.2, 0.2, _NEIGHBOURS)) / _NEIGHBOURS
+    around = 2.0 * np.pi * (np.arange(_NEIGHBOURS) + random.uniform(-0.2, 0.2, _NEIGHBOURS)) / _NEIGHBOURS
     reach = random.uniform(1.5, 3.0, _NEIGHBOURS)
     for k in range(_NEIGHBOURS):
-        place = position + reach[k] * np.array([np.cos(bearing[k]), np.sin(bearing[k]), 0.0])
+        place = position + reach[k] * np.array([np.cos(around[k]), np.sin(around[k]), 0.0])
         speed = random.normal(0.0, 1.0, 3) * (1.0, 1.0, 0.1)
         source = Source(20 + k, 195)
         north, east, down = enu_to_ned(speed)
