@@ -1,8 +1,8 @@
 """The companion's settings: frozen, checked at load, passed explicitly. SI units, fleet-local ENU, times in
 µs.
 
-Defaults are the paper's where it gives a number; where it is silent the value that we settled on stands here
-with its reason, and `config/companions/*.yaml` may say otherwise.
+Defaults are the paper's where it gives a number; where it is silent, the value that we settled on stands
+here. A scenario file may say otherwise.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class HorizonConfig(Settings):
 
 
 class CostConfig(Settings):
-    """Ω_t and Ω_i. Only their ratios matter. Not given in the paper: `docs` of the scenario files say how
-    chosen."""
+    """Ω_t and Ω_i. Only their ratios matter. Not given in the paper: settled by
+    flying the swap and the escort."""
 
     omega_t_position: Positive = 100.0
     omega_t_velocity: Positive = 20.0
@@ -133,10 +133,10 @@ class GuardConfig(Settings):
     own_stale_us: Micros = 500_000
     hold_us: Micros = Field(500_000, description="a plan is held for so long after the last good one")
     target_stale_us: Micros = 3_000_000
-    neighbour_stale_us: Micros = 2_000_000
     plan_stale_us: Micros = Field(500_000, description="a shared horizon older than this is not used")
     landing_speed: Positive = Field(0.3, description="m/s; slower than this a vehicle may land")
     landing_clearance: Positive = Field(1.0, description="m, horizontally to the nearest neighbour, to land")
+    settle_us: int = Field(30_000_000, ge=0, le=600_000_000, description="longest way from escort to landing")
     tube: Positive = Field(1.0, description="m of tracking error at which the plan is anchored anew")
 
 

@@ -95,8 +95,8 @@ class Dqmpc:
         self._solvers = lru_cache(maxsize=16)(self._build)
 
     def hessian(self, omega_scale: float) -> Array:
-        """P = 2(Ω_i I + Ω_x s_x s_xᵀ + Ω_v s_v s_vᵀ), divided by the largest Ω_t: PIQP likes weights near
-        1e2."""
+        """P = 2(Ω_i I + Ω_x s_x s_xᵀ + Ω_v s_v s_vᵀ); PIQP likes its weights
+        between 1e2 and 1e3."""
         s_x, s_v = self.S_x[-1], self.S_v[-1]
         w = self.cost
         return 2.0 * (

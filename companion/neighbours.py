@@ -77,15 +77,15 @@ class Neighbours:
         )
 
     def obstacles(self, now: int) -> Obstacles:
-        """All neighbours aligned with ``now + n·dt``, n = 0…N; those unheard of for too long are left out."""
+        """All neighbours aligned with ``now + n·dt``, n = 0…N.
+
+        One that falls silent stays an obstacle where it was last, carried on for a bounded time: it may well
+        be there.
+        """
         config = self._config
         steps = config.horizon.steps + 1
         age = now - self._times
-        fresh = age <= config.guard.neighbour_stale_us
         ids, states = self._ids, self._states
-        if not fresh.all():
-            ids = tuple(system for system, is_fresh in zip(ids, fresh, strict=True) if is_fresh)
-            states, age = states[fresh], age[fresh]
         if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
         carried = np.minimum(np.maximum(age, 0), config.neighbour.extrapolate_us) * 1e-6

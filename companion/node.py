@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.config import CompanionConfig
-from companion.errors import SolverError
+from companion.errors import CompanionError
 from companion.forces import Obstacles
 from companion.guard import Guard
 from companion.heading import Heading
@@ -27,6 +27,8 @@ from mavlink_bridge.node import Datagram
 
 COMPONENT = 195
 """MAV_COMP_ID_PATHPLANNER."""
+AUTOPILOT = 1
+"""MAV_COMP_ID_AUTOPILOT1: other components of the vehicle have no say in where it is."""
 DO_REPOSITION = 192
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 _GLOBAL = (0, 5)
@@ -155,7 +157,11 @@ class Companion:
             return False
         if not abs(order.z) < _HIGHEST:
             return False
-        self._goal = self._fleet.to_enu(latitude, longitude, order.z)
+        goal = self._fleet.to_enu(latitude, longitude, order.z)
+        limits = self.config.limits
+        if self.config.task != "goto" or (goal < limits.box_min).any() or (goal > limits.box_max).any():
+            return False
+        self._goal = goal
         return True
 
     def _ack(self, message: CommandInt | CommandLong, result: int) -> CommandAck:
@@ -165,6 +171,9 @@ class Companion:
         """Plan when due; start from the measured state each time the vehicle becomes ours."""
         if not self.pilot.streaming or view.own is None or view.local is None:
             self.guard.horizon = None
+            return
+        stale = view.own.age > self.config.guard.own_stale_us
+        if self.guard.horizon is None and stale:
             return
         measured = Motion(view.own.position, view.own.velocity, _ZERO)
         if self.guard.horizon is None:
@@ -176,8 +185,12 @@ class Companion:
         self._next_plan += self.config.rates.replan_us * (
             1 + (now - self._next_plan) // self.config.rates.replan_us
         )
-        if view.own.age > self.config.guard.own_stale_us:
+        if stale:
             self.guard.hold(now, solver=False)
+            return
+        if not self.pilot.guided:
+            # Set-points flow before they steer: a plan would run away from the vehicle.
+            self.guard.start(now, measured)
             return
         self._plan(now, view, measured)
 
@@ -197,7 +210,7 @@ class Companion:
                 else horizon.positions(now, config.steps + 1, config.dt_us)
             )
             self.plan = self.planner.plan(now, state.position, state.velocity, prediction, aim, obstacles)
-        except SolverError:
+        except CompanionError:
             self.guard.hold(now, solver=True)
             return
         finally:
@@ -221,11 +234,10 @@ class Companion:
         config, target = self.config, view.target
         if self.pilot.phase is Phase.SETTLE:
             return self._settle(measured, target)
-        stale = target is None or target.age > config.guard.target_stale_us
         if config.task == "goto":
             goal = measured.position if self._goal is None else self._goal
             return Aim(goal, _ZERO, goal if target is None else target.position)
-        if target is None or stale:
+        if target is None:
             return None
         ahead = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
         destination = circle(target.position, measured.position, config.surface.radius, config.surface.height)
@@ -236,7 +248,12 @@ class Companion:
         land."""
         if self._rest is None:
             reach = float(np.linalg.norm(measured.velocity)) / (2.0 * min(self.config.limits.u_max))
-            self._rest = measured.position + reach * measured.velocity
+            limits, here = self.config.limits, measured.position
+            self._rest = np.clip(
+                here + reach * measured.velocity,
+                np.minimum(limits.box_min, here),
+                np.maximum(limits.box_max, here),
+            )
         if float(np.linalg.norm(measured.velocity)) < self.config.guard.landing_speed:
             self._make_room(measured.position)
         return Aim(self._rest, _ZERO, self._rest if target is None else target.position)
@@ -281,7 +298,9 @@ def _filter(link: str, system: int, target: int) -> Callable[[int, int, int], bo
     """Header filter of a link: the messages wanted there, from whom they may come."""
     wanted = _WANTED[link]
     if link == "autopilot":
-        return lambda identifier, sender, _component: identifier in wanted and sender == system
+        return lambda identifier, sender, component: (
+            identifier in wanted and sender == system and component == AUTOPILOT
+        )
     if link == "target":
         return lambda identifier, sender, _component: identifier in wanted and sender == target
     if link == "swarm":

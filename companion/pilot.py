@@ -20,14 +20,21 @@ from mavlink_bridge.messages import (
     Heartbeat,
     Message,
     Source,
+    StatusText,
     SysStatus,
 )
 
 DO_SET_MODE, ARM_DISARM, NAV_TAKEOFF, NAV_LAND = 176, 400, 22, 21
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
 ACCEPTED, IN_PROGRESS = 0, 5
+WARNING = 4
+"""MAV_SEVERITY."""
 ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
 _RETRY = 500_000
+_EXPIRY = 15_000_000
+"""µs after which an acknowledged command without effect is sent again; longer than a take-off."""
+HEARTBEAT_LOST = 3_000_000
+"""µs without a heartbeat after which the autopilot's mode is not known."""
 _NAN = float("nan")
 _NEEDED = tuple(
     (SET_MESSAGE_INTERVAL, (identifier, interval, 0.0, 0.0, 0.0, 0.0, 0.0))
@@ -64,7 +71,12 @@ class Pilot:
         self.profile: Profile | None = None
         self.waiting_for = "a heartbeat of the autopilot"
         self.refusals: list[str] = []
+        self.said = ""
+        """The last warning of the autopilot: usually why it refuses."""
         self._heartbeat: Heartbeat | None = None
+        self._beaten: Heartbeat | None = None
+        self._now = self._beat_at = 0
+        self._settling_since: int | None = None
         self._status: SysStatus | None = None
         self._height: float | None = None
         self._ground = 0.0
@@ -79,6 +91,7 @@ class Pilot:
         return (
             self.profile is not None
             and self._heartbeat is not None
+            and self._now - self._beat_at <= HEARTBEAT_LOST
             and bool(self._heartbeat.base_mode & ARMED)
             and is_guided(self.profile, self._heartbeat)
         )
@@ -103,6 +116,9 @@ class Pilot:
                 self.profile = {p.autopilot: p for p in (ARDUPILOT, PX4)}.get(message.autopilot)
         elif isinstance(message, SysStatus):
             self._status = message
+        elif isinstance(message, StatusText):
+            if message.severity <= WARNING:
+                self.said = message.text
         elif isinstance(message, CommandAck):
             call = self._asked.pop(message.command, None)
             if call is None:
@@ -123,7 +139,8 @@ class Pilot:
         """The operator's order to land. A vehicle under way first comes to a hover clear of the others,
         because an autopilot that lands looks out for nobody."""
         if self.phase is Phase.CONNECT:
-            return False
+            # Nothing is in the air yet, and an earlier go is taken back.
+            self._height = None
         if self.phase is Phase.ESCORT:
             self.phase = Phase.SETTLE
         elif self.phase is Phase.PREPARE:
@@ -137,6 +154,11 @@ class Pilot:
 
     def step(self, now: int, view: View) -> list[Message]:
         """Commands to send now."""
+        self._now = now
+        if self._heartbeat is not self._beaten:
+            self._beaten, self._beat_at = self._heartbeat, now
+        if self.phase is Phase.SETTLE:
+            self._settle(now, view)
         if self.phase is Phase.CONNECT:
             return self._connect(now, view)
         if self.phase is Phase.PREPARE:
@@ -147,6 +169,13 @@ class Pilot:
                 return []
             return self._call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
         return []
+
+    def _settle(self, now: int, view: View) -> None:
+        """Land without settling when that cannot go on: not ours to steer, blind, or too long."""
+        self._settling_since = now if self._settling_since is None else self._settling_since
+        blind = view.own is None or view.own.age > self._config.guard.own_stale_us
+        if blind or not self.guided or now - self._settling_since > self._config.guard.settle_us:
+            self.phase = Phase.LAND
 
     def _connect(self, now: int, view: View) -> list[Message]:
         calls: list[Message] = []
@@ -182,6 +211,10 @@ class Pilot:
         profile, beat, height = self.profile, self._heartbeat, self._height
         if profile is None or beat is None or height is None or view.own is None:
             return []
+        if Step.ARM in profile.steps[: self._step] and not beat.base_mode & ARMED:
+            # Disarmed again, by itself or by somebody: all over.
+            self._step = 0
+            self._forget()
         step = profile.steps[self._step]
         if step is Step.MODE:
             done = is_guided(profile, beat)
@@ -216,6 +249,9 @@ class Pilot:
         """The command, unless it was acknowledged, sent less than half a second ago, or must wait for its
         turn: COMMAND_ACK names the command alone, so that one of a kind may be open at a time."""
         key = (command, tuple(p for p in params if p == p))
+        if key in self._acknowledged and now - self._sent.get(key, now) > _EXPIRY:
+            # Acknowledged and yet without effect: ask again.
+            self._acknowledged.discard(key)
         if key in self._acknowledged or self._recent(now, key) or self._recent(now, self._asked.get(command)):
             return []
         self._sent[key], self._asked[command] = now, key

@@ -48,7 +48,8 @@ class Sharing:
             beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
             shared.autopilot.append(beat)
             shared.swarm.append(beat)
-        if self._passes(1, now, rates.state_us) and view.own is not None:
+        fresh = view.own is not None and view.own.age <= self._config.guard.own_stale_us
+        if self._passes(1, now, rates.state_us) and fresh:
             shared.swarm.append(self._position(now - self._boot, view))
         if self._passes(2, now, rates.plan_us) and horizon is not None:
             plan = self._plan(horizon)

@@ -79,7 +79,8 @@ class Track:
         return True
 
     def at(self, now: int) -> State | None:
-        """The state carried to ``now``, at most ``extrapolate_us`` far; None before the first measurement."""
+        """The state carried to ``now``, at most ``extrapolate_us`` far, where it then rests; None before the
+        first measurement."""
         if self._time is None:
             return None
         position, velocity = self._extrapolate(now)
@@ -99,7 +100,8 @@ class Track:
         since = time - (self._time if self._time is not None else time)
         dt = min(max(since, 0), self._config.extrapolate_us) * 1e-6
         x = self._filter.x
-        return x[:3] + dt * x[3:], x[3:].copy()
+        moving = since <= self._config.extrapolate_us
+        return x[:3] + dt * x[3:], x[3:].copy() if moving else np.zeros(3)
 
     def _start(self, time: int, z: Array) -> None:
         self._filter.x = z.copy()

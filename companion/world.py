@@ -64,8 +64,11 @@ class World:
             self._hear_target(now, message)
 
     def at(self, now: int) -> View:
-        """The view at ``now`` (µs)."""
-        return View(self._own.at(now), self._yaw, self._target.at(now), self._local)
+        """The view at ``now`` (µs); a target unheard of for too long is none."""
+        target = self._target.at(now)
+        if target is not None and target.age > self.config.guard.target_stale_us:
+            target = None
+        return View(self._own.at(now), self._yaw, target, self._local)
 
     def obstacles(self, now: int, view: View) -> Obstacles:
         """Neighbours, and the target where it is one, aligned with ``now + n·dt``."""

@@ -204,15 +204,17 @@ def test_a_plan_alone_is_no_neighbour():
     assert hearing(plan(X, V)).obstacles(NOW).ids == ()
 
 
-def test_who_is_silent_for_too_long_is_left_out_and_comes_back():
-    neighbours = hearing(position(X), position(-X, system=13))
-    stale = CONFIG.guard.neighbour_stale_us
-    neighbours.hear_position(NOW + stale, position(-X, system=13))
-    assert neighbours.obstacles(NOW + stale).ids == (OTHER, 13)
-    assert neighbours.obstacles(NOW + stale + 1).ids == (13,)
-    assert neighbours.ages(NOW + stale)[OTHER] == stale
-    neighbours.hear_position(NOW + stale + DELAY + 1, position(X))
-    assert neighbours.obstacles(NOW + stale + 1).ids == (OTHER, 13)
+def test_who_falls_silent_stays_an_obstacle_where_it_was_last():
+    """Carried on for a bounded time: it may well still be there."""
+    neighbours = hearing(position(X, V))
+    bound = CONFIG.neighbour.extrapolate_us
+    there = neighbours.obstacles(NOW + bound).positions[0, 0]
+    np.testing.assert_allclose(there, X + 1e-6 * bound * V, atol=0.03)
+    for silence in (bound + 1, 10 * bound, 1000 * bound):
+        silent = neighbours.obstacles(NOW + silence)
+        assert silent.ids == (OTHER,)
+        np.testing.assert_allclose(silent.positions[0], np.broadcast_to(there, (16, 3)), atol=1e-6)
+    assert neighbours.ages(NOW + 10 * bound)[OTHER] == 10 * bound
 
 
 @LAWS

@@ -192,7 +192,7 @@ def test_no_go_by_another_link_starts_anything():
 def test_every_command_is_acknowledged_to_its_sender():
     bench = Bench()
     table = [
-        (LAND, (), DENIED),
+        (LAND, (), ACCEPTED),
         (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, NAN), DENIED),
         (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, 0.1), DENIED),
         (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, math.inf), DENIED),
@@ -344,15 +344,20 @@ def test_taken_over_by_its_mode_switch_it_is_silent_and_then_starts_where_it_is(
     assert math.remainder(math.pi / 2 - first.yaw - 2.5, math.tau) == pytest.approx(0.0, abs=0.02)
 
 
-def test_settling_waits_until_nobody_is_below():
+@pytest.mark.parametrize("below", [[0.6, 0.0, 0.5], [0.0, 0.0, 2.0], [-0.2, 0.7, 0.3]])
+def test_nobody_is_landed_upon(below):
+    """Somebody stands below, who will not go away: it moves aside before it orders to land."""
     bench = Bench().take_off(5.0)
-    neighbour = bench.datagram("swarm", seen_at(12, [0.6, 0.0, 0.5]))
+    neighbour = bench.datagram("swarm", seen_at(12, below))
     bench.fly(1.0, neighbour)
     bench.order(LAND)
-    assert commands(bench.fly(3.0, neighbour)) == []
-    assert bench.phase is Phase.SETTLE
-    # It goes; nobody hears of it for so long that it is forgotten.
-    assert commands(bench.fly(4.0)) == [LAND]
+    for _ in range(1000):
+        before = bench.autopilot.position.copy()
+        if commands(bench.step(neighbour)) == [LAND]:
+            break
+    assert bench.phase is Phase.LAND
+    assert np.linalg.norm(before[:2] - below[:2]) > bench.config.guard.landing_clearance
+    assert np.linalg.norm(bench.autopilot.velocity) < bench.config.guard.landing_speed
 
 
 def test_a_changed_origin_sends_nothing_far_away(flying):

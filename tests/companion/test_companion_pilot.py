@@ -262,7 +262,7 @@ ORDERS = [
     Order(Phase.CONNECT, "go", 121.0, False, Phase.CONNECT),
     Order(Phase.CONNECT, "go", math.nan, False, Phase.CONNECT),
     Order(Phase.CONNECT, "go", math.inf, False, Phase.CONNECT),
-    Order(Phase.CONNECT, "land", 0.0, False, Phase.CONNECT),
+    Order(Phase.CONNECT, "land", 0.0, True, Phase.CONNECT),
     Order(Phase.PREPARE, "go", 6.0, True, Phase.PREPARE),
     Order(Phase.PREPARE, "land", 0.0, True, Phase.LAND),
     Order(Phase.ESCORT, "go", 6.0, True, Phase.ESCORT),
@@ -325,3 +325,23 @@ def test_in_flight_set_points_are_for_an_armed_vehicle_in_our_mode(flavour, arme
     assert rig.pilot.streaming == streams
     rig.tick(beat(flavour, True, True))
     assert rig.pilot.streaming
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_an_order_to_land_before_the_start_takes_the_go_back(flavour):
+    rig = Rig(flavour, NOTHING)
+    assert rig.pilot.go(6.0)
+    assert rig.pilot.land()
+    rig.view = READY
+    rig.run(5.0, beat(flavour), HEALTHY)
+    assert rig.pilot.phase is Phase.CONNECT
+    assert rig.pilot.waiting_for == "the operator's go"
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_without_a_heartbeat_nothing_is_guided(flavour):
+    rig = Rig(flavour).escorting()
+    assert rig.pilot.guided
+    rig.run(4.0)
+    assert not rig.pilot.guided
+    assert not rig.pilot.streaming

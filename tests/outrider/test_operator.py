@@ -124,6 +124,13 @@ def test_exactly_what_is_not_answered_goes_on(orders: list[tuple[int, int]], dat
             bench.operator.land(system)
         else:
             bench.operator.goal(system, np.array([0.0, 0.0, 5.0]))
+    # An order to land takes back one to take off that came before it and is still open.
+    taken_back = {
+        (system, NAV_TAKEOFF)
+        for i, (system, command) in enumerate(orders)
+        if command == NAV_LAND and (system, NAV_TAKEOFF) in orders[:i]
+    }
+    orders = [order for order in orders if order not in taken_back]
     assert {(m.target_system, m.command) for m in bench.run(0.5)} == set(orders)
     answered = set(data.draw(st.lists(st.sampled_from(orders), unique=True)))
     again = bench.run(0.5, *(ack(*order) for order in sorted(answered)))

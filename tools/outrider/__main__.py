@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Final, Optional, cast
@@ -97,6 +98,13 @@ def main() -> None:
         sys.exit(FAULT)
     except (OutriderError, BridgeError, OSError) as error:
         sys.stderr.write(f"outrider: {error}\n")
+        sys.exit(FAULT)
+    except Exception as error:
+        # A fault of ours must not look like a collision, which has status 1.
+        if os.environ.get("OUTRIDER_TRACEBACK"):
+            raise
+        name = type(error).__name__
+        sys.stderr.write(f"outrider: {name}: {error}; OUTRIDER_TRACEBACK=1 shows where\n")
         sys.exit(FAULT)
     sys.exit(status)
 

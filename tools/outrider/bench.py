@@ -80,7 +80,8 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
     scenes."""
     config = load(find("scenarios", "antipodal-8"), Scenario).companion
     scenes = [_scene(config, seed) for seed in range(60)]
-    planner = Planner(config)
+    # Each scene has its own vehicle: a planner remembers its field and its gradient.
+    planners = [Planner(config) for _ in scenes]
     headings = [Heading(config.heading, config.horizon) for _ in scenes]
     for scene, heading in zip(scenes, headings, strict=True):
         # As in flight, the nose is on the target when the planning begins.
@@ -92,7 +93,9 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
     ahead = 1e-6 * horizon.dt_us * np.arange(1, horizon.steps + 2)
     now = 1_000_000
     for turn in range(rounds + 1):
-        for (world, position, velocity, aim), heading in zip(scenes, headings, strict=True):
+        for (world, position, velocity, aim), planner, heading in zip(
+            scenes, planners, headings, strict=True
+        ):
             prediction = position + np.vstack([np.zeros(1), ahead[:-1, None]]) * velocity
             started = time.thread_time_ns()
             obstacles = world.obstacles(now, world.at(now))
@@ -180,7 +183,8 @@ def real_time_factor(replan_hz: float | None) -> float:
 
 
 def _scene(config: CompanionConfig, seed: int) -> Scene:
-    """Eight neighbours around, 1.5 to 3 m off, each with a shared horizon, the goal behind them."""
+    """Eight neighbours around, 1.5 to 3 m off at nearly the same height, as in a swap, each with a shared
+    horizon, the goal behind them."""
     random = np.random.default_rng(seed)
     fleet = FleetFrame(47.397742, 8.545594, 488.0)
     world = World(config, 1, 101, fleet)
@@ -204,7 +208,7 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
             config.horizon.dt_us,
             place,
             speed,
-            random.normal(0.0, 1.0, (config.horizon.steps + 1, 3)),
+            random.normal(0.0, 1.0, (config.horizon.steps + 1, 3)) * (1.0, 1.0, 0.1),
             fleet.fingerprint,
         )
         world.hear(980_000, "swarm", Tunnel(source, 0, 0, PAYLOAD_TYPE, pack(shared)))

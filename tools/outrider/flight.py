@@ -87,6 +87,7 @@ class Flight:
         self.truth = Truth(self.autopilots, self.target, scenario.d_min, scenario.d_min_target)
         self.ether = Ether(self._channels(), seed, scenario.timing.base_tick_us)
         self._tally_at_start: list[Tally] = []
+        self._tally_at_end: list[Tally] = []
         self._calm_since: int | None = None
         self._near_since: int | None = None
         self._land_at = 0
@@ -104,9 +105,9 @@ class Flight:
 
     @property
     def tallies(self) -> list[tuple[Tally, Tally]]:
-        """Per companion: at the start of the clock and now."""
-        start = self._tally_at_start or [c.tally for c in self.companions]
-        return list(zip(start, (c.tally for c in self.companions), strict=True))
+        """Per companion: at the start of the clock and at its end."""
+        now = [c.tally for c in self.companions]
+        return list(zip(self._tally_at_start or now, self._tally_at_end or now, strict=True))
 
     def errors(self, positions: np.ndarray, target: np.ndarray | None) -> np.ndarray:
         """Distance (K,) of each vehicle from where it should be: its goal, or the surface around
@@ -205,6 +206,7 @@ class Flight:
             if now - EPOCH > _PREPARE_CAP:
                 waiting = [
                     f"{c.name} waits for {c.pilot.waiting_for}"
+                    + (f" ({c.pilot.said})" if c.pilot.said else "")
                     for c in self.companions
                     if c.pilot.phase is not Phase.ESCORT
                 ]
@@ -238,6 +240,7 @@ class Flight:
             over = now >= self.converged_at + HOLD + _AFTER
         if over:
             self.clock_end = now
+            self._tally_at_end = [c.tally for c in self.companions]
             self._land(now)
 
     def _land(self, now: int) -> None:

@@ -40,7 +40,8 @@ class Operator:
         self._order(CommandLong(self._source, system, COMPONENT, NAV_TAKEOFF, 0, params))
 
     def land(self, system: int) -> None:
-        """Land where you are."""
+        """Land where you are; an order to take off that is still open is taken back."""
+        self._open.pop((system, NAV_TAKEOFF), None)
         params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0)
         self._order(CommandLong(self._source, system, COMPONENT, NAV_LAND, 0, params))
 
