@@ -171,10 +171,12 @@ class Pilot:
         return []
 
     def _settle(self, now: int, view: View) -> None:
-        """Land without settling when that cannot go on: not ours to steer, blind, or too long."""
-        self._settling_since = now if self._settling_since is None else self._settling_since
+        """Land without settling when that cannot go on: blind, or too long. Somebody who took the vehicle
+        over by its mode switch keeps it: nothing is ordered against them."""
+        since = self._settling_since = now if self._settling_since is None else self._settling_since
+        taken_over = not self.guided and now - self._beat_at <= HEARTBEAT_LOST
         blind = view.own is None or view.own.age > self._config.guard.own_stale_us
-        if blind or not self.guided or now - self._settling_since > self._config.guard.settle_us:
+        if not taken_over and (blind or now - since > self._config.guard.settle_us):
             self.phase = Phase.LAND
 
     def _connect(self, now: int, view: View) -> list[Message]:
@@ -212,9 +214,10 @@ class Pilot:
         if profile is None or beat is None or height is None or view.own is None:
             return []
         if Step.ARM in profile.steps[: self._step] and not beat.base_mode & ARMED:
-            # Disarmed again, by itself or by somebody: all over.
-            self._step = 0
+            # Disarmed again, by itself or by somebody, who will not expect it to arm: a new go is needed.
+            self._step, self._height, self.phase = 0, None, Phase.CONNECT
             self._forget()
+            return []
         step = profile.steps[self._step]
         if step is Step.MODE:
             done = is_guided(profile, beat)

@@ -181,6 +181,15 @@ def test_a_command_to_somebody_else_is_not_obeyed_nor_answered(flying, system, c
     assert flying.phase is Phase.ESCORT
 
 
+@pytest.mark.parametrize("component", [0, 100, 191, 195])
+def test_other_components_of_the_vehicle_have_no_say(flying, component):
+    """A camera's heartbeat is not the autopilot's, and a VIO's position not the vehicle's."""
+    source = Source(SYSTEM, component)
+    others = (Heartbeat(source, 30, 0, 0, 0, 4), LocalPosition(source, 0, (9.0, 9.0, 9.0), (0.0, 0.0, 0.0)))
+    assert len(setpoints(flying.fly(1.0, flying.datagram("autopilot", *others)))) == 50
+    np.testing.assert_allclose(flying.autopilot.position, HOLDING, atol=0.1)
+
+
 def test_no_go_by_another_link_starts_anything():
     for link in Stranger.links:
         bench = Bench()

@@ -70,7 +70,8 @@ class Rig:
     def tick(self, *heard: Message):
         """One step: the commands sent, as (command, parameters without NaN)."""
         for message in heard:
-            self.pilot.hear(message)
+            # As a codec makes it: a new one each time.
+            self.pilot.hear(message._replace())
         sent = [
             (m.command, tuple(p for p in m.params if p == p)) for m in self.pilot.step(self.now, self.view)
         ]
@@ -246,6 +247,15 @@ def test_an_autopilot_that_answers_no_request_is_asked_for_every_stream():
     assert any(command == REQUEST and params[0] == 49.0 for command, params in sent)
 
 
+def test_a_command_without_effect_is_asked_again_though_acknowledged():
+    rig = Rig().prepared()
+    rig.sent.clear()
+    rig.run(40.0, beat("ardupilot"), acks=True)
+    times = [now for now, command, _ in rig.sent if command == MODE]
+    assert len(times) == 3
+    assert min(np.diff(times)) > 10_000_000
+
+
 class Order(NamedTuple):
     """An operator's order in a phase: whether it is taken, and the phase afterwards."""
 
@@ -283,6 +293,44 @@ def test_orders(flavour, case):
     rig.pilot.phase = case.phase
     taken = rig.pilot.go(case.height) if case.order == "go" else rig.pilot.land()
     assert (taken, rig.pilot.phase) == (case.taken, case.after)
+
+
+def test_an_order_to_land_takes_an_earlier_go_back():
+    rig = Rig(view=READY._replace(local=None))
+    assert rig.pilot.go(HEIGHT)
+    assert rig.pilot.land()
+    rig.view = READY
+    assert {command for command, _ in rig.run(5.0, BEAT, HEALTHY, acks=True)} == {INTERVAL}
+    assert rig.pilot.phase is Phase.CONNECT
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_without_a_heartbeat_for_three_seconds_nothing_is_steered(flavour):
+    rig = Rig(flavour).escorting()
+    rig.run(2.9)
+    assert rig.pilot.streaming
+    rig.run(0.2)
+    assert not rig.pilot.streaming
+    rig.tick(beat(flavour, armed=True, guided=True))
+    assert rig.pilot.streaming
+
+
+@pytest.mark.parametrize("blind", [None, state(HEIGHT, age=500_001)], ids=["nothing", "old"])
+def test_who_is_blind_lands_without_settling(blind):
+    rig = Rig().escorting()
+    rig.pilot.land()
+    rig.view = READY._replace(own=blind)
+    sent = rig.run(0.1, beat("ardupilot", armed=True, guided=True))
+    assert [command for command, _ in sent] == [LAND]
+
+
+def test_settling_ends():
+    rig = Rig().escorting()
+    rig.pilot.land()
+    longest = CompanionConfig().guard.settle_us * 1e-6
+    flying = beat("ardupilot", armed=True, guided=True)
+    assert rig.run(longest - 0.1, flying) == []
+    assert [command for command, _ in rig.run(0.2, flying)] == [LAND]
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -345,3 +393,23 @@ def test_without_a_heartbeat_nothing_is_guided(flavour):
     rig.run(4.0)
     assert not rig.pilot.guided
     assert not rig.pilot.streaming
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_who_took_the_vehicle_over_while_it_settles_keeps_it(flavour):
+    rig = Rig(flavour).escorting()
+    assert rig.pilot.land()
+    taken = beat(flavour, armed=True, guided=False)
+    assert rig.run(CompanionConfig().guard.settle_us * 1e-6 + 1.0, taken) == []
+    assert not rig.pilot.streaming
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_disarmed_on_the_way_up_it_does_not_arm_again_without_a_new_go(flavour):
+    rig = Rig(flavour).prepared()
+    rig.run(1.0, beat(flavour, armed=True, guided=True), acks=True)
+    assert rig.pilot.phase is Phase.PREPARE
+    sent = rig.run(20.0, beat(flavour), HEALTHY, acks=True)
+    assert ARM not in {command for command, _ in sent}
+    assert rig.pilot.phase is Phase.CONNECT
+    assert rig.pilot.waiting_for == "the operator's go"
