@@ -15,6 +15,7 @@ from companion.heading import Heading
 from companion.horizon import Array, Horizon, Motion
 from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
 from companion.planner import Aim, Plan, Planner
+from companion.reception import LINKS, accepts
 from companion.setpoint import setpoint
 from companion.sharing import Sharing
 from companion.surface import circle
@@ -27,20 +28,12 @@ from mavlink_bridge.node import Datagram
 
 COMPONENT = 195
 """MAV_COMP_ID_PATHPLANNER."""
-AUTOPILOT = 1
-"""MAV_COMP_ID_AUTOPILOT1: other components of the vehicle have no say in where it is."""
 DO_REPOSITION = 192
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 _GLOBAL = (0, 5)
 """MAV_FRAME_GLOBAL and its INT twin."""
 _HIGHEST = 1e5
 """m; a NaN is not below it either."""
-_WANTED = {
-    "autopilot": {0, 1, 30, 32, 49, 77, 245, 253},
-    "swarm": {33, 385},
-    "target": {33},
-    "ground": {75, 76},
-}
 _ASIDE = 0.5
 """m further than the clearance, when moving aside to land."""
 _NEAR = 1e-3
@@ -84,7 +77,7 @@ class Companion:
         self.guard = Guard(config)
         self.pilot = Pilot(config, self._source, fleet.altitude)
         self._sharing = Sharing(config, self._source, fleet)
-        self._codecs = {link: Codec(_filter(link, system, target_system)) for link in _WANTED}
+        self._codecs = {link: Codec(accepts(link, system, target_system)) for link in LINKS}
         self.plan: Plan | None = None
         self._goal: Array | None = None
         self._rest: Array | None = None
@@ -292,17 +285,3 @@ class Companion:
                 codec = self._codecs[link]
                 out.append(Datagram(link, b"".join(codec.encode(message) for message in messages)))
         return out
-
-
-def _filter(link: str, system: int, target: int) -> Callable[[int, int, int], bool]:
-    """Header filter of a link: the messages wanted there, from whom they may come."""
-    wanted = _WANTED[link]
-    if link == "autopilot":
-        return lambda identifier, sender, component: (
-            identifier in wanted and sender == system and component == AUTOPILOT
-        )
-    if link == "target":
-        return lambda identifier, sender, _component: identifier in wanted and sender == target
-    if link == "swarm":
-        return lambda identifier, sender, _component: identifier in wanted and sender != system
-    return lambda identifier, _sender, _component: identifier in wanted
