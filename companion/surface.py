@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, sin
+from math import atan2, cos, sin
 
 import numpy as np
 
@@ -24,6 +24,12 @@ def circle(target: Array, own: Array, radius: float, height: float) -> Array:
     return np.array([target[0] + radius * cos(psi), target[1] + radius * sin(psi), target[2] + height])
 
 
-def circle_error(target: Array, own: Array, radius: float, height: float) -> float:
-    """Distance (m) of ``own`` from the circle: what stand-off error means in reports."""
-    return hypot(hypot(own[0] - target[0], own[1] - target[1]) - radius, float(own[2] - target[2] - height))
+def circle_error(target: Array, own: Array, radius: float, height: float) -> Array:
+    """Distances (…,) in m of positions ``own`` (…, 3) from the circle around ``target`` (…, 3).
+
+    This is what stand-off error means in reports.
+    """
+    offset = own - target
+    across = np.hypot(offset[..., 0], offset[..., 1]) - radius
+    distance: Array = np.hypot(across, offset[..., 2] - height)
+    return distance

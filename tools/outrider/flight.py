@@ -117,7 +117,7 @@ class Flight:
         if target is None:
             return np.full(len(positions), np.nan)
         surface = self.scenario.companion.surface
-        return np.array([circle_error(target, p, surface.radius, surface.height) for p in positions])
+        return circle_error(target, positions, surface.radius, surface.height)
 
     # Building
 

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.node import COMPONENT
+from companion.node import COMPONENT, DO_REPOSITION
+from companion.pilot import NAV_LAND, NAV_TAKEOFF
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Source
 from mavlink_bridge.node import Datagram
 
 LINK = "ground"
-NAV_LAND, NAV_TAKEOFF, DO_REPOSITION = 21, 22, 192
 GLOBAL_FRAME = 0
 _NAN = float("nan")
 _RETRY = 500_000

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.surface import circle_error
 from outrider.flight import Flight
 
 Array = NDArray[np.float64]
@@ -119,10 +120,7 @@ def standoff_errors(flight: Flight, position: Array, target: Array) -> Array:
     if flight.scenario.task != "escort":
         return np.empty((0, position.shape[1] if position.ndim > 1 else 0))
     surface = flight.scenario.companion.surface
-    offset = position - target[:, None, :]
-    across = np.hypot(offset[..., 0], offset[..., 1]) - surface.radius
-    result: Array = np.hypot(across, offset[..., 2] - surface.height)
-    return result
+    return circle_error(target[:, None, :], position, surface.radius, surface.height)
 
 
 def _percentiles(values: Array, *which: int | str) -> dict[str, float | None]:
