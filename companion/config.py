@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from companion.obstacles import Obstacle, Post, Sphere
+from companion.settings import Settings
 
 Positive = Annotated[float, Field(gt=0.0, le=1e4)]
 Micros = Annotated[int, Field(gt=0, le=10_000_000, multiple_of=4)]
@@ -21,10 +24,7 @@ Bounds = tuple[
 ]
 
 
-class Settings(BaseModel):
-    """Base: an unknown key is an error, and nothing changes after load."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+__all__ = ["CompanionConfig", "Obstacle", "Post", "Settings", "Sphere"]
 
 
 class HorizonConfig(Settings):
@@ -110,9 +110,23 @@ class TrackConfig(Settings):
     sigma_position: Positive = Field(0.02, description="m")
     sigma_velocity: Positive = Field(0.05, description="m/s")
     sigma_acceleration: Positive = Field(2.0, description="m/s², of the constant-velocity model")
-    delay_us: int = Field(20_000, ge=0, le=2_000_000, description="assumed age of a message when it arrives")
+    delay_us: int = Field(
+        20_000, ge=0, le=2_000_000, description="least age of a message when it arrives; jitter adds to it"
+    )
+    stamps: bool = Field(True, description="date by the sender's time_boot_ms; false: by the arrival alone")
+    rewind_us: int = Field(
+        2_000_000, ge=0, le=10_000_000, description="how late a message may be and still be put in its place"
+    )
     extrapolate_us: Micros = Field(1_000_000, description="no track is carried further than this")
-    jump: Positive = Field(3.0, description="m; an innovation beyond it needs a second witness")
+    gate: Positive = Field(
+        22.46, description="on d² = yᵀS⁻¹y, χ² of six: 16.81 passes 99 % of what is true, 22.46 99.9 %"
+    )
+    jump: Positive = Field(
+        3.0, description="m and m/s: an innovation beyond it is refused too; it grows by this per second"
+    )
+    witnesses: int = Field(
+        2, ge=1, le=10, description="refused measurements that agree with each other and are then believed"
+    )
     velocity_up: bool = Field(False, description="the sender's vz is positive up, contrary to MAVLink")
 
 
@@ -163,10 +177,11 @@ class CompanionConfig(Settings):
     own: TrackConfig = TrackConfig(delay_us=5_000, sigma_acceleration=10.0)
     neighbour: TrackConfig = TrackConfig()
     target: TrackConfig = TrackConfig(
-        sigma_position=0.5, sigma_velocity=0.3, sigma_acceleration=2.0, jump=8.0
+        sigma_position=1.0, sigma_velocity=0.3, sigma_acceleration=1.0, jump=8.0
     )
     target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
     target_d_safe: float | None = Field(None, gt=0.0, le=100.0)
+    obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed; the field is about them")
     horizon: HorizonConfig = HorizonConfig()
     cost: CostConfig = CostConfig()
     limits: LimitsConfig = LimitsConfig()

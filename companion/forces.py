@@ -22,6 +22,8 @@ import numpy as np
 
 from companion.horizon import Array
 
+_VEHICLES = np.zeros(1)
+_VEHICLES.flags.writeable = False
 _NEAR = 1e-6
 """Below this distance (m) no direction is away; the force then points along +x rather than nowhere."""
 
@@ -29,14 +31,27 @@ _NEAR = 1e-6
 class Obstacles(NamedTuple):
     """What is to be avoided, M of them, aligned in time with the own horizon (fleet-local ENU, m).
 
-    ``positions`` (M, N + 1, 3) at n = 0…N; ``d_min``, ``d_safe`` (M,) between centres; ``ids`` name them for
-    latches and logs.
+    ``positions`` (M, N + 1, 3) at n = 0…N; ``d_min``, ``d_safe`` (M,) between centres, ``radius`` (M,) or
+    (1,) included, which is what an obstacle is larger than a vehicle; ``ids`` name them for latches and logs.
     """
 
     ids: tuple[int, ...]
     positions: Array
     d_min: Array
     d_safe: Array
+    radius: Array = _VEHICLES
+
+    def joined(self, others: Obstacles) -> Obstacles:
+        """These and the others."""
+        if not others.ids:
+            return self
+        return Obstacles(
+            self.ids + others.ids,
+            np.concatenate([self.positions, others.positions]),
+            np.concatenate([self.d_min, others.d_min]),
+            np.concatenate([self.d_safe, others.d_safe]),
+            np.concatenate([np.broadcast_to(part.radius, len(part.ids)) for part in (self, others)]),
+        )
 
 
 def magnitude(distance: Array, d_min: Array, d_safe: Array, gain: float, clamp: float) -> Array:

@@ -6,11 +6,14 @@ its n = 0 position for the whole horizon (Sec. IV-A), or carried on at constant 
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
-from companion.horizon import Array, HorizonTable, roll_out
+from companion.horizon import Array, Horizon, HorizonTable, roll_out
+from companion.plan_clock import PlanClock
 from companion.tracks import Track
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
@@ -21,6 +24,16 @@ _MOST = 255
 """System ids that there are."""
 _STRAYED = 1.0
 """A neighbour further than this (m) from its own plan is not where it says: its track counts."""
+
+
+@lru_cache(maxsize=256)
+def _read(payload: bytes) -> tuple[int, Horizon]:
+    """Fingerprint and horizon of a plan on the wire. Where many companions share a process each plan is read
+    once. Raises PlanWireError."""
+    plan = unpack(payload)
+    horizon = roll_out(plan.epoch, plan.dt, plan.position_m, plan.velocity_m_s, plan.accelerations_m_s2)
+    horizon.knots.flags.writeable = False
+    return plan.origin, horizon
 
 
 class Neighbours:
@@ -35,6 +48,7 @@ class Neighbours:
         self._ids: tuple[int, ...] = ()
         self._states: Array = np.zeros((0, 6))
         self._times = np.zeros(0, dtype=np.int64)
+        self._clocks: dict[int, PlanClock] = {}
         self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
         self._d_min: Array = np.full(_MOST, config.field.d_min)
         self._d_safe: Array = np.full(_MOST, config.field.d_safe)
@@ -47,7 +61,9 @@ class Neighbours:
             return
         position = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
         track = self._tracks.get(system) or Track(self._config.neighbour)
-        if not track.measure(now, position, ned_to_enu(message.velocity_ned)):
+        track.measure(now, position, ned_to_enu(message.velocity_ned), message.time_boot)
+        time = track.time
+        if time is None:
             return
         if system not in self._tracks:
             self._tracks[system] = track
@@ -56,25 +72,31 @@ class Neighbours:
             self._times = np.append(self._times, now)
         row = self._ids.index(system)
         self._states[row] = track.last
-        self._times[row] = now if track.time is None else track.time
+        self._times[row] = time
 
     def hear_plan(self, now: int, message: Tunnel) -> None:
-        """A neighbour's horizon in a TUNNEL. One in another fleet frame, or from the future, is refused."""
+        """A neighbour's horizon in a TUNNEL. One in another fleet frame, from the future or from long ago is
+        refused, unless it is the sender's clock that is wrong."""
         system = message.source.system
         if system == self._system or message.payload_type != PAYLOAD_TYPE:
             return
         try:
-            plan = unpack(message.payload)
+            origin, horizon = _read(message.payload)
         except PlanWireError:
             self.refused_plans += 1
             return
-        if plan.origin != self._fleet.fingerprint or plan.epoch > now + plan.dt or not plan.accelerations:
+        begins = None
+        if origin == self._fleet.fingerprint and len(horizon.knots) > 1:
+            clock = self._clocks.get(system)
+            if clock is None:
+                config = self._config
+                clock = PlanClock(config.neighbour.delay_us, config.guard.plan_stale_us)
+                self._clocks[system] = clock
+            begins = clock.begins(now, horizon.epoch, horizon.dt)
+        if begins is None:
             self.refused_plans += 1
             return
-        self._table.put(
-            system,
-            roll_out(plan.epoch, plan.dt, plan.position_m, plan.velocity_m_s, plan.accelerations_m_s2),
-        )
+        self._table.put(system, horizon._replace(epoch=begins))
 
     def obstacles(self, now: int) -> Obstacles:
         """All neighbours aligned with ``now + n·dt``, n = 0…N.

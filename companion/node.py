@@ -17,12 +17,12 @@ from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
 from companion.planner import Aim, Plan, Planner
 from companion.reception import LINKS, accepts
 from companion.setpoint import setpoint
+from companion.settling import Settling
 from companion.sharing import Sharing
 from companion.surface import circle
-from companion.tracks import State
 from companion.world import View, World
 from mavlink_bridge.codec import Codec
-from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source
 from mavlink_bridge.node import Datagram
 
@@ -34,10 +34,6 @@ _GLOBAL = (0, 5)
 """MAV_FRAME_GLOBAL and its INT twin."""
 _HIGHEST = 1e5
 """m; a NaN is not below it either."""
-_ASIDE = 0.5
-"""m further than the clearance, when moving aside to land."""
-_NEAR = 1e-3
-_EAST = np.array([1.0, 0.0])
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
 
@@ -79,8 +75,9 @@ class Companion:
         self._sharing = Sharing(config, self._source, fleet)
         self._codecs = {link: Codec(accepts(link, system, target_system)) for link in LINKS}
         self.plan: Plan | None = None
+        self._frame: LocalFrame | None = None
         self._goal: Array | None = None
-        self._rest: Array | None = None
+        self._settling = Settling(config)
         self._obstacles = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
         self._heading = Heading(config.heading, config.horizon)
         self._boot: int | None = None
@@ -106,6 +103,8 @@ class Companion:
         if self._boot is None:
             self._boot = self._next_plan = self._next_setpoint = now
         answers = self._receive(now, inbox)
+        if not self._has_to_act(now):
+            return self._encode(ground=answers)
         view = self.world.at(now)
         commands = self.pilot.step(now, view)
         self._fly(now, view)
@@ -113,6 +112,12 @@ class Companion:
         shared = self._sharing.due(now, view, self.guard.horizon)
         return self._encode(
             autopilot=[*commands, *setpoints, *shared.autopilot], swarm=shared.swarm, ground=answers
+        )
+
+    def _has_to_act(self, now: int) -> bool:
+        """Under way there is nothing to do between two deadlines but to listen."""
+        return self.pilot.phase is not Phase.ESCORT or now >= min(
+            self._next_plan, self._next_setpoint, self._sharing.next_due
         )
 
     def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
@@ -162,6 +167,9 @@ class Companion:
 
     def _fly(self, now: int, view: View) -> None:
         """Plan when due; start from the measured state each time the vehicle becomes ours."""
+        if view.local is not self._frame:
+            # Where the vehicle was in the old frame must not be flown to in the new one.
+            self._frame, self.guard.horizon = view.local, None
         if not self.pilot.streaming or view.own is None or view.local is None:
             self.guard.horizon = None
             return
@@ -196,12 +204,12 @@ class Companion:
         state = self.guard.anchor(now, measured)
         started = self._stopwatch()
         try:
-            self._obstacles = obstacles = self.world.obstacles(now, view)
             prediction = (
                 np.broadcast_to(state.position, (config.steps + 1, 3))
                 if horizon is None
                 else horizon.positions(now, config.steps + 1, config.dt_us)
             )
+            self._obstacles = obstacles = self.world.obstacles(now, view, prediction)
             self.plan = self.planner.plan(now, state.position, state.velocity, prediction, aim, obstacles)
         except CompanionError:
             self.guard.hold(now, solver=True)
@@ -226,7 +234,10 @@ class Companion:
         horizon."""
         config, target = self.config, view.target
         if self.pilot.phase is Phase.SETTLE:
-            return self._settle(measured, target)
+            rest = self._settling.rest(measured, self._obstacles)
+            if self._settling.clear:
+                self.pilot.settled()
+            return Aim(rest, _ZERO, rest if target is None else target.position)
         if config.task == "goto":
             goal = measured.position if self._goal is None else self._goal
             return Aim(goal, _ZERO, goal if target is None else target.position)
@@ -235,35 +246,6 @@ class Companion:
         ahead = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
         destination = circle(target.position, measured.position, config.surface.radius, config.surface.height)
         return Aim(destination + ahead * target.velocity, target.velocity, target.position)
-
-    def _settle(self, measured: Motion, target: State | None) -> Aim:
-        """Stop where braking from the order on ends, still avoiding; then, calm and clear of the others,
-        land."""
-        if self._rest is None:
-            reach = float(np.linalg.norm(measured.velocity)) / (2.0 * min(self.config.limits.u_max))
-            limits, here = self.config.limits, measured.position
-            self._rest = np.clip(
-                here + reach * measured.velocity,
-                np.minimum(limits.box_min, here),
-                np.maximum(limits.box_max, here),
-            )
-        if float(np.linalg.norm(measured.velocity)) < self.config.guard.landing_speed:
-            self._make_room(measured.position)
-        return Aim(self._rest, _ZERO, self._rest if target is None else target.position)
-
-    def _make_room(self, position: Array) -> None:
-        """Landing is straight down: land if no neighbour is near horizontally, or else move aside of it,
-        because a landed one will not go away."""
-        clearance = self.config.guard.landing_clearance
-        apart = position[:2] - self._obstacles.positions[:, 0, :2]
-        distance = np.sqrt(np.einsum("ji,ji->j", apart, apart))
-        if distance.min(initial=np.inf) > clearance:
-            self.pilot.settled()
-            return
-        nearest = int(np.argmin(distance))
-        away = apart[nearest] / distance[nearest] if distance[nearest] > _NEAR else _EAST
-        beside = self._obstacles.positions[nearest, 0, :2] + (clearance + _ASIDE) * away
-        self._rest = np.append(beside, position[2])
 
     def _setpoints(self, now: int, view: View) -> list[Message]:
         if now < self._next_setpoint:

@@ -17,6 +17,7 @@ from companion.world import View
 from mavlink_bridge.messages import (
     CommandAck,
     CommandLong,
+    ExtendedSysState,
     Heartbeat,
     Message,
     Source,
@@ -30,6 +31,8 @@ ACCEPTED, IN_PROGRESS = 0, 5
 WARNING = 4
 """MAV_SEVERITY."""
 ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
+IN_AIR = 2
+"""MAV_LANDED_STATE."""
 _RETRY = 500_000
 _EXPIRY = 15_000_000
 """µs after which an acknowledged command without effect is sent again; longer than a take-off."""
@@ -78,6 +81,8 @@ class Pilot:
         self._now = self._beat_at = 0
         self._settling_since: int | None = None
         self._status: SysStatus | None = None
+        self._landed_state: int | None = None
+        self._flying_already = False
         self._height: float | None = None
         self._ground = 0.0
         self._step = 0
@@ -116,6 +121,8 @@ class Pilot:
                 self.profile = {p.autopilot: p for p in (ARDUPILOT, PX4)}.get(message.autopilot)
         elif isinstance(message, SysStatus):
             self._status = message
+        elif isinstance(message, ExtendedSysState):
+            self._landed_state = message.landed_state
         elif isinstance(message, StatusText):
             if message.severity <= WARNING:
                 self.said = message.text
@@ -129,7 +136,8 @@ class Pilot:
                 self.refusals.append(f"command {message.command}: result {message.result}")
 
     def go(self, height: float) -> bool:
-        """The operator's go: climb to ``height`` metres above the start. Whether it is taken."""
+        """The operator's go: climb to ``height`` metres above the start, or take over where it flies already.
+        Whether it is taken."""
         if self.phase not in (Phase.CONNECT, Phase.PREPARE) or not 0.5 <= height <= 120.0:
             return self.phase is Phase.ESCORT
         self._height = height
@@ -189,8 +197,13 @@ class Pilot:
                 calls += self._call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
         if not self.waiting_for and view.own is not None and view.local is not None:
             self._ground = float(view.own.position[2])
+            self._flying_already = self._armed and self._landed_state == IN_AIR
             self.phase = Phase.PREPARE
         return calls
+
+    @property
+    def _armed(self) -> bool:
+        return self._heartbeat is not None and bool(self._heartbeat.base_mode & ARMED)
 
     def _missing(self, view: View) -> str:
         if self._heartbeat is None:
@@ -203,6 +216,9 @@ class Pilot:
             return "LOCAL_POSITION_NED"
         if view.yaw is None:
             return "ATTITUDE"
+        if self._armed and self._landed_state is None:
+            # Armed: a vehicle that may be flying must not be told to take off.
+            return "EXTENDED_SYS_STATE"
         if self._status is None or not self._status.health & PREARM_OK:
             return "the autopilot's pre-arm checks"
         if self._height is None:
@@ -227,7 +243,8 @@ class Pilot:
             call = self._call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
         else:
             climbed = float(view.own.position[2]) - self._ground
-            done = abs(climbed - height) < 0.3 and float(abs(view.own.velocity).max()) < 0.3
+            still = float(abs(view.own.velocity).max()) < 0.3
+            done = self._flying_already or (still and abs(climbed - height) < 0.3)
             above_sea = self._origin_altitude + self._ground + height
             altitude = above_sea if profile.takeoff_absolute else height
             call = self._call(now, NAV_TAKEOFF, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude))

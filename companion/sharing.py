@@ -37,6 +37,11 @@ class Sharing:
         self._boot: int | None = None
         self._next = [0, 0, 0]
 
+    @property
+    def next_due(self) -> int:
+        """When (µs) there is something to share again."""
+        return min(self._next)
+
     def due(self, now: int, view: View, horizon: Horizon | None) -> Shared:
         """What is due at ``now`` (µs). Without a flown ``horizon`` none is shared."""
         if self._boot is None:

@@ -1,35 +1,38 @@
-"""One moving thing as seen through its messages: a filterpy Kalman filter with age, a gate and bounded
-extrapolation.
+"""One moving thing as seen through its messages: dated by its sender's clock, filtered, gated, and carried on
+for a bounded time.
 
-State [p, v] (6,), fleet-local ENU, SI; constant velocity with white acceleration; every measurement is
-position and velocity, as GLOBAL_POSITION_INT and LOCAL_POSITION_NED carry both.
+``timing`` says when a measurement was true, ``rewind`` puts it in its place, ``estimator`` makes the belief.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+import math
 from typing import NamedTuple
 
 import numpy as np
-from filterpy.common import Q_continuous_white_noise
-from filterpy.kalman import KalmanFilter
 
 from companion.config import TrackConfig
+from companion.estimator import Belief, Estimator
+from companion.gains import model
 from companion.horizon import Array
+from companion.rewind import Rewind
+from companion.timing import SenderClock
 
-_WITNESSES = 2
-"""Consecutive measurements that agree with each other before a jump is believed."""
 _FAR, _FAST = 1e5, 100.0
 """m and m/s; beyond these a state is garbage, soundly framed though it may be."""
 
 
 class State(NamedTuple):
-    """Position (3,), velocity (3,), fleet-local ENU; ``age`` µs since the last accepted measurement was
-    true."""
+    """Position (3,), velocity (3,), fleet-local ENU; ``age`` µs since the last accepted measurement was true.
+
+    ``sigma``: standard deviation of the position on each axis, m. It grows with the age without bound, and is
+    infinite where nobody says.
+    """
 
     position: Array
     velocity: Array
     age: int
+    sigma: float = math.inf
 
 
 class Track:
@@ -37,97 +40,79 @@ class Track:
 
     def __init__(self, config: TrackConfig) -> None:
         self._config = config
-        self._filter = KalmanFilter(dim_x=6, dim_z=6)
-        self._filter.H = np.eye(6)
-        self._filter.R = np.diag([config.sigma_position**2] * 3 + [config.sigma_velocity**2] * 3)
-        self._time: int | None = None
-        self._doubt: list[Array] = []
-        self.rejected = 0
+        self._clock = SenderClock(config.delay_us, config.rewind_us)
+        self._rewind = Rewind(Estimator(config), config.rewind_us)
+        self._absurd = self._undated = 0
 
     @property
     def time(self) -> int | None:
         """When the last accepted measurement was true, µs; None before the first."""
-        return self._time
+        belief = self._rewind.belief
+        return None if belief is None else belief.time + self._clock.skew
 
-    def measure(self, received: int, position: Array, velocity: Array) -> bool:
-        """Take a measurement that arrived at ``received`` (µs); whether it was accepted.
+    @property
+    def rejected(self) -> int:
+        """Measurements that came to nothing: absurd, not to be dated, too late, or refused by the gate."""
+        belief = self._rewind.belief
+        refused = 0 if belief is None else belief.refused
+        return self._absurd + self._undated + self._rewind.too_late + refused
 
-        One that lies more than ``jump`` metres from the prediction, or would in a second, needs a second
-        witness near it: a teleport of one message is noise, a persistent one is real and starts the track
-        anew. Late ones (older than the state) and absurd ones are rejected.
+    def measure(self, received: int, position: Array, velocity: Array, stamp: int = 0) -> bool:
+        """Take a measurement that arrived at ``received`` (µs) and left with ``stamp`` (µs of the sender's
+        clock, 0 for none); whether it was accepted.
+
+        Position (3,) m, velocity (3,) m/s, fleet-local ENU as the message has it: the sign of a sender that
+        counts its vertical speed upwards is put right here. A late one is taken in its place as long as
+        ``rewind_us`` reaches; a duplicate changes nothing.
         """
-        if not (position @ position <= _FAR**2 and velocity @ velocity <= _FAST**2):
-            self.rejected += 1
+        a, b, c = position.tolist()
+        d, e, f = velocity.tolist()
+        if not (a * a + b * b + c * c <= _FAR**2 and d * d + e * e + f * f <= _FAST**2):
+            self._absurd += 1
             return False
-        time = received - self._config.delay_us
-        z = np.concatenate([position, velocity])
-        if self._time is None:
-            self._start(time, z)
-            return True
-        if time < self._time:
-            self.rejected += 1
+        dated = self._clock.date(received, stamp if self._config.stamps else 0)
+        if dated is None:
+            self._undated += 1
             return False
-        off, turn = (z - np.concatenate(self._extrapolate(time))).reshape(2, 3)
-        if max(float(off @ off), float(turn @ turn)) > self._config.jump**2:
-            return self._witness(time, z)
-        self._doubt.clear()
-        if time > self._time:
-            dt = (time - self._time) * 1e-6
-            self._filter.predict(F=_transition(dt), Q=_noise(dt, self._config.sigma_acceleration))
-        self._filter.update(z)
-        self._time = time
-        return True
+        return self._rewind.put(dated, (a, b, c, d, e, -f if self._config.velocity_up else f))
 
     def at(self, now: int) -> State | None:
         """The state carried to ``now``, at most ``extrapolate_us`` far, where it then rests; None before the
         first measurement."""
-        if self._time is None:
+        belief = self._rewind.belief
+        if belief is None:
             return None
-        position, velocity = self._extrapolate(now)
-        return State(position, velocity, now - self._time)
+        age = now - self._clock.skew - belief.time
+        most = self._config.extrapolate_us
+        dt = 1e-6 * min(max(age, 0), most)
+        a, b, c, d, e, f = belief.x
+        position = np.array((a + dt * d, b + dt * e, c + dt * f))
+        velocity = np.array((d, e, f)) if age <= most else np.zeros(3)
+        return State(position, velocity, age, self._sigma(belief, age))
 
     @property
     def last(self) -> Array:
-        """Position and velocity (6,) at the last accepted measurement."""
-        state: Array = self._filter.x
-        return state
+        """Position and velocity (6,) at the last accepted measurement; ValueError before the first."""
+        return np.array(self._known().x)
 
-    def covariance(self) -> Array:
-        """Covariance (6, 6) at the last measurement."""
-        return np.array(self._filter.P)
+    def covariance(self, now: int | None = None) -> Array:
+        """Covariance (6, 6) of position and velocity at ``now`` (µs), or at the last measurement; ValueError
+        before the first."""
+        belief = self._known()
+        P = np.array(belief.P).reshape(2, 2)
+        age = 0 if now is None else now - self._clock.skew - belief.time
+        if age > 0:
+            F, Q = model(age, self._config.sigma_acceleration)
+            P = F @ P @ F.T + Q
+        return np.asarray(np.kron(P, np.eye(3)), dtype=np.float64)
 
-    def _extrapolate(self, time: int) -> tuple[Array, Array]:
-        since = time - (self._time if self._time is not None else time)
-        dt = min(max(since, 0), self._config.extrapolate_us) * 1e-6
-        x = self._filter.x
-        moving = since <= self._config.extrapolate_us
-        return x[:3] + dt * x[3:], x[3:].copy() if moving else np.zeros(3)
+    def _sigma(self, belief: Belief, age: int) -> float:
+        p, c, _, v = belief.P
+        dt = 1e-6 * max(age, 0)
+        grown = self._config.sigma_acceleration**2 * dt**3 / 3.0
+        return math.sqrt(p + dt * (2.0 * c + dt * v) + grown)
 
-    def _start(self, time: int, z: Array) -> None:
-        self._filter.x = z.copy()
-        self._filter.P = np.array(self._filter.R)
-        self._time = time
-        self._doubt.clear()
-
-    def _witness(self, time: int, z: Array) -> bool:
-        self._doubt = [d for d in self._doubt if np.linalg.norm(d[:3] - z[:3]) <= self._config.jump]
-        self._doubt.append(z)
-        if len(self._doubt) < _WITNESSES:
-            self.rejected += 1
-            return False
-        self._start(time, z)
-        return True
-
-
-@lru_cache(maxsize=512)
-def _transition(dt: float) -> Array:
-    F = np.eye(6)
-    F[:3, 3:] = dt * np.eye(3)
-    return F
-
-
-@lru_cache(maxsize=512)
-def _noise(dt: float, sigma: float) -> Array:
-    """Q of the white-acceleration model; ``Q_continuous_white_noise`` takes the spectral density σ²·(1 s)."""
-    block = Q_continuous_white_noise(dim=2, dt=dt, spectral_density=sigma**2)
-    return np.kron(block, np.eye(3))
+    def _known(self) -> Belief:
+        if self._rewind.belief is None:
+            raise ValueError("nothing has been heard yet: there is no state")
+        return self._rewind.belief

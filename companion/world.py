@@ -11,6 +11,7 @@ from companion.config import CompanionConfig
 from companion.forces import Obstacles
 from companion.horizon import Array
 from companion.neighbours import Neighbours
+from companion.obstacles import FixedObstacles
 from companion.tracks import State, Track
 from mavlink_bridge.frames import FleetFrame, LocalFrame, ned_to_enu
 from mavlink_bridge.messages import (
@@ -35,6 +36,14 @@ class View(NamedTuple):
     local: LocalFrame | None
 
 
+def reach(config: CompanionConfig) -> float:
+    """How far from the own horizon (m) something can be and still act: the field and the band, both grown for
+    closing at v_max."""
+    field, band, speed = config.field, config.tangential, max(config.limits.v_max)
+    stopping = 0.0 if field.braking is None else speed**2 / (2.0 * field.braking)
+    return field.d_safe + max(stopping, band.d_band + band.reach_s * speed)
+
+
 class World:
     """Gathers messages by link; answers with a view at any later time."""
 
@@ -46,6 +55,8 @@ class World:
         self._target_system = target_system
         self._own = Track(config.own)
         self._target = Track(config.target)
+        self._fixed = FixedObstacles(config.obstacles)
+        self._reach = reach(config)
         self._local: LocalFrame | None = None
         self._origin: tuple[float, float, float] | None = None
         self._yaw: float | None = None
@@ -70,20 +81,29 @@ class World:
             target = None
         return View(self._own.at(now), self._yaw, target, self._local)
 
-    def obstacles(self, now: int, view: View) -> Obstacles:
-        """Neighbours, and the target where it is one, aligned with ``now + n·dt``."""
+    def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
+        """Neighbours, the target where it is one, and what stands near the own ``prediction`` (N + 1, 3),
+        aligned with ``now + n·dt``."""
         obstacles = self.neighbours.obstacles(now)
         config = self.config
-        if view.target is None or config.target_d_min is None or config.target_d_safe is None:
-            return obstacles
-        ahead = 1e-6 * config.horizon.dt_us * np.arange(config.horizon.steps + 1)
-        moving = view.target.position + ahead[:, None] * view.target.velocity
-        return Obstacles(
-            (*obstacles.ids, self._target_system),
-            np.concatenate([obstacles.positions, moving[None]]),
-            np.append(obstacles.d_min, config.target_d_min),
-            np.append(obstacles.d_safe, config.target_d_safe),
-        )
+        if view.target is not None and config.target_d_min is not None and config.target_d_safe is not None:
+            ahead = 1e-6 * config.horizon.dt_us * np.arange(config.horizon.steps + 1)
+            moving = view.target.position + ahead[:, None] * view.target.velocity
+            obstacles = obstacles.joined(
+                Obstacles(
+                    (self._target_system,),
+                    moving[None],
+                    np.array([config.target_d_min]),
+                    np.array([config.target_d_safe]),
+                )
+            )
+        if len(self._fixed):
+            ids, positions, radius = self._fixed.around(prediction, self._reach)
+            field = config.field
+            obstacles = obstacles.joined(
+                Obstacles(ids, positions, field.d_min + radius, field.d_safe + radius, radius)
+            )
+        return obstacles
 
     def _hear_own(self, now: int, message: Message) -> None:
         if isinstance(message, LocalPosition):
@@ -92,6 +112,7 @@ class World:
                     now,
                     self._local.position_to_fleet(message.position_ned),
                     self._local.velocity_to_fleet(message.velocity_ned),
+                    message.time_boot,
                 )
         elif isinstance(message, Attitude):
             if self._local is not None:
@@ -108,7 +129,4 @@ class World:
         if message.source.system != self._target_system:
             return
         position = self.fleet.to_enu(message.latitude, message.longitude, message.altitude)
-        velocity: Array = ned_to_enu(message.velocity_ned)
-        if self.config.target.velocity_up:
-            velocity[2] = -velocity[2]
-        self._target.measure(now, position, velocity)
+        self._target.measure(now, position, ned_to_enu(message.velocity_ned), message.time_boot)

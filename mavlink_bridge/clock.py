@@ -6,6 +6,8 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
+from mavlink_bridge.node_clock import NodeClock
+
 
 class Clock(Protocol):
     """Time in integer µs that never decreases."""
@@ -36,16 +38,39 @@ class SimulatedClock:
 
 class WallClock:
     """Unix time in µs, read once; from then on it runs on the monotonic clock, so that no correction of the
-    host's time makes it jump."""
+    host's time makes it jump.
 
-    def __init__(self) -> None:
-        self._offset = time.time_ns() - time.monotonic_ns()
+    ``offset_ns`` of another WallClock of this host makes the two agree exactly, across processes too: the
+    monotonic clock is the same for all. Time 0 may be put elsewhere with an ``offset_ns`` of one's own.
+    """
+
+    def __init__(self, offset_ns: int | None = None) -> None:
+        self.offset_ns = time.time_ns() - time.monotonic_ns() if offset_ns is None else offset_ns
+        """This clock minus the monotonic clock, ns."""
 
     def now(self) -> int:
         """Unix time, µs."""
-        return (time.monotonic_ns() + self._offset) // 1000
+        return (time.monotonic_ns() + self.offset_ns) // 1000
 
     def wait_until(self, instant: int) -> None:
-        """Sleep until ``instant`` (Unix µs)."""
+        """Sleep until ``instant`` (Unix µs), never spinning: on a shared machine that would be others' time.
+
+        ``time.sleep`` waits for an absolute instant, so that the time spent before it begins is no delay.
+        """
         while (left := instant - self.now()) > 0:
             time.sleep(left * 1e-6)
+
+
+class SkewedClock:
+    """The clock of a computer that is wrong: ``skew`` of what the true ``clock`` shows."""
+
+    def __init__(self, clock: Clock, skew: NodeClock) -> None:
+        self._clock, self._skew = clock, skew
+
+    def now(self) -> int:
+        """What it shows, µs."""
+        return self._skew.reading(self._clock.now())
+
+    def wait_until(self, instant: int) -> None:
+        """Until it shows ``instant`` (µs)."""
+        self._clock.wait_until(self._skew.instant(instant))

@@ -22,3 +22,11 @@ class ScheduleError(BridgeError):
 
 class PlanWireError(BridgeError):
     """A plan that does not fit into 128 bytes, or bytes that are not a plan."""
+
+
+class EndpointError(BridgeError):
+    """A text that names no endpoint: what is wrong with it, and what is allowed."""
+
+
+class LinkError(BridgeError):
+    """An endpoint cannot be opened: a host without address, a port in use, a device that is not there."""

@@ -1,61 +1,30 @@
 """The in-memory link: broadcast channels with seeded delay, loss, duplication, reordering and partitions.
 
 Every path (channel, sender, receiver) draws from its own generator, so that a run depends on the seed and on
-names, never on the order in which nodes are listed or stepped.
+names, never on the order in which nodes are listed or stepped; and what is changed on one path changes no
+draw of another.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from heapq import heappop, heappush
 from random import Random
 from typing import NamedTuple
 from zlib import crc32
 
+from mavlink_bridge.channel import Channel, Faults, Partition
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.node import Datagram
 
-
-class Faults(NamedTuple):
-    """What a channel does to each datagram on its way to each receiver, independently.
-
-    ``delay`` µs always, plus up to ``jitter`` µs, uniform; ``loss``, ``duplication``, ``reordering`` are
-    probabilities in 0…1. A reordered datagram waits until one tick after the next one on its path has arrived
-    (and for ever if none follows); jitter that exceeds the spacing of datagrams reorders too.
-    """
-
-    delay: int = 0
-    jitter: int = 0
-    loss: float = 0.0
-    duplication: float = 0.0
-    reordering: float = 0.0
-
-
-class Partition(NamedTuple):
-    """From ``start`` until before ``end`` (µs, time of sending) nothing passes between ``members`` (node
-    names) and the others."""
-
-    start: int
-    end: int
-    members: frozenset[str]
-
-
-class Channel(NamedTuple):
-    """A broadcast domain: what a member sends on its link reaches every other under *their* link's name.
-
-    ``members``: node name → name of its link into this channel.
-    """
-
-    name: str
-    members: Mapping[str, str]
-    faults: Faults = Faults()
-    partitions: tuple[Partition, ...] = ()
+__all__ = ["Channel", "Ether", "EtherCounters", "Faults", "Partition"]
 
 
 class EtherCounters(NamedTuple):
     """Each datagram counts once per receiver: sent + duplicated = delivered + dropped + still under way.
 
-    ``unrouted``: datagrams on a link that no channel carries.
+    ``dropped``: lost, cut off, or found a full buffer; ``unrouted``: datagrams on a link that no channel
+    carries.
     """
 
     sent: int
@@ -66,15 +35,34 @@ class EtherCounters(NamedTuple):
 
 
 _Queue = list[tuple[int, str, int, int, Datagram]]
+_FOREVER = 1 << 63
 
 
 class _Path:
-    """From one sender over one channel to one receiver."""
+    """From one sender over one channel to one receiver. Nothing passes while ``cuts`` (µs, start and end) say
+    so and before ``shut`` (µs)."""
 
-    __slots__ = ("cuts", "faults", "held", "link", "queue", "random")
+    __slots__ = (
+        "channel",
+        "cuts",
+        "faults",
+        "held",
+        "link",
+        "lost",
+        "plain",
+        "queue",
+        "random",
+        "receiver",
+        "sender",
+        "shut",
+        "way",
+    )
 
-    def __init__(self, channel: Channel, sender: str, receiver: str, queue: _Queue, seed: int) -> None:
-        self.faults = channel.faults
+    def __init__(
+        self, channel: Channel, sender: str, receiver: str, queue: _Queue, seed: int, tick: int
+    ) -> None:
+        self.channel, self.sender, self.receiver = channel.name, sender, receiver
+        self.faults = faults = channel.between(sender, receiver)
         self.link = channel.members[receiver]
         self.queue = queue
         self.cuts = [
@@ -82,8 +70,45 @@ class _Path:
             for cut in channel.partitions
             if (sender in cut.members) != (receiver in cut.members)
         ]
-        self.random = Random(crc32(f"{seed}\0{channel.name}\0{sender}\0{receiver}".encode()))
+        self.shut = 0
+        self.random = Random(crc32(f"{seed}\0{channel.name}\0{sender}\0{receiver}".encode())).random
         self.held: tuple[str, int, int, Datagram] | None = None
+        self.lost: bool | None = None
+        self.way = max(faults.delay, tick)
+        # Neither chance nor calendar: what most datagrams of most runs go through.
+        self.plain = not self.cuts and not any(
+            (faults.jitter, faults.loss, faults.duplication, faults.reordering)
+        )
+
+    def loses(self) -> bool:
+        """Whether the next datagram is lost. One draw, or none if nothing ever is."""
+        faults = self.faults
+        if not faults.loss:
+            return False
+        share = faults.loss
+        if self.lost is not None:
+            share = faults.loss_after_loss if self.lost else faults.loss_after_passing
+        self.lost = self.random() < share
+        return self.lost
+
+
+class _Cut(NamedTuple):
+    """Made while running, in force since then."""
+
+    channel: str | None
+    members: frozenset[str]
+    until: int
+
+    def parts(self, path: _Path) -> bool:
+        inside = (path.sender in self.members) != (path.receiver in self.members)
+        return inside and self.channel in (None, path.channel)
+
+
+class _Buffer(NamedTuple):
+    """What waits for a node that does not read, ``room`` datagrams at most."""
+
+    room: int
+    waiting: list[Datagram]
 
 
 class Ether:
@@ -98,19 +123,21 @@ class Ether:
         self._queues: dict[str, _Queue] = {}
         self._paths: dict[tuple[str, str], list[list[_Path]]] = {}
         self._sequences: dict[str, int] = {}
+        self._buffers: dict[str, _Buffer] = {}
+        self._cuts: list[_Cut] = []
         self._sent = self._delivered = self._dropped = self._duplicated = self._unrouted = 0
-        names: set[str] = set()
+        self._names: set[str] = set()
         for channel in sorted(channels, key=lambda channel: channel.name):
-            _check(channel)
-            if channel.name in names:
+            channel.check()
+            if channel.name in self._names:
                 raise BridgeError(f"two channels are named {channel.name!r}")
-            names.add(channel.name)
+            self._names.add(channel.name)
             for sender, link in channel.members.items():
                 self._queues.setdefault(sender, [])
                 self._sequences.setdefault(sender, 0)
                 self._paths.setdefault((sender, link), []).append(
                     [
-                        _Path(channel, sender, receiver, self._queues.setdefault(receiver, []), seed)
+                        _Path(channel, sender, receiver, self._queues.setdefault(receiver, []), seed, tick)
                         for receiver in channel.members
                         if receiver != sender
                     ]
@@ -123,9 +150,10 @@ class Ether:
 
     @property
     def under_way(self) -> int:
-        """How many are queued or held back at present."""
-        held = sum(path.held is not None for ways in self._paths.values() for way in ways for path in way)
-        return held + sum(map(len, self._queues.values()))
+        """How many are queued, held back or waiting for a node at present."""
+        held = sum(path.held is not None for path in self._all_paths())
+        waiting = sum(len(buffer.waiting) for buffer in self._buffers.values())
+        return held + waiting + sum(map(len, self._queues.values()))
 
     def send(self, now: int, sender: str, datagrams: Iterable[Datagram]) -> None:
         """Put what ``sender`` emits at ``now`` (µs) on its way."""
@@ -139,24 +167,80 @@ class Ether:
                 self._sequences[sender] = number + 1
                 self._sent += len(paths)
                 for path in paths:
-                    self._carry(now, sender, number, path, data)
+                    if path.plain and now >= path.shut:
+                        arrival = (now + path.way, sender, number, 1, Datagram(path.link, data))
+                        heappush(path.queue, arrival)
+                    else:
+                        self._carry(now, number, path, data)
 
     def receive(self, now: int, node: str) -> list[Datagram]:
         """What has reached ``node`` by ``now`` (µs) and is new, by arrival time, sender, order of sending."""
-        queue = self._queues.get(node)
-        arrived: list[Datagram] = []
-        if queue is None:
-            return arrived
-        while queue and queue[0][0] <= now:
-            arrived.append(heappop(queue)[4])
+        if node in self._buffers:
+            self.keep(now, node, self._buffers[node].room)
+            arrived = self._buffers.pop(node).waiting
+        else:
+            queue = self._queues.get(node)
+            if not queue or queue[0][0] > now:
+                return []
+            arrived = self._arrivals(now, node)
         self._delivered += len(arrived)
         return arrived
 
-    def _carry(self, now: int, sender: str, number: int, path: _Path, data: bytes) -> None:
-        delay, jitter, loss, duplication, reordering = path.faults
-        random = path.random.random
+    def keep(self, now: int, node: str, room: int) -> None:
+        """``node`` does not read at ``now`` (µs): what has reached it waits for the next ``receive`` in a
+        buffer of ``room`` datagrams. What finds it full is dropped, as by a socket: the newest."""
+        waiting = self._buffers[node].waiting if node in self._buffers else []
+        waiting += self._arrivals(now, node)
+        self._dropped += max(len(waiting) - room, 0)
+        del waiting[room:]
+        self._buffers[node] = _Buffer(room, waiting)
+
+    def cut(self, channel: str | None, members: Iterable[str], until: int | None = None) -> None:
+        """From now on and until before ``until`` (µs, time of sending; None: until healed) nothing passes
+        between ``members`` and the others on ``channel`` (None: on any). What is under way arrives.
+
+        Raises BridgeError for a channel or a member that does not exist.
+        """
+        inside = frozenset(members)
+        if channel is not None and channel not in self._names:
+            raise BridgeError(f"no channel is named {channel!r}; there are {', '.join(sorted(self._names))}")
+        for name in sorted(inside - self._queues.keys()):
+            raise BridgeError(f"no node is named {name!r}; there are {', '.join(sorted(self._queues))}")
+        self._cuts.append(_Cut(channel, inside, _FOREVER if until is None else until))
+        self._shut()
+
+    def heal(self, channel: str | None = None, members: Iterable[str] | None = None) -> None:
+        """End the cuts that were made for ``channel`` and ``members``; None fits every cut. The partitions of
+        a channel's own calendar stay."""
+        inside = None if members is None else frozenset(members)
+        self._cuts = [
+            cut
+            for cut in self._cuts
+            if (channel is not None and cut.channel != channel)
+            or (inside is not None and cut.members != inside)
+        ]
+        self._shut()
+
+    def _all_paths(self) -> Iterable[_Path]:
+        return (path for ways in self._paths.values() for way in ways for path in way)
+
+    def _shut(self) -> None:
+        for path in self._all_paths():
+            path.shut = max((cut.until for cut in self._cuts if cut.parts(path)), default=0)
+
+    def _arrivals(self, now: int, node: str) -> list[Datagram]:
+        queue = self._queues.get(node)
+        arrived: list[Datagram] = []
+        while queue and queue[0][0] <= now:
+            arrived.append(heappop(queue)[4])
+        return arrived
+
+    def _carry(self, now: int, number: int, path: _Path, data: bytes) -> None:
+        _, jitter, _, duplication, reordering, _ = path.faults
+        random = path.random
         # A fault of zero draws nothing: a clean link costs no random numbers.
-        if (path.cuts and any(start <= now < end for start, end in path.cuts)) or (loss and random() < loss):
+        cut = now < path.shut or any(start <= now < end for start, end in path.cuts)
+        if cut or path.loses():
             self._dropped += 1
             return
         datagram = Datagram(path.link, data)
@@ -165,24 +249,14 @@ class Ether:
             copies = 2
             self._duplicated += 1
         if reordering and random() < reordering and path.held is None:
-            path.held = (sender, number, 0, datagram)
+            path.held = (path.sender, number, 0, datagram)
             copies -= 1
             if not copies:
                 return
         for copy in range(copies):
-            way = delay + int(random() * (jitter + 1)) if jitter else delay
+            way = path.faults.delay + int(random() * (jitter + 1)) if jitter else path.way
             arrival = now + max(way, self._tick)
-            heappush(path.queue, (arrival, sender, number, copy + 1, datagram))
+            heappush(path.queue, (arrival, path.sender, number, copy + 1, datagram))
         if path.held is not None and path.held[1] != number:
             heappush(path.queue, (arrival + self._tick, *path.held))
             path.held = None
-
-
-def _check(channel: Channel) -> None:
-    faults = channel.faults
-    for name in ("delay", "jitter"):
-        if getattr(faults, name) < 0:
-            raise BridgeError(f"channel {channel.name!r}: {name} = {getattr(faults, name)} µs is negative")
-    for name in ("loss", "duplication", "reordering"):
-        if not 0 <= getattr(faults, name) <= 1:
-            raise BridgeError(f"channel {channel.name!r}: {name} = {getattr(faults, name)} is not in 0…1")

@@ -8,7 +8,9 @@ left out. The checksum is CRC-16/MCRF4XX over all that follows the start byte, a
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from enum import Enum
+from functools import lru_cache
 from struct import Struct
 from typing import NamedTuple
 
@@ -16,6 +18,7 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 START_V1, START_V2 = 0xFE, 0xFD
+_DATAGRAM = 2048
 LONGEST_FRAME = 280  # version 2: 10 header, 255 payload, 2 checksum, 13 signature
 SIGNATURE_LENGTH = 13
 SIGNED_FLAG = 0x01
@@ -98,6 +101,30 @@ def frame_at(data: bytes, start: int) -> Frame | Flaw:
     )
 
 
+@lru_cache(maxsize=2048)
+def _leading(data: bytes) -> tuple[tuple[Frame, ...], int]:
+    frames: list[Frame] = []
+    at = 0
+    while True:
+        frame = frame_at(data, at)
+        if isinstance(frame, Flaw) or not frame.known:
+            return tuple(frames), at
+        frames.append(frame)
+        at += len(frame.data)
+
+
+def leading_frames(data: bytes) -> tuple[tuple[Frame, ...], int]:
+    """The frames of known messages with a good checksum that ``data`` begins with, one right behind the
+    other, and where they end: of a datagram, as a rule, all that it holds.
+
+    Short data is remembered for a while: in one process a datagram is read by every receiver and once more
+    for every log, and what its frames are depends on nothing but its bytes.
+    """
+    # A bytearray may change, and may not be hashed.
+    short = type(data) is bytes and len(data) <= _DATAGRAM
+    return _leading(data) if short else _leading.__wrapped__(data)
+
+
 def claimed_length(data: bytes, start: int) -> int | None:
     """Length that the frame at ``data[start]`` claims, verified or not; None if it claims none."""
     mark = data[start : start + 1]
@@ -149,13 +176,20 @@ class Framer:
         """Bytes kept for the next call."""
         return len(self._rest)
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> Sequence[Frame]:
         """The frames with a good checksum that ``data`` completes."""
         if self._rest:
             data = self._rest + data
+        frames, at = leading_frames(data)
+        if at == len(data):
+            self._rest = b""
+            self.frames += len(frames)
+            return frames
+        return self._search(data, at, list(frames))
+
+    def _search(self, data: bytes, at: int, found: list[Frame]) -> list[Frame]:
+        """``found`` and the frames of ``data`` from ``at`` on, where something is wrong."""
         size = len(data)
-        found: list[Frame] = []
-        at = 0
         while at < size:
             frame = frame_at(data, at)
             if frame is Flaw.PARTIAL:

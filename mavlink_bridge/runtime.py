@@ -1,5 +1,5 @@
 """The loop that runs nodes in lock-step under simulated time: one process, bit-identical whatever the order
-of the nodes."""
+of the nodes. Each node may live by a clock of its own, hang for a while, or vanish."""
 
 from __future__ import annotations
 
@@ -11,64 +11,86 @@ from typing import Literal, NamedTuple, Protocol
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.ether import Ether
 from mavlink_bridge.node import Datagram, Node
+from mavlink_bridge.node_clock import QUANTUM, NodeClock
+from mavlink_bridge.slot import Slot
+
+__all__ = ["BUFFER", "QUANTUM", "Direction", "LockStep", "Scheduled", "Tap"]
 
 Direction = Literal["in", "out"]
 
-QUANTUM = 4
-"""µs; the two low bits of a tlog's time stamp carry the link."""
+BUFFER = 256
+"""Datagrams that wait for a node that hangs; about what a UDP socket holds by default on Linux."""
 
 
 class Scheduled(NamedTuple):
-    """``node`` is due at ``phase`` + k ``period`` (µs, k = 0, 1, …)."""
+    """``node`` is due whenever its clock shows ``phase`` + k ``period`` (µs, k an integer), for the first
+    time not before the true time ``phase``, and is told the time that its clock shows.
+
+    Without a ``clock`` that is true time: due at ``phase``, ``phase`` + ``period``, …
+    """
 
     node: Node
     period: int
     phase: int = 0
+    clock: NodeClock | None = None
 
 
 class Tap(Protocol):
     """Sees every datagram as it enters (``in``) or leaves (``out``) a node; must not change anything."""
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        """At ``now`` µs."""
+        """At ``now`` µs, the time that the node is told; true time is the loop's ``now``."""
         ...
 
 
 class LockStep:
-    """Runs ``scheduled`` nodes over ``ether``. All times are µs and whole multiples of ``base_tick``, which
-    is one of 4 µs.
+    """Runs ``scheduled`` nodes over ``ether``. All times are µs; periods and phases are whole multiples of
+    ``base_tick``, which is one of 4 µs. For a node that hangs ``buffer`` datagrams wait.
 
     Within a tick all due nodes first receive, then all step, then everything is sent: no node sees another's
-    output of the same tick. Raises ScheduleError for periods or phases off the grid and for names used twice.
+    output of the same tick. A node whose clock is not true is due at the first tick at which its clock shows
+    the deadline or more, so that its calls wander against the others'; a tick calls it once at most.
+
+    Raises ScheduleError for periods or phases off the grid, for names used twice, and for a clock that shows
+    a negative time.
     """
 
     def __init__(
-        self, scheduled: Iterable[Scheduled], ether: Ether, base_tick: int, taps: Sequence[Tap] = ()
+        self,
+        scheduled: Iterable[Scheduled],
+        ether: Ether,
+        base_tick: int,
+        taps: Sequence[Tap] = (),
+        buffer: int = BUFFER,
     ) -> None:
-        self._scheduled = sorted(scheduled, key=lambda entry: entry.node.name)
+        entries = sorted(scheduled, key=lambda entry: entry.node.name)
         self._ether = ether
         self._taps = tuple(taps)
+        self._buffer = buffer
         self._now = 0
         if base_tick <= 0 or base_tick % QUANTUM:
             raise ScheduleError(f"base tick = {base_tick} µs is not a positive multiple of {QUANTUM} µs")
-        for node, period, phase in self._scheduled:
+        for node, period, phase, _ in entries:
             if period <= 0 or period % base_tick:
                 raise ScheduleError(
                     f"{node.name}: period = {period} µs is not a positive multiple of {base_tick} µs"
                 )
             if phase < 0 or phase % base_tick:
                 raise ScheduleError(f"{node.name}: phase = {phase} µs is not a multiple of {base_tick} µs")
-        names = [entry.node.name for entry in self._scheduled]
-        for name, following in pairwise(names):
-            if name == following:
-                raise ScheduleError(f"two nodes are named {name!r}")
+        for one, following in pairwise(entries):
+            if one.node.name == following.node.name:
+                raise ScheduleError(f"two nodes are named {one.node.name!r}")
+        self._slots = [Slot(*entry, base_tick) for entry in entries]
+        # Rooms of the buffers of those that hang.
+        self._hanging: dict[str, int] = {}
+        self._vanished: set[str] = set()
         # The index breaks ties by name, so that taps are called in one order whatever the order given.
-        self._due = [(entry.phase, index) for index, entry in enumerate(self._scheduled)]
+        self._due = [(slot.first(), index) for index, slot in enumerate(self._slots)]
         heapify(self._due)
 
     @property
     def now(self) -> int:
-        """Every tick before this instant (µs) has been run."""
+        """Every tick before this instant (µs, true time) has been run."""
         return self._now
 
     def run(self, until: int, on_tick: Callable[[int], bool | None] | None = None) -> None:
@@ -79,33 +101,91 @@ class LockStep:
         """
         due = self._due
         while due and due[0][0] < until:
-            now = due[0][0]
+            now = self._now = due[0][0]
             self._tick(now, self._pop_due(now))
             self._now = now + 1
             if on_tick is not None and on_tick(now):
                 return
         self._now = max(self._now, until)
 
-    def _pop_due(self, now: int) -> list[Node]:
-        nodes = []
-        while self._due[0][0] == now:
-            index = self._due[0][1]
-            node, period, _ = self._scheduled[index]
-            heapreplace(self._due, (now + period, index))
-            nodes.append(node)
-        return nodes
+    def freeze(self, name: str) -> None:
+        """Node ``name`` hangs from now on: it is not stepped, and what arrives for it waits in its buffer;
+        when that is full, the newest is dropped. Its clock goes on."""
+        self._index_of(name)
+        self._hanging.setdefault(name, self._buffer)
 
-    def _tick(self, now: int, nodes: list[Node]) -> None:
+    def thaw(self, name: str) -> None:
+        """Node ``name`` goes on at its next deadline with all that waited; those that passed are not made up
+        for. Raises ScheduleError if it has vanished."""
+        self._index_of(name)
+        if name in self._vanished:
+            raise ScheduleError(f"{name}: has vanished and cannot be thawed")
+        self._hanging.pop(name, None)
+
+    def vanish(self, name: str) -> None:
+        """Node ``name`` is never stepped again; what waits or arrives for it is dropped."""
+        self._index_of(name)
+        self._hanging[name] = 0
+        self._vanished.add(name)
+
+    def set_clock(self, name: str, offset: int, drift_ppm: float = 0.0) -> None:
+        """From now on the clock of node ``name`` is ``offset`` µs off true time (negative: late) and runs
+        ``drift_ppm`` fast.
+
+        The node is due again at the first phase + k period (k an integer) that the clock then comes to, so
+        within a period. Node time never decreases: after a step back the node is called on, but told a time
+        that stands almost still, 4 µs more each call, until its clock has caught up.
+
+        Raises ScheduleError for a drift that no clock has and for a clock that shows a negative time.
+        """
+        index = self._index_of(name)
+        due = self._slots[index].set_clock(self._now, offset, drift_ppm)
+        # In place: a run that is under way goes on with it.
+        self._due[:] = [(due if of == index else instant, of) for instant, of in self._due]
+        heapify(self._due)
+
+    def _index_of(self, name: str) -> int:
+        names = [slot.name for slot in self._slots]
+        if name not in names:
+            raise ScheduleError(f"no node is named {name!r}; there are {', '.join(names)}")
+        return names.index(name)
+
+    def _pop_due(self, now: int) -> list[Slot]:
+        due, slots = self._due, []
+        while due[0][0] == now:
+            index = due[0][1]
+            slot = self._slots[index]
+            heapreplace(due, (slot.after(now), index))
+            slots.append(slot)
+        return slots
+
+    def _tick(self, now: int, slots: list[Slot]) -> None:
         ether = self._ether
-        inboxes = [ether.receive(now, node.name) for node in nodes]
-        self._show(now, "in", nodes, inboxes)
-        outboxes = [node.step(now, inbox) for node, inbox in zip(nodes, inboxes, strict=True)]
-        self._show(now, "out", nodes, outboxes)
-        for node, outbox in zip(nodes, outboxes, strict=True):
-            ether.send(now, node.name, outbox)
+        if self._hanging:
+            slots = self._awake(now, slots)
+        times = [slot.told(now) for slot in slots]
+        inboxes = [ether.receive(now, slot.name) for slot in slots]
+        if self._taps:
+            self._show(times, slots, "in", inboxes)
+        outboxes = [slot.step(time, inbox) for slot, time, inbox in zip(slots, times, inboxes, strict=True)]
+        if self._taps:
+            self._show(times, slots, "out", outboxes)
+        for slot, outbox in zip(slots, outboxes, strict=True):
+            if outbox:
+                ether.send(now, slot.name, outbox)
 
-    def _show(self, now: int, direction: Direction, nodes: list[Node], boxes: list[list[Datagram]]) -> None:
+    def _awake(self, now: int, slots: list[Slot]) -> list[Slot]:
+        """Those of ``slots`` that do not hang; the others let wait what has arrived."""
+        for slot in slots:
+            room = self._hanging.get(slot.name)
+            if room is not None:
+                self._ether.keep(now, slot.name, room)
+        return [slot for slot in slots if slot.name not in self._hanging]
+
+    def _show(
+        self, times: list[int], slots: list[Slot], direction: Direction, boxes: list[list[Datagram]]
+    ) -> None:
         for tap in self._taps:
-            for node, box in zip(nodes, boxes, strict=True):
+            for time, slot, box in zip(times, slots, boxes, strict=True):
                 for datagram in box:
-                    tap(now, node.name, direction, datagram)
+                    tap(time, slot.name, direction, datagram)

@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.framing import LONGEST_FRAME, STARTS, Flaw, claimed_length, frame_at
+from mavlink_bridge.framing import LONGEST_FRAME, STARTS, Flaw, claimed_length, frame_at, leading_frames
 
 LINKS = 4
 PLAUSIBLE_JUMP = 86_400_000_000
@@ -92,7 +92,9 @@ class TlogWriter:
             raise LogError(f"time {time_us} µs, link {link}: not in a tlog's range")
         stamp = _STAMP.pack(time_us & ~3 | link)
         target = self._file if self._gzip is None else self._gzip
-        at = 0
+        frames, at = leading_frames(data)
+        target.write(b"".join([stamp + frame.data for frame in frames]))
+        self.records += len(frames)
         while at < len(data):
             frame = frame_at(data, at)
             if isinstance(frame, Flaw) or not (frame.known or _goes_on(data, at + len(frame.data))):

@@ -14,6 +14,9 @@ from sitl.environment import GRAVITY
 
 FloatArray = NDArray[np.float64]
 
+_WEIGHTLESS = 1e-3
+"""‖A‖ over weight below which A points nowhere."""
+
 
 class Airframe(NamedTuple):
     """Derived once from a ``VehicleConfig``; n rotors, SI, body axes forward-right-down.
@@ -38,7 +41,9 @@ class Airframe(NamedTuple):
     omega_idle: float  # rad/s
     min_thrust: float  # N, one rotor
     max_thrust: float  # N, one rotor
+    speed_squared: float  # rad²/s² for each N of a rotor
     mixer: FloatArray  # (n, 4) from thrust and moments to rotor thrusts
+    rotor_share: FloatArray  # (n,) total thrust over that of each rotor in hover
     k_x: float  # N/m
     k_v: float  # N s/m
     k_R: FloatArray  # (3,) N m  # noqa: N815
@@ -51,10 +56,15 @@ class Airframe(NamedTuple):
     cancelled_turning: float  # N m s, what the rotor drag has against a yaw rate
     limits_force: bool
     tan_max_tilt: float
-    max_yaw_error: float  # rad
     cos_max_yaw_error: float
+    sin_max_yaw_error: float
+    weightless: float  # N, ‖A‖ below which A points nowhere
     min_lift: float  # N, all rotors
     max_lift: float  # N, all rotors
+    force_learnt: float  # part of what is not known of a force that the observer learns in a step
+    moment_learnt: float
+    max_disturbance_force: float  # N
+    max_disturbance_moment: FloatArray  # (3,) N m
     rest_height: float  # m
     gear_radius: float  # m
     ground_friction: float
@@ -70,6 +80,7 @@ def airframe(config: VehicleConfig, gravity: float = GRAVITY) -> Airframe:
     max_thrust = config.k_f * config.omega_max**2
     cancelled_speeds = config.drag_feed_forward * math.sqrt(n * weight / config.k_f)
     max_yaw_error = math.pi if config.max_yaw_error_deg is None else math.radians(config.max_yaw_error_deg)
+    mixer = np.asarray(np.linalg.pinv(effectiveness(x, y, spin, config.k_m)), dtype=np.float64)
     return Airframe(
         step=step,
         gravity=gravity,
@@ -88,7 +99,9 @@ def airframe(config: VehicleConfig, gravity: float = GRAVITY) -> Airframe:
         omega_idle=config.omega_idle,
         min_thrust=config.k_f * config.omega_idle**2,
         max_thrust=max_thrust,
-        mixer=np.asarray(np.linalg.pinv(effectiveness(x, y, spin, config.k_m)), dtype=np.float64),
+        speed_squared=1.0 / config.k_f,
+        mixer=mixer,
+        rotor_share=1.0 / mixer[:, 0],
         k_x=config.k_x,
         k_v=config.k_v,
         k_R=np.array(config.k_R),
@@ -101,14 +114,25 @@ def airframe(config: VehicleConfig, gravity: float = GRAVITY) -> Airframe:
         cancelled_turning=config.rotor_drag * cancelled_speeds * float(np.mean(x * x + y * y)),
         limits_force=config.max_tilt_deg is not None,
         tan_max_tilt=math.tan(math.radians(config.max_tilt_deg or 0.0)),
-        max_yaw_error=max_yaw_error,
         cos_max_yaw_error=math.cos(max_yaw_error),
+        sin_max_yaw_error=math.sin(max_yaw_error),
+        weightless=_WEIGHTLESS * weight,
         min_lift=config.min_lift * weight,
         max_lift=n * max_thrust,
+        force_learnt=-math.expm1(-config.disturbance_force_rate * step),
+        moment_learnt=-math.expm1(-config.disturbance_moment_rate * step),
+        max_disturbance_force=config.max_disturbance_force * weight,
+        max_disturbance_moment=np.array(config.max_disturbance_moment),
         rest_height=config.rest_height,
         gear_radius=config.gear_radius,
         ground_friction=config.ground_friction,
     )
+
+
+def hover_speeds(config: VehicleConfig, gravity: float = GRAVITY) -> FloatArray:
+    """The rotor speeds (n,) (rad/s) that carry the weight without a moment; ``gravity`` in m/s²."""
+    numbers = airframe(config, gravity)
+    return np.sqrt(config.mass * gravity * numbers.mixer[:, 0] * numbers.speed_squared)
 
 
 def airframe_record(numbers: Airframe) -> NDArray[np.void]:

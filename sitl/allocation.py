@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sitl.compiled import kernel
-from sitl.vectors import Vector
+from sitl.lanes import at, put, some, where
+from sitl.vectors import Vector, greatest, least
 
 if TYPE_CHECKING:
     from sitl.airframe import Airframe, FloatArray
@@ -27,10 +28,10 @@ def effectiveness(rotor_x: FloatArray, rotor_y: FloatArray, rotor_spin: FloatArr
 def _collective_range(rotor_thrusts: FloatArray, airframe: Airframe) -> tuple[float, float]:
     """The total thrusts (N) that keep every rotor within its limits when added to the given thrusts."""
     low, high = -math.inf, math.inf
-    for i in range(rotor_thrusts.size):
-        share = airframe.mixer[i, 0]
-        low = max(low, (airframe.min_thrust - rotor_thrusts[i]) / share)
-        high = min(high, (airframe.max_thrust - rotor_thrusts[i]) / share)
+    for i in range(airframe.rotor_x.size):
+        thrust, rotors = at(rotor_thrusts, i), airframe.rotor_share[i]
+        low = greatest(low, (airframe.min_thrust - thrust) * rotors)
+        high = least(high, (airframe.max_thrust - thrust) * rotors)
     return low, high
 
 
@@ -38,13 +39,28 @@ def _collective_range(rotor_thrusts: FloatArray, airframe: Airframe) -> tuple[fl
 def _feasible_tilting(tilting: FloatArray, airframe: Airframe) -> float:
     """The largest part (0…1) of roll and pitch that leaves some total thrust within all limits."""
     part = 1.0
-    for i in range(tilting.size):
-        for j in range(tilting.size):
-            share_i, share_j = airframe.mixer[i, 0], airframe.mixer[j, 0]
-            spread = tilting[j] / share_j - tilting[i] / share_i
-            room = airframe.max_thrust / share_j - airframe.min_thrust / share_i
-            if part * spread > room:
-                part = room / spread
+    for i in range(airframe.rotor_x.size):
+        for j in range(airframe.rotor_x.size):
+            rotors_i, rotors_j = airframe.rotor_share[i], airframe.rotor_share[j]
+            spread = at(tilting, j) * rotors_j - at(tilting, i) * rotors_i
+            room = airframe.max_thrust * rotors_j - airframe.min_thrust * rotors_i
+            part = where(part * spread > room, room / spread, part)
+    return part
+
+
+@kernel
+def _feasible_turning(rotor_thrusts: FloatArray, yaw_moment: float, airframe: Airframe) -> float:
+    """The largest part (0…1) of a yaw moment (N m) for which the rotors have room."""
+    part, excess = 1.0, 0.0
+    for i in range(airframe.rotor_x.size):
+        turning = airframe.mixer[i, 3] * yaw_moment
+        room = where(turning > 0.0, airframe.max_thrust, airframe.min_thrust) - at(rotor_thrusts, i)
+        excess = greatest(excess, abs(turning) - abs(room))
+    if some(excess > 0.0):
+        for i in range(airframe.rotor_x.size):
+            turning = airframe.mixer[i, 3] * yaw_moment
+            room = where(turning > 0.0, airframe.max_thrust, airframe.min_thrust) - at(rotor_thrusts, i)
+            part = where(abs(part * turning) > abs(room), abs(room / turning), part)
     return part
 
 
@@ -56,25 +72,22 @@ def allocate(thrust: float, moment: Vector, airframe: Airframe, commanded: Float
     first, then the total thrust, and roll and pitch, which hold the vehicle up, only when no total thrust can
     carry them.
     """
-    n = commanded.size
+    n = airframe.rotor_x.size
     for i in range(n):
-        commanded[i] = airframe.mixer[i, 1] * moment[0] + airframe.mixer[i, 2] * moment[1]
+        put(commanded, i, airframe.mixer[i, 1] * moment[0] + airframe.mixer[i, 2] * moment[1])
     low, high = _collective_range(commanded, airframe)
-    if low > high:
-        part = _feasible_tilting(commanded, airframe)
+    torn = low > high
+    if some(torn):
+        part = where(torn, _feasible_tilting(commanded, airframe), 1.0)
         for i in range(n):
-            commanded[i] *= part
+            put(commanded, i, part * at(commanded, i))
         low, high = _collective_range(commanded, airframe)
-    collective = max(low, min(high, thrust))
-    yaw_part = 1.0
+    collective = greatest(low, least(high, thrust))
     for i in range(n):
-        commanded[i] += airframe.mixer[i, 0] * collective
-        turning = airframe.mixer[i, 3] * moment[2]
-        room = (airframe.max_thrust if turning > 0.0 else airframe.min_thrust) - commanded[i]
-        if abs(yaw_part * turning) > abs(room):
-            yaw_part = abs(room / turning)
+        put(commanded, i, at(commanded, i) + airframe.mixer[i, 0] * collective)
+    yaw_moment = _feasible_turning(commanded, moment[2], airframe) * moment[2]
     for i in range(n):
-        wanted = commanded[i] + yaw_part * airframe.mixer[i, 3] * moment[2]
+        wanted = at(commanded, i) + airframe.mixer[i, 3] * yaw_moment
         # Rounding may leave a limit by the last bit.
-        wanted = max(airframe.min_thrust, min(airframe.max_thrust, wanted))
-        commanded[i] = math.sqrt(wanted / airframe.k_f)
+        wanted = greatest(airframe.min_thrust, least(airframe.max_thrust, wanted))
+        put(commanded, i, math.sqrt(wanted * airframe.speed_squared))

@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from sitl.profiles import ProfileName
+
 Rate = Annotated[float, Field(ge=0.0, le=1000.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(ge=0.0, le=3600.0)]
@@ -43,7 +45,13 @@ class AutopilotConfig(BaseModel):
     altitude: FiniteFloat = Field(0.0, description="of the ground at the start, m above mean sea level")
     yaw: FiniteFloat = Field(0.0, description="at the start, clockwise from north")
     rates: TelemetryRates = TelemetryRates()
-    sensors: Literal["truth"] = "truth"
+    sensors: ProfileName = Field("truth", description="how good its estimate is: truth, rtk or gnss")
+    start_height: float = Field(
+        0.0,
+        ge=0.0,
+        le=1000.0,
+        description="above the ground at the start (m); if not 0 it begins armed, hovering in GUIDED or HOLD",
+    )
 
     ready_after: Seconds = Field(1.0, description="from boot until position is known and arming is allowed")
     disarm_delay: Seconds = Field(10.0, description="armed on the ground for this long: disarmed again")

@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from sitl.angles import cosine_sine, small_cosine_sinc
 from sitl.compiled import kernel
+from sitl.lanes import some, where
 from sitl.vectors import Axes, Vector, cross, dot, plus, scaled, times, to_ned
 
 if TYPE_CHECKING:
@@ -36,14 +38,12 @@ def turned(q: Quaternion, rotation: Vector) -> Quaternion:
     """q ⊗ exp(rotation / 2): the attitude after a turn about a fixed body axis, rotation vector in rad."""
     half = times(0.5, rotation)
     square = dot(half, half)
-    if square < 1e-4:
-        # The next terms of both series are below the last bit here, and there is no 0/0 at rest.
-        c = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square / 720.0))
-        s = 1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0))
-    else:
+    c, s = small_cosine_sinc(square)
+    large = square > 0.01
+    if some(large):
         angle = math.sqrt(square)
-        c = math.cos(angle)
-        s = math.sin(angle) / angle
+        cosine, sine = cosine_sine(angle)
+        c, s = where(large, cosine, c), where(large, sine / angle, s)
     w, x, y, z = q
     ex, ey, ez = times(s, half)
     return (

@@ -40,8 +40,9 @@ class Commander:
         self._altitude = altitude
         self._voice = voice
         self._takeoff_height = config.takeoff_height
-        self._ready_at = round(config.ready_after * 1e6)
+        self._ready_at = 0 if config.start_height else round(config.ready_after * 1e6)
         self._touched_at: int | None = None
+        self._blind_since: int | None = None
         self._disarm_at = 0
         self.armed = False
         self.landed = True
@@ -61,6 +62,12 @@ class Commander:
             stream.age(now),
             stream.gap,
         )
+
+    def begin_in_air(self) -> None:
+        """Boot in flight: armed, at rest, holding."""
+        self.armed, self.landed = True, False
+        self.mode = self._flavour.after_takeoff
+        self._guidance.hover(self._estimate().pose)
 
     # What is asked
 
@@ -110,9 +117,10 @@ class Commander:
 
     # What happens
 
-    def watch(self, now: int, on_ground: bool) -> None:
-        """Notice what time and the ground brought about until ``now`` (µs)."""
-        self.ready = self.ready or now >= self._ready_at
+    def watch(self, now: int, on_ground: bool, located: bool) -> None:
+        """Notice what time and the ground brought about until ``now`` (µs); ``located``: the estimator says
+        that it has a position."""
+        self.ready = located and now >= self._ready_at
         if not on_ground:
             self.landed = False
             self._touched_at = None
@@ -121,6 +129,8 @@ class Commander:
         if not self.armed:
             return
         guidance = self._guidance
+        if not located or self._blind_since is not None:
+            self._look(now, located)
         if guidance.timed_out:
             self._lose(now)
         elif guidance.activity is Activity.TAKEOFF and guidance.reached:
@@ -155,6 +165,17 @@ class Commander:
             self._switch(self._flavour.after_loss, now)
         if self.mode is Mode.POSITION:
             self._guidance.land(_SINKING)
+
+    def _look(self, now: int, located: bool) -> None:
+        """Flying without a position: land while there is height to lose, whoever steers."""
+        if located or self.landed:
+            self._blind_since = None
+            return
+        if self._blind_since is None:
+            self._blind_since = now
+        if self.mode is not Mode.LAND and now - self._blind_since >= self._flavour.blind_patience:
+            self._voice.warn(self._flavour.blind_text)
+            self._switch(Mode.LAND, now)
 
     def _touch(self, now: int) -> None:
         """On the ground, and not yet taken for landed."""

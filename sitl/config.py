@@ -83,6 +83,16 @@ class VehicleConfig(BaseModel):
     max_yaw_error_deg: Annotated[float, Field(gt=0.0, le=90.0)] | None = Field(
         45.0, description="greatest turn that is commanded at once (deg); null leaves it unlimited"
     )
+    disturbance_force_rate: NotNegative = Field(
+        0.0, description="how fast an unexplained force is learnt, to be countered (1/s); 0 leaves it out"
+    )
+    disturbance_moment_rate: NotNegative = Field(
+        0.0, description="how fast an unexplained moment is learnt, to be countered (1/s); 0 leaves it out"
+    )
+    max_disturbance_force: Share = Field(0.5, description="greatest force that is learnt, over weight")
+    max_disturbance_moment: tuple[NotNegative, NotNegative, NotNegative] = Field(
+        (1.0, 1.0, 0.1), description="greatest moments that are learnt, about body axes (N m)"
+    )
     min_lift: Share = Field(0.3, description="least upward force that is commanded, over weight")
 
     rest_height: NotNegative = Field(description="centre of mass above the ground when landed (m)")

@@ -2,8 +2,8 @@
 
 Notation of the paper, e3 down: A is the force that the vehicle should feel apart from gravity's reaction, b3c
 = −A/‖A‖. Added to the paper: the rotor drag at zero wind can be cancelled (after Faessler, Franchi and
-Scaramuzza, 2018, who show that a drag linear in velocity only turns A), and A can be limited to a greatest
-tilt.
+Scaramuzza, 2018, who show that a drag linear in velocity only turns A), so is the disturbance that the
+``observer`` has learnt, and A can be limited to a greatest tilt.
 """
 
 from __future__ import annotations
@@ -11,8 +11,25 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from sitl.angles import cosine_sine
 from sitl.compiled import kernel
-from sitl.vectors import Axes, Vector, cross, dot, norm, plus, scaled, times, to_body, to_ned
+from sitl.derivatives import WithRates, across_with_rates, cross_with_rates, unit_with_rates
+from sitl.lanes import some, where
+from sitl.observer import Disturbance, drag_moment
+from sitl.vectors import (
+    Axes,
+    Vector,
+    chosen,
+    cross,
+    dot,
+    greatest,
+    least,
+    plus,
+    scaled,
+    times,
+    to_body,
+    to_ned,
+)
 
 if TYPE_CHECKING:
     from sitl.airframe import Airframe
@@ -20,33 +37,8 @@ if TYPE_CHECKING:
 Trajectory = tuple[Vector, Vector, Vector, Vector, Vector]
 """x_d and its first four derivatives (m, NED)."""
 
-_WEIGHTLESS = 1e-3
-"""‖A‖ over weight below which A points nowhere."""
 _UPRIGHT_NOSE = 0.02
 """Sine of the angle between b3c and b1d (or b1d's right) below which there is no heading."""
-
-
-@kernel
-def unit_with_rates(x: Vector, dx: Vector, ddx: Vector) -> tuple[Vector, Vector, Vector]:
-    """u = x/‖x‖ with its first two derivatives, from those of x."""
-    s = 1.0 / norm(x)
-    u, a, b = times(s, x), times(s, dx), times(s, ddx)
-    growth = dot(u, a)
-    du = plus(a, -growth, u)
-    ddu = plus(plus(b, -2.0 * growth, du), -dot(u, b) - dot(du, du), u)
-    return u, du, ddu
-
-
-@kernel
-def cross_with_rates(
-    a: tuple[Vector, Vector, Vector], b: tuple[Vector, Vector, Vector]
-) -> tuple[Vector, Vector, Vector]:
-    """a×b with its first two derivatives, from those of both."""
-    return (
-        cross(a[0], b[0]),
-        plus(cross(a[1], b[0]), 1.0, cross(a[0], b[1])),
-        plus(plus(cross(a[2], b[0]), 2.0, cross(a[1], b[1])), 1.0, cross(a[0], b[2])),
-    )
 
 
 @kernel
@@ -56,40 +48,47 @@ def limited_force(A: Vector, airframe: Airframe) -> tuple[Vector, bool]:
     Height comes first: the upward part lies between the least lift and all rotors at full thrust, and the
     horizontal part has what the tilt and the thrust then leave, in its own direction.
     """
-    up = max(airframe.min_lift, min(airframe.max_lift, -A[2]))
-    horizontal = math.sqrt(A[0] * A[0] + A[1] * A[1])
-    room = min(airframe.tan_max_tilt * up, math.sqrt(airframe.max_lift**2 - up * up))
-    if up == -A[2] and horizontal <= room:
-        return A, False
-    part = room / horizontal if horizontal > room else 1.0
-    return (part * A[0], part * A[1], -up), True
+    up = greatest(airframe.min_lift, least(airframe.max_lift, -A[2]))
+    square = A[0] * A[0] + A[1] * A[1]
+    tilted, lift = airframe.tan_max_tilt * up, airframe.max_lift
+    room = least(tilted * tilted, lift * lift - up * up)
+    wide = square > room
+    limited = wide | (up > -A[2]) | (up < -A[2])
+    if some(limited):
+        part = where(wide, math.sqrt(room / square), 1.0)
+        A = (part * A[0], part * A[1], -up)
+    return A, limited
 
 
 @kernel
-def limited_yaw(yaw: float, axes: Axes, airframe: Airframe) -> float:
-    """``yaw`` (rad), or the heading that is the greatest yaw error away from the nose, on the shorter side.
+def limited_nose(yaw: float, axes: Axes, airframe: Airframe) -> Vector:
+    """b1d = (cos ψ, sin ψ, 0) for a yaw ψ (rad), or for the heading that is the greatest yaw error away from
+    the nose, on the shorter side.
 
     Beyond a right angle e_R leads roll and pitch astray while a vehicle whose yaw is weak turns slowly round.
     """
-    ahead, right = math.cos(yaw), math.sin(yaw)
-    b1 = axes[0]
-    along = ahead * b1[0] + right * b1[1]
-    if along >= airframe.cos_max_yaw_error * math.sqrt(b1[0] * b1[0] + b1[1] * b1[1]):
-        return yaw
-    side = 1.0 if b1[0] * right - b1[1] * ahead >= 0.0 else -1.0
-    return math.atan2(b1[1], b1[0]) + side * airframe.max_yaw_error
+    ahead, right = cosine_sine(yaw)
+    x, y = axes[0][0], axes[0][1]
+    level = math.sqrt(x * x + y * y)
+    far = ahead * x + right * y < airframe.cos_max_yaw_error * level
+    if some(far):
+        cosine, sine = airframe.cos_max_yaw_error, airframe.sin_max_yaw_error
+        sine = where(x * right - y * ahead >= 0.0, sine, -sine)
+        ahead = where(far, (x * cosine - y * sine) / level, ahead)
+        right = where(far, (y * cosine + x * sine) / level, right)
+    return (ahead, right, 0.0)
 
 
 @kernel
 def commanded_attitude(
-    A: tuple[Vector, Vector, Vector],
-    yaw: float,
+    A: WithRates,
+    nose: Vector,
     yaw_rate: float,
     yaw_acceleration: float,
     axes: Axes,
     airframe: Airframe,
 ) -> tuple[Axes, Vector, Vector]:
-    """R_c, Ω_c and Ω̇_c from A, its derivatives and b1d = (cos ψ, sin ψ, 0) and its derivatives.
+    """R_c, Ω_c and Ω̇_c from A and its derivatives, and from b1d (the ``nose``) and the derivatives of ψ.
 
     The paper takes b2c normal to b1d, which turns the nose of a tilted vehicle away from ψ by up to half its
     tilt squared. With ``euler_heading`` b1c instead lies in the vertical plane of b1d, so that the yaw that
@@ -97,36 +96,41 @@ def commanded_attitude(
     heading to choose so does the nose, without feed-forward: there the command has no direction to follow.
     """
     still = (0.0, 0.0, 0.0)
-    if norm(A[0]) > _WEIGHTLESS * airframe.mass * airframe.gravity:
-        b3 = unit_with_rates(times(-1.0, A[0]), times(-1.0, A[1]), times(-1.0, A[2]))
-    else:
-        b3 = (axes[2], still, still)
-    nose = (math.cos(yaw), math.sin(yaw), 0.0)
+    down = (times(-1.0, A[0]), times(-1.0, A[1]), times(-1.0, A[2]))
+    weightless = dot(A[0], A[0]) <= airframe.weightless * airframe.weightless
+    if some(weightless):
+        down = (
+            chosen(weightless, axes[2], down[0]),
+            chosen(weightless, still, down[1]),
+            chosen(weightless, still, down[2]),
+        )
+    b3 = unit_with_rates(down)
     aside = (-nose[1], nose[0], 0.0)
     inward = -yaw_rate * yaw_rate
     if airframe.euler_heading:
         turning = plus(times(inward, aside), -yaw_acceleration, nose)
-        C = cross_with_rates(b3, cross_with_rates((aside, times(-yaw_rate, nose), turning), b3))
+        C = across_with_rates((aside, times(-yaw_rate, nose), turning), b3)
     else:
         turning = plus(times(inward, nose), yaw_acceleration, aside)
         C = cross_with_rates(b3, (nose, times(yaw_rate, aside), turning))
-    if norm(C[0]) > _UPRIGHT_NOSE:
-        b2 = unit_with_rates(C[0], C[1], C[2])
-    else:
+    upright = dot(C[0], C[0]) <= _UPRIGHT_NOSE * _UPRIGHT_NOSE
+    if some(upright):
         # Of b1 and b2 at most one can be along b3c.
         side = cross(b3[0], axes[0])
-        if norm(side) < _UPRIGHT_NOSE:
-            side = plus(axes[1], -dot(axes[1], b3[0]), b3[0])
-        b3 = (b3[0], still, still)
-        b2 = (times(1.0 / norm(side), side), still, still)
-    b1 = cross_with_rates(b2, b3)
-    wx, wy, wz = dot(b3[0], b2[1]), dot(b1[0], b3[1]), dot(b2[0], b1[1])
+        along = dot(side, side) < _UPRIGHT_NOSE * _UPRIGHT_NOSE
+        side = chosen(along, plus(axes[1], -dot(axes[1], b3[0]), b3[0]), side)
+        b3 = (b3[0], chosen(upright, still, b3[1]), chosen(upright, still, b3[2]))
+        C = (chosen(upright, side, C[0]), chosen(upright, still, C[1]), chosen(upright, still, C[2]))
+    b2 = unit_with_rates(C)
+    b1 = cross(b2[0], b3[0])
+    wx, wy, wz = dot(b3[0], b2[1]), dot(b1, b3[1]), -dot(b1, b2[1])
+    # From ḃ1 = wz b2 − wy b3 and its like for the others.
     rates_change = (
         dot(b3[0], b2[2]) - wy * wz,
-        dot(b1[0], b3[2]) - wz * wx,
-        dot(b2[0], b1[2]) - wx * wy,
+        dot(b1, b3[2]) - wz * wx,
+        wx * wy - dot(b1, b2[2]),
     )
-    return (b1[0], b2[0], b3[0]), (wx, wy, wz), rates_change
+    return (b1, b2[0], b3[0]), (wx, wy, wz), rates_change
 
 
 @kernel
@@ -137,27 +141,23 @@ def desired_force(
     axes: Axes,
     rates: Vector,
     target: Trajectory,
+    disturbance: Vector,
     airframe: Airframe,
-) -> tuple[float, tuple[Vector, Vector, Vector]]:
+) -> tuple[float, WithRates]:
     """The thrust f (N) and A with its first two derivatives.
 
-    A = −k_x e_x − k_v e_v − m g e3 + m ẍ_d + D ẋ_d and f = −(A − D ẋ_d)·b3. D is the drag that is cancelled:
-    −D v⊥ is −D v and a force along b3, so that the first turns A and the second goes into f. The derivatives
-    take the measured acceleration where the paper has that of its model, which a steady wind would make wrong
-    for ever, and the jerk of the model.
+    A = −k_x e_x − k_v e_v − m g e3 + m ẍ_d + D ẋ_d − d with the known disturbance d (N, NED), and
+    f = −(A − D ẋ_d)·b3. D is the drag that is cancelled: −D v⊥ is −D v and a force along b3, so that the
+    first turns A and the second goes into f. The derivatives take the measured acceleration where the paper
+    has that of its model, which a steady wind would make wrong for ever, and the jerk of the model.
     """
     m, k_x, k_v, D = airframe.mass, airframe.k_x, airframe.k_v, airframe.cancelled_drag
     b3 = axes[2]
     db3 = to_ned(axes, (rates[1], -rates[0], 0.0))
     e_x, e_v = plus(position, -1.0, target[0]), plus(velocity, -1.0, target[1])
     B = plus(plus(times(m, target[2]), -k_x, e_x), -k_v, e_v)
-    B = (B[0], B[1], B[2] - m * airframe.gravity)
+    B = plus((B[0], B[1], B[2] - m * airframe.gravity), -1.0, disturbance)
     A = plus(B, D, target[1])
-    limited, was_limited = limited_force(A, airframe) if airframe.limits_force else (A, False)
-    if was_limited:
-        f = -dot(plus(limited, -D, target[1]), b3)
-        still = (0.0, 0.0, 0.0)
-        return max(f, 0.0), (limited, still, still)
     f = -dot(B, b3)
     e_a = plus(acceleration, -1.0, target[2])
     dB = plus(plus(times(m, target[3]), -k_x, e_v), -k_v, e_a)
@@ -166,9 +166,15 @@ def desired_force(
     sliding = plus(sliding, -dot(velocity, b3), db3)
     jerk = plus(plus(times(-df / m, b3), -f / m, db3), -D / m, sliding)
     ddB = plus(plus(times(m, target[4]), -k_x, e_a), -k_v, plus(jerk, -1.0, target[3]))
+    dA, ddA = plus(dB, D, target[2]), plus(ddB, D, target[3])
     if airframe.limits_force:
-        f = max(f, 0.0)
-    return f, (A, plus(dB, D, target[2]), plus(ddB, D, target[3]))
+        A, limited = limited_force(A, airframe)
+        if some(limited):
+            still = (0.0, 0.0, 0.0)
+            f = where(limited, -dot(plus(A, -D, target[1]), b3), f)
+            dA, ddA = chosen(limited, still, dA), chosen(limited, still, ddA)
+        f = greatest(f, 0.0)
+    return f, (A, dA, ddA)
 
 
 @kernel
@@ -190,16 +196,18 @@ def control(
     yaw: float,
     yaw_rate: float,
     yaw_acceleration: float,
+    disturbance: Disturbance,
     airframe: Airframe,
 ) -> tuple[float, Vector]:
     """Thrust f (N, along −b3) and moment M (N m, body) that track a trajectory (NED) and a heading (rad).
 
     M = −k_R e_R − k_Ω e_Ω + Ω×JΩ − J(Ω̂RᵀR_cΩ_c − RᵀR_cΩ̇_c), Ω̂ being the cross product with Ω, and less the
-    moment of the rotor drag that is cancelled, which acts at the height of the rotors.
+    moment of the rotor drag that is cancelled, which acts at the height of the rotors, and that of the
+    known ``disturbance``.
     """
-    f, A = desired_force(position, velocity, acceleration, axes, rates, target, airframe)
-    yaw = limited_yaw(yaw, axes, airframe)
-    commanded, rates_c, rates_change = commanded_attitude(A, yaw, yaw_rate, yaw_acceleration, axes, airframe)
+    f, A = desired_force(position, velocity, acceleration, axes, rates, target, disturbance[0], airframe)
+    nose = limited_nose(yaw, axes, airframe)
+    commanded, rates_c, rates_change = commanded_attitude(A, nose, yaw_rate, yaw_acceleration, axes, airframe)
     rates_c = times(airframe.rate_feed_forward, rates_c)
     rates_change = times(airframe.rate_feed_forward, rates_change)
     e_R, followed = attitude_errors(axes, commanded, rates_c)
@@ -210,8 +218,6 @@ def control(
     M = plus(times(-1.0, scaled(k_R, e_R)), -1.0, scaled(k_Omega, e_Omega))
     M = plus(M, 1.0, cross(rates, scaled(J, rates)))
     turning = plus(cross(rates, followed), -1.0, to_body(axes, to_ned(commanded, rates_change)))
-    slip = to_body(commanded, target[1])
-    M = plus(M, airframe.cancelled_drag_arm, (-slip[1], slip[0], 0.0))
-    M = plus(M, airframe.cancelled_rolling, (slip[0], slip[1], 0.0))
-    M = plus(M, airframe.cancelled_turning, (0.0, 0.0, followed[2]))
+    M = plus(M, 1.0, drag_moment(to_body(commanded, target[1]), followed[2], airframe))
+    M = plus(M, -1.0, disturbance[1])
     return f, plus(M, -1.0, scaled(J, turning))

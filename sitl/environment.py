@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from sitl.body import Motion, body_axes, turned
 from sitl.compiled import kernel
-from sitl.vectors import plus, times
+from sitl.lanes import some, where
+from sitl.vectors import chosen, plus, times
 
 if TYPE_CHECKING:
     from sitl.airframe import Airframe
@@ -35,32 +36,55 @@ def ground_contact(before: Motion, after: Motion, ground: float, airframe: Airfr
     """
     floor = ground - airframe.rest_height
     position, velocity, attitude, rates = after
-    fall = velocity[2]
-    if position[2] < floor:
-        return after, False
-    if fall < 0.0:
-        return ((position[0], position[1], floor), velocity, attitude, rates), False
+    below = position[2] >= floor
+    standing = below & (velocity[2] >= 0.0)
+    if some(below):
+        position = (position[0], position[1], where(below, floor, position[2]))
+        if some(standing):
+            stood = _stood(before, after, floor, airframe)
+            position, velocity = chosen(standing, stood[0], position), chosen(standing, stood[1], velocity)
+            attitude = (
+                where(standing, stood[2][0], attitude[0]),
+                where(standing, stood[2][1], attitude[1]),
+                where(standing, stood[2][2], attitude[2]),
+                where(standing, stood[2][3], attitude[3]),
+            )
+            rates = chosen(standing, stood[3], rates)
+    return (position, velocity, attitude, rates), standing
 
-    speed = math.hypot(velocity[0], velocity[1])
+
+@kernel
+def _stood(before: Motion, after: Motion, floor: float, airframe: Airframe) -> Motion:
+    """The motion at the end of a step that the ground amends."""
+    _, velocity, _, rates = after
+    fall = velocity[2]
     friction = airframe.ground_friction * fall
-    kept = 1.0 - friction / speed if speed > friction else 0.0
+    kept = _part_left(_length(velocity[0], velocity[1]), friction)
     velocity = (kept * velocity[0], kept * velocity[1], 0.0)
 
     impulse = airframe.mass * fall * airframe.gear_radius
     b1, b2, b3 = body_axes(before[2])
-    down_body = (b1[2], b2[2], b3[2])
-    at_peace = math.hypot(down_body[0], down_body[1]) < _FLAT or down_body[2] < _TIPPED
-    righting = 0.0 if at_peace else 1.0 / _RIGHTING_TIME
-    settling = (-righting * down_body[1], righting * down_body[0])
+    flat = _length(b1[2], b2[2]) < _FLAT
+    righting = where(flat | (b3[2] < _TIPPED), 0.0, 1.0 / _RIGHTING_TIME)
+    settling = (-righting * b2[2], righting * b1[2])
     excess = (rates[0] - settling[0], rates[1] - settling[1])
-    tilting = math.hypot(airframe.inertia[0] * excess[0], airframe.inertia[1] * excess[1])
-    left = 1.0 - impulse / tilting if tilting > impulse else 0.0
-    turning, scrub = airframe.inertia[2] * abs(rates[2]), airframe.ground_friction * impulse
-    spin_left = 1.0 - scrub / turning if turning > scrub else 0.0
+    J = airframe.inertia
+    left = _part_left(_length(J[0] * excess[0], J[1] * excess[1]), impulse)
+    spin_left = _part_left(J[2] * abs(rates[2]), airframe.ground_friction * impulse)
     rates = (settling[0] + left * excess[0], settling[1] + left * excess[1], spin_left * rates[2])
 
     h = airframe.step
     moved = plus(plus(before[0], 0.5 * h, before[1]), 0.5 * h, velocity)
-    position = (moved[0], moved[1], floor)
     attitude = turned(before[2], times(0.5 * h, plus(before[3], 1.0, rates)))
-    return (position, velocity, attitude, rates), True
+    return (moved[0], moved[1], floor), velocity, attitude, rates
+
+
+@kernel
+def _part_left(size: float, taken: float) -> float:
+    """What is left, as a part, of something of this size when as much as ``taken`` is taken away."""
+    return where(size > taken, 1.0 - taken / size, 0.0)
+
+
+@kernel
+def _length(x: float, y: float) -> float:
+    return math.sqrt(x * x + y * y)

@@ -69,6 +69,12 @@ class Guidance:
         return self._shaper.acceleration
 
     @property
+    def motion(self) -> tuple[Vector, Vector, Vector]:
+        """Position, velocity, acceleration."""
+        shaper = self._shaper
+        return shaper.position, shaper.velocity, shaper.acceleration
+
+    @property
     def yaw(self) -> float:
         return self._heading.yaw
 
@@ -107,6 +113,11 @@ class Guidance:
         # A trajectory that is being passed through takes effect at once, not at the end of the next step.
         self._shaper.advance(self.wanted(now), self._limits[Activity.TRACK], 0.0)
 
+    def hover(self, here: Pose) -> None:
+        """Stay ``here``, where it is at rest in the air."""
+        self._leave_ground(here)
+        self.hold()
+
     def hold(self) -> None:
         """Brake, and stay where that ends."""
         self._begin(Activity.HOLD, _STAY)
@@ -118,6 +129,19 @@ class Guidance:
     def land(self, speed: float) -> None:
         """Brake, and sink at ``speed`` (m/s)."""
         self._begin(Activity.LAND, _STAY._replace(velocity=(0.0, 0.0, speed)))
+
+    def relocate(self, position: Vector, velocity: Vector) -> None:
+        """The frame has slipped: what is being tracked is now here, and goes on from here.
+
+        A takeoff still leads straight up. A set-point stays what it says, and is chased within the limits.
+        """
+        if self.activity is Activity.IDLE:
+            return
+        shaper = self._shaper
+        if self.activity is Activity.TAKEOFF:
+            z = self._setpoint.position[2]
+            self._setpoint = self._setpoint._replace(position=(position[0], position[1], z))
+        shaper.position, shaper.velocity, shaper.captured = position, velocity, False
 
     def advance(self, now: int, step: int) -> None:
         """Move the reference from ``now`` to ``now + step`` (µs)."""

@@ -12,7 +12,6 @@ from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, Source, Vector
 from mavlink_bridge.node import Datagram
-from sitl import sensors
 from sitl.autopilot_config import AutopilotConfig
 from sitl.commander import Commander
 from sitl.config import VehicleConfig
@@ -22,12 +21,15 @@ from sitl.flavours.px4 import Px4
 from sitl.guidance import Activity, Guidance
 from sitl.orders import Orders
 from sitl.origin import Origin
+from sitl.plant import Plant
 from sitl.reception import Reception
-from sitl.setpoints import ZERO
+from sitl.sensors import Estimate
+from sitl.setpoints import Setpoint
 from sitl.steering import Steering
 from sitl.telemetry import IN_AIR, LANDING, ON_GROUND, ORIGIN, TAKING_OFF, Snapshot, Telemetry
-from sitl.vehicle import Reference, Vehicle, VehicleState
+from sitl.vehicle import Reference, VehicleState
 from sitl.voice import Voice
+from sitl.weather import WeatherConfig
 
 LINK: Final = "autopilot"
 """The one link of the node."""
@@ -36,9 +38,6 @@ LINK: Final = "autopilot"
 _COMPONENT: Final = 1
 # PING, COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED, TIMESYNC
 _HEARD: Final = frozenset((4, 75, 76, 84, 111))
-# The reference is renewed at least this often (µs); the vehicle extrapolates it in between.
-_RENEWAL: Final = 5_000
-
 _FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
 # In the air; with thrust cut it is about to be on the ground.
 _LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, Activity.IDLE: LANDING}
@@ -48,42 +47,56 @@ class Autopilot:
     """One vehicle with its autopilot, as a ``Node`` with the link ``autopilot``.
 
     The physics moves in the NED frame of ``site``; what is sent and received is in the vehicle's own local
-    NED. The truth of the last step is there for who composes a simulation: ``trace``, ``trace_times``,
-    ``state``, ``reference``.
+    NED. It flies on what its sensors make it believe. The truth of the last step is there for who composes a
+    simulation: ``trace``, ``trace_times``, ``state``, ``reference``; and so are ``begin`` and the faults,
+    which act from the next step on.
     """
 
-    def __init__(self, config: AutopilotConfig, vehicle: VehicleConfig, site: FleetFrame, seed: int) -> None:
-        """On the ground at the configured place, which becomes the origin of its local frame; ``seed`` for
-        noise."""
+    def __init__(
+        self,
+        config: AutopilotConfig,
+        vehicle: VehicleConfig,
+        site: FleetFrame,
+        seed: int,
+        weather: WeatherConfig | None = None,
+    ) -> None:
+        """On the ground at the configured place, which becomes the origin of its local frame, or as high
+        above it as the configuration says. ``seed`` (≥ 0) with the system id for all noise. ``weather`` is
+        the air around it; without, the air stands still."""
         self.config = config
-        self.wind: Vector = ZERO
-        """Velocity of the air (m/s, site NED), for whoever makes weather."""
         self._source = Source(config.system_id, _COMPONENT)
         self._origin = Origin(site, config.latitude, config.longitude, config.altitude)
-        self._period = vehicle.physics_period
-        self._stride = max(1, _RENEWAL // self._period)
-        ground = float(self._origin.position[2]) + vehicle.rest_height
-        self._vehicle = Vehicle(vehicle, self._origin.position, config.yaw + self._origin.turn, ground)
-        self._sensors = sensors.sensors(config.sensors, self._origin, seed)
         self._flavour: Flavour = _FLAVOURS[config.flavour](config)
         self._telemetry = Telemetry(config.rates, self._flavour.reports_ekf)
         self._guidance = Guidance(config)
+        self._plant = Plant(
+            config,
+            vehicle,
+            weather or WeatherConfig(),
+            self._guidance,
+            self._origin,
+            self._flavour.coasting,
+            seed,
+        )
         self._outbox: list[Message] = []
         voice = Voice(self._source, self._outbox)
         steering = Steering(self._flavour, self._guidance, voice)
         self._commander = Commander(
-            config, self._flavour, self._guidance, steering, self._estimate, self._origin.altitude, voice
+            config,
+            self._flavour,
+            self._guidance,
+            steering,
+            self._plant.estimate,
+            self._origin.altitude,
+            voice,
         )
         orders = Orders(self._commander, self._flavour, self._telemetry)
         self._reception = Reception(self._source, self._outbox, voice, self._commander, orders, steering)
         self._codec = Codec(accept=lambda message_id, _system, _component: message_id in _HEARD)
         self._boot: int | None = None
         self._now = 0
-        self._steps = 0
-        self._followed: Reference | None = None
-        self._elapsed = 0
-        self._trace: list[npt.NDArray[np.float64]] = []
-        self._trace_start = 0
+        if config.start_height:
+            self._commander.begin_in_air()
 
     @property
     def name(self) -> str:
@@ -99,33 +112,15 @@ class Autopilot:
             self._boot = now
             self._telemetry.start(0)
         self._now = now - self._boot
-        self._move()
+        self._plant.move(self._now, armed=self._commander.armed)
         self._watch()
         for datagram in inbox:
             self._listen(datagram)
         return self._tell()
 
-    def _move(self) -> None:
-        """All physics steps that end by now, under a reference that is renewed on a fixed grid."""
-        vehicle, guidance, period, stride = self._vehicle, self._guidance, self._period, self._stride
-        self._trace_start = self._steps
-        self._trace.clear()
-        last = self._now // period
-        while self._steps < last:
-            count = min(last - self._steps, stride - self._steps % stride)
-            reference = self.reference
-            if reference is not None and self._followed is not None:
-                reference = reference.following(self._followed, self._elapsed)
-            self._followed, self._elapsed = reference, count * period
-            self._trace.append(
-                vehicle.advance(count, reference, self.wind, idle=reference is None and self._commander.armed)
-            )
-            guidance.advance(self._steps * period, count * period)
-            self._steps += count
-
     def _watch(self) -> None:
         was_ready = self._commander.ready
-        self._commander.watch(self._now, self._vehicle.on_ground)
+        self._commander.watch(self._now, self._plant.vehicle.on_ground, self._plant.sensors.gps.located)
         if self._commander.ready and not was_ready:
             self._telemetry.request(ORIGIN)
 
@@ -133,7 +128,7 @@ class Autopilot:
         if datagram.link != LINK:
             return
         for message in self._codec.feed(datagram.data):
-            self._reception.handle(message, self._now, self._estimate())
+            self._reception.handle(message, self._now, self._plant.estimate())
 
     def _tell(self) -> list[Datagram]:
         messages = self._outbox
@@ -145,44 +140,77 @@ class Autopilot:
         self._outbox.clear()
         return [Datagram(LINK, data)]
 
-    def _estimate(self) -> sensors.Estimate:
-        return self._sensors.estimate(self._now, self._vehicle.state)
+    def _target(self) -> Setpoint | None:
+        guidance = self._guidance
+        return guidance.wanted(self._now) if guidance.activity is Activity.TRACK else None
 
     def _snapshot(self) -> Snapshot:
-        commander, guidance, flavour = self._commander, self._guidance, self._flavour
+        commander, flavour, plant = self._commander, self._flavour, self._plant
         return Snapshot(
             self._source,
             self._now,
-            self._estimate(),
+            plant.estimate(),
             self._origin,
             commander.ready,
             commander.armed,
-            len(self._vehicle.config.rotors),
+            len(plant.vehicle.config.rotors),
             flavour.autopilot,
             flavour.base_mode(commander.mode) | (ARMED if commander.armed else 0),
             flavour.custom_mode(commander.mode),
-            ON_GROUND if commander.landed else _LANDED_STATES.get(guidance.activity, IN_AIR),
-            guidance.wanted(self._now) if guidance.activity is Activity.TRACK else None,
+            ON_GROUND if commander.landed else _LANDED_STATES.get(self._guidance.activity, IN_AIR),
+            self._target,
             flavour.echoes_yaw,
+            plant.sensors.gps.located,
+            plant.sensors.gps.fixed,
+            plant.sensors.silent(self._now),
         )
+
+    # Events and faults, from the next step on
+
+    def begin(self, now: int) -> None:
+        """The goal event, on the clock of ``step`` (µs): the weather's gusts count from it."""
+        self._plant.begin(now - (now if self._boot is None else self._boot))
+
+    def lose_gps(self) -> None:
+        """No more GPS: the estimate drifts, and after the firmware's patience there is no position."""
+        self._plant.lose_gps()
+
+    def regain_gps(self) -> None:
+        """GPS again: the estimate returns to it, in one jump if the position was given up."""
+        self._plant.sensors.gps.regain()
+
+    def fail_rotor(self, index: int, left: float) -> None:
+        """From now on the rotor ``index`` (0…n−1) has the part ``left`` (0…1) of its motor's speed; nothing
+        tells the autopilot. Raises IndexError and ValueError."""
+        self._plant.vehicle.fail_rotor(index, left)
+
+    def shift_gps(self, offset_enu: Vector) -> None:
+        """GPS is off by ``offset_enu`` (m, fleet-local ENU) in all; zero ends it. The estimate follows within
+        some seconds, or jumps after having refused for seven."""
+        east, north, up = offset_enu
+        self._plant.shift_gps(self._origin.vector_to_local(np.array((north, east, -up))))
 
     # The truth
 
     @property
     def trace(self) -> npt.NDArray[np.float64]:
         """Positions (n, 3) (m, site NED) after each physics step of the last ``step``."""
-        return np.concatenate(self._trace) if self._trace else np.empty((0, 3))
+        return self._plant.trace
 
     @property
     def trace_times(self) -> npt.NDArray[np.int64]:
         """When (n,) the vehicle was there (µs, on the clock of ``step``)."""
-        steps = np.arange(self._trace_start + 1, self._steps + 1, dtype=np.int64)
-        return steps * self._period + (self._boot or 0)
+        return self._plant.trace_times + (self._boot or 0)
 
     @property
     def state(self) -> VehicleState:
         """The true state, site NED."""
-        return self._vehicle.state
+        return self._plant.vehicle.state
+
+    @property
+    def wind(self) -> Vector:
+        """Velocity of the air (m/s, site NED) in the last physics step."""
+        return self._plant.wind
 
     @property
     def armed(self) -> bool:
@@ -200,16 +228,16 @@ class Autopilot:
         return self._commander.mode
 
     @property
+    def estimate(self) -> Estimate:
+        """What is believed, in the own local NED."""
+        return self._plant.estimate()
+
+    @property
+    def estimate_error(self) -> npt.NDArray[np.float64]:
+        """Estimated minus true position (3,) (m, site NED): what ``reference`` is off by on purpose."""
+        return self._plant.estimate_error
+
+    @property
     def reference(self) -> Reference | None:
-        """What is tracked now (site NED); None when nothing is."""
-        guidance = self._guidance
-        if guidance.activity is Activity.IDLE:
-            return None
-        motion = self._origin.motion_to_site((guidance.position, guidance.velocity, guidance.acceleration))
-        return Reference(
-            motion[0],
-            motion[1],
-            motion[2],
-            yaw=guidance.yaw + self._origin.turn,
-            yaw_rate=guidance.yaw_rate,
-        )
+        """What is tracked now (site NED), as the estimate has it; None when nothing is."""
+        return self._plant.course.reference

@@ -43,6 +43,11 @@ class Origin:
         moved[0] += self.position
         return moved
 
+    def vectors_to_site(self, vectors: npt.ArrayLike) -> Array:
+        """Free vectors (n, 3): local NED → site NED."""
+        turned: Array = np.array(vectors).dot(self._axes)
+        return turned
+
     def position_to_local(self, site: Array) -> Vector:
         """A position (3,), m: site NED → local NED."""
         x, y, z = ((site - self.position) @ self.rotation).tolist()

@@ -43,6 +43,7 @@ _TYPES: Final = {4: 2, 6: 13, 8: 14}
 _STANDBY: Final = 3
 _ACTIVE: Final = 4
 _CALIBRATING: Final = 2
+_CRITICAL: Final = 5
 
 # MAV_SYS_STATUS_SENSOR: gyro, accelerometer, magnetometer, barometer; control of rate, attitude, yaw, height
 # and position; motors, AHRS. GPS and the prearm check wait for a position.
@@ -53,13 +54,16 @@ _PREARM: Final = 0x10000000
 # ESTIMATOR_STATUS_FLAGS: attitude, velocities, relative and absolute position, and their predictions.
 _EKF_READY: Final = 0x1 | 0x2 | 0x4 | 0x8 | 0x10 | 0x20 | 0x100 | 0x200
 _EKF_WAITING: Final = 0x1 | 0x80 | 0x400
+# Without GPS for too long: attitude, vertical velocity and height by barometer, constant position assumed.
+_EKF_LOST: Final = 0x1 | 0x4 | 0x20 | 0x80
 
 _NEVER: Final = 1 << 62
 
 
 class Snapshot(NamedTuple):
-    """All that a message may tell. ``time`` since boot (µs); ``base_mode`` with the armed bit; ``target`` is
-    the set-point that is followed now, None when there is none."""
+    """All that a message may tell. ``time`` since boot (µs); ``base_mode`` with the armed bit; ``target``
+    gives the set-point that is followed now, None when there is none. ``located``: the estimator has a
+    position or waits for its first; ``fixed``: there is GPS; ``silent``: position messages fail to come."""
 
     source: Source
     time: int
@@ -72,18 +76,24 @@ class Snapshot(NamedTuple):
     base_mode: int
     custom_mode: int
     landed_state: int
-    target: Setpoint | None
+    target: Callable[[], Setpoint | None]
     echoes_yaw: bool
+    located: bool
+    fixed: bool
+    silent: bool
 
 
 def _heartbeat(s: Snapshot) -> Message:
-    state = _ACTIVE if s.armed else _STANDBY if s.ready else _CALIBRATING
+    idle = _STANDBY if s.ready else _CALIBRATING
+    flying = _ACTIVE if s.located else _CRITICAL
+    state = flying if s.armed else idle
     return Heartbeat(s.source, _TYPES.get(s.rotors, 0), s.autopilot, s.base_mode, s.custom_mode, state)
 
 
 def _sys_status(s: Snapshot) -> Message:
     known = _SENSORS | _GPS | _PREARM
-    return SysStatus(s.source, known, known, known if s.ready else _SENSORS, None, None)
+    health = (known if s.ready else _SENSORS) & ~(0 if s.fixed else _GPS)
+    return SysStatus(s.source, known, known, health, None, None)
 
 
 def _attitude(s: Snapshot) -> Message:
@@ -92,11 +102,13 @@ def _attitude(s: Snapshot) -> Message:
 
 
 def _local_position(s: Snapshot) -> Message | None:
-    return LocalPosition(s.source, s.time, s.estimate.position, s.estimate.velocity) if s.ready else None
+    if not s.ready or s.silent:
+        return None
+    return LocalPosition(s.source, s.time, s.estimate.position, s.estimate.velocity)
 
 
 def _global_position(s: Snapshot) -> Message | None:
-    if not s.ready:
+    if not s.ready or s.silent:
         return None
     e, origin = s.estimate, s.origin
     latitude, longitude, altitude = origin.geodetic(e.position)
@@ -107,11 +119,12 @@ def _global_position(s: Snapshot) -> Message | None:
 
 def _origin(s: Snapshot) -> Message | None:
     o = s.origin
-    return GpsGlobalOrigin(s.source, o.latitude, o.longitude, o.altitude, s.time) if s.ready else None
+    known = s.ready or not s.located
+    return GpsGlobalOrigin(s.source, o.latitude, o.longitude, o.altitude, s.time) if known else None
 
 
 def _position_target(s: Snapshot) -> Message | None:
-    target = s.target
+    target = s.target()
     if target is None:
         return None
     if not s.echoes_yaw:
@@ -130,7 +143,7 @@ def _position_target(s: Snapshot) -> Message | None:
 
 
 def _ekf_status(s: Snapshot) -> Message:
-    return EkfStatus(s.source, _EKF_READY if s.ready else _EKF_WAITING)
+    return EkfStatus(s.source, _EKF_READY if s.ready else _EKF_WAITING if s.located else _EKF_LOST)
 
 
 def _extended_sys_state(s: Snapshot) -> Message:

@@ -5,10 +5,23 @@ from __future__ import annotations
 import math
 
 from sitl.compiled import kernel
+from sitl.lanes import where
 
 Vector = tuple[float, float, float]
 Axes = tuple[Vector, Vector, Vector]
 """The body axes b1, b2, b3 in NED: the columns of R, which takes body coordinates to NED."""
+
+
+@kernel
+def least(a: float, b: float) -> float:
+    """The smaller one; b where they do not compare."""
+    return where(a < b, a, b)
+
+
+@kernel
+def greatest(a: float, b: float) -> float:
+    """The greater one; b where they do not compare."""
+    return where(a > b, a, b)
 
 
 @kernel
@@ -39,6 +52,12 @@ def times(s: float, a: Vector) -> Vector:
 def scaled(a: Vector, b: Vector) -> Vector:
     """The product element by element: a diagonal matrix times a vector."""
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
+
+
+@kernel
+def chosen(condition: bool, a: Vector, b: Vector) -> Vector:
+    """``where`` of vectors."""
+    return (where(condition, a[0], b[0]), where(condition, a[1], b[1]), where(condition, a[2], b[2]))
 
 
 @kernel

@@ -8,10 +8,11 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sitl.airframe import FloatArray, airframe, airframe_record
+from sitl.airframe import FloatArray, airframe, airframe_record, hover_speeds
+from sitl.batch import advance_rows
 from sitl.config import VehicleConfig
 from sitl.environment import GRAVITY
-from sitl.pipeline import COMMAND_SIZE, FLYING, IDLE, LANDED, STATE_SIZE, STOPPED, advance_rows
+from sitl.pipeline import COMMAND_SIZE, FLYING, IDLE, LANDED, STATE_SIZE, STOPPED
 
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
@@ -81,26 +82,44 @@ class VehicleState(NamedTuple):
     body_rates: FloatArray  # (3,) rad/s, FRD
     rotor_speeds: FloatArray  # (n,) rad/s
     acceleration: FloatArray  # (3,) m/s², NED, mean of the last physics step; 0 at rest
+    learnt_force: FloatArray = _ZERO  # (3,) N, NED, what the controller counters of wind and faults
 
 
 class NotFiniteError(ValueError):
     """A reference or a wind that is not finite; the vehicle has not moved."""
 
 
-def initial_states(config: VehicleConfig, positions: ArrayLike, yaws: ArrayLike, ground: float) -> FloatArray:
-    """State rows (K, STATE_SIZE + n) of vehicles at rest, motors off.
+def initial_states(
+    config: VehicleConfig,
+    positions: ArrayLike,
+    yaws: ArrayLike,
+    ground: float,
+    *,
+    hovering: bool = False,
+    gravity: float = GRAVITY,
+) -> FloatArray:
+    """State rows (K, STATE_SIZE + 2 n) of vehicles at rest, motors off or, when ``hovering``, at hover speed.
 
     Positions (K, 3) in m, NED; yaws (K,) in rad; ``ground`` is the NED z (m). Who starts on the ground or
-    below it is put on its gear there.
+    below it is put on its gear there, or, as it cannot hover there, refused with a ValueError.
     """
     places = np.atleast_2d(np.asarray(positions, dtype=np.float64))
     half_yaws = 0.5 * np.asarray(yaws, dtype=np.float64)
-    states = np.zeros((len(places), STATE_SIZE + len(config.rotors)))
+    n = len(config.rotors)
+    states = np.zeros((len(places), STATE_SIZE + 2 * n))
+    states[:, STATE_SIZE + n :] = 1.0
     floor = ground - config.rest_height
     states[:, 0:3] = places
     states[:, 2] = np.minimum(places[:, 2], floor)
     states[:, 6], states[:, 9] = np.cos(half_yaws), np.sin(half_yaws)
     states[:, LANDED] = places[:, 2] >= floor
+    if hovering:
+        if np.any(states[:, LANDED]):
+            k = int(np.argmax(places[:, 2]))
+            raise ValueError(
+                f"vehicle {k} cannot hover at z = {places[k, 2]:g} m, NED: it must be less than {floor:g} m"
+            )
+        states[:, STATE_SIZE : STATE_SIZE + n] = hover_speeds(config, gravity)
     return states
 
 
@@ -131,15 +150,15 @@ def advance_many(
 ) -> FloatArray:
     """Advance K vehicles of one type in place; the positions (K, steps, 3) after each physics step.
 
-    ``states`` (K, STATE_SIZE + n) and ``commands`` (K, COMMAND_SIZE) are rows as in ``pipeline``,
+    ``states`` (K, STATE_SIZE + 2 n) and ``commands`` (K, COMMAND_SIZE) are rows as in ``pipeline``,
     C-contiguous float64; ``airframes`` comes from ``airframe_record``. Each vehicle moves exactly, to the
     bit, as it would alone. Raises NotFiniteError.
     """
-    tracks = np.empty((states.shape[0], steps, 3))
+    tracks = np.empty((states.shape[0], 3 * steps))
     bad = advance_rows(states, commands, airframes, steps, tracks)
     if bad >= 0:
         raise NotFiniteError(f"the command of vehicle {bad} is not finite: {commands[bad].tolist()}")
-    return tracks
+    return tracks.reshape(-1, steps, 3)
 
 
 class Vehicle:
@@ -152,13 +171,20 @@ class Vehicle:
         yaw: float = 0.0,
         ground: float = 0.0,
         gravity: float = GRAVITY,
+        *,
+        hovering: bool = False,
     ) -> None:
-        """Motors off, at rest; ``position`` (3,) and the z of the ``ground`` in m, NED, ``yaw`` in rad."""
+        """At rest, motors off, or in the air at hover speed when ``hovering``.
+
+        ``position`` (3,) and the z of the ``ground`` in m, NED, ``yaw`` in rad, ``gravity`` in m/s². Raises
+        ValueError for a position to hover at that is not above the ground.
+        """
         self.config = config
         self._airframe = airframe_record(airframe(config, gravity))
-        self._states = initial_states(config, np.asarray(position), np.asarray([yaw]), ground)
+        self._states = initial_states(config, position, [yaw], ground, hovering=hovering, gravity=gravity)
         self._commands = np.zeros((1, COMMAND_SIZE))
         self._state, self._command = self._states[0], self._commands[0]
+        self._motors, self._left = self._state[STATE_SIZE:].reshape(2, -1)
         self._ground = ground
 
     def advance(
@@ -174,11 +200,25 @@ class Vehicle:
         track: FloatArray = advance_many(self._states, self._commands, self._airframe, steps)[0]
         return track
 
+    def fail_rotor(self, index: int, left: float) -> None:
+        """From now on the rotor ``index`` (0…n−1) turns at the part ``left`` (0…1) of its motor's speed.
+
+        Its thrust and its torques fall with the square. Nothing tells the controller. Raises IndexError and
+        ValueError.
+        """
+        n = len(self.config.rotors)
+        if not 0 <= index < n:
+            raise IndexError(f"rotor {index} of {self.config.name}: its rotors are 0 to {n - 1}")
+        if not 0.0 <= left <= 1.0:
+            raise ValueError(f"rotor {index} of {self.config.name}: {left} left, allowed is 0 to 1")
+        self._left[index] = left
+
     @property
     def state(self) -> VehicleState:
         """The true state after the last step."""
         row = self._state.copy()
-        return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], row[STATE_SIZE:], row[13:16])
+        speeds = self._motors * self._left
+        return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], speeds, row[13:16], row[20:23])
 
     @property
     def yaw(self) -> float:

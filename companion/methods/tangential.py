@@ -72,7 +72,7 @@ class Tangential:
         moving = (obstacles.positions[:, 1] - obstacles.positions[:, 0]) / self._dt
         closing = np.maximum(np.einsum("ji,ji->j", away, moving - scene.velocity) / distance, 0.0)
         edge = obstacles.d_safe + config.d_band + config.reach_s * closing
-        depth = _share((edge - distance) / (edge - config.d_full))
+        depth = _share((edge - distance) / (edge - config.d_full - obstacles.radius))
         to_go = scene.to_go
         length = sqrt(to_go @ to_go) + _NEAR
         along = -(away @ to_go) / length

@@ -86,6 +86,12 @@ class Flavour(Protocol):
     after_landing: Mode
     after_loss: Mode
     """The mode when set-points time out."""
+    coasting: float
+    """s; so long its filter has a position without GPS."""
+    blind_patience: int
+    """µs; flying without a position for so long, it lands."""
+    blind_text: str
+    """STATUSTEXT (253) of that."""
 
     def custom_mode(self, mode: Mode) -> int:
         """HEARTBEAT.custom_mode."""

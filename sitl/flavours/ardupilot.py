@@ -73,6 +73,10 @@ class ArduPilot:
     after_takeoff = Mode.GUIDED
     after_landing = Mode.LAND
     after_loss = Mode.GUIDED
+    # EKF3's posRetryTimeNoVel; then ten failures of the check that runs at 10 Hz.
+    coasting = 7.0
+    blind_patience = 1_000_000
+    blind_text = "EKF Failsafe: changed to LAND Mode"
 
     def __init__(self, config: AutopilotConfig) -> None:
         self._timeout = round(config.guided_timeout * 1e6)
@@ -93,7 +97,7 @@ class ArduPilot:
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
         if mode is Mode.STANDBY and status.armed and not status.landed:
             return Denial(FAILED, "STABILIZE in flight needs a pilot")
-        if mode is not Mode.STANDBY and not status.ready:
+        if mode not in (Mode.STANDBY, Mode.LAND) and not status.ready:
             return Denial(FAILED, "Mode change failed: requires position")
         return None
 

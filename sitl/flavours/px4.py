@@ -64,6 +64,10 @@ class Px4:
     shortest_interval = 1000
     after_takeoff = Mode.HOLD
     after_landing = Mode.HOLD
+    # EKF2_NOAID_TOUT.
+    coasting = 5.0
+    blind_patience = 0
+    blind_text = "Failsafe: no position, blind land"
 
     def __init__(self, config: AutopilotConfig) -> None:
         self.after_loss = _LOSS[config.offboard_loss]
@@ -90,7 +94,7 @@ class Px4:
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
         if mode is Mode.GUIDED and not _streaming(status):
             return Denial(TEMPORARILY_REJECTED, "OFFBOARD needs set-points at more than 2 Hz")
-        if not status.ready:
+        if not status.ready and (status.landed or mode is not Mode.LAND):
             return Denial(TEMPORARILY_REJECTED, "Mode change refused: no position estimate")
         return None
 

@@ -218,6 +218,24 @@ def test_who_falls_silent_stays_an_obstacle_where_it_was_last():
 
 
 @LAWS
+@given(order=st.permutations(range(6)), v=vectors(4.0))
+def test_positions_that_overtake_each_other_tell_the_same(order, v):
+    """All at once, in any order: the stamps say which was when."""
+    results = []
+    for turn in (range(6), order):
+        neighbours = Neighbours(CONFIG, OWN, FLEET)
+        for k in turn:
+            heard = position(X + 0.1 * k * v, v)._replace(time_boot=10**7 + k * 100_000)
+            # Quick ones and slow ones; the quickest took the least time that there is.
+            neighbours.hear_position(NOW + 5 * 100_000 + DELAY, heard)
+        results.append(neighbours)
+    one, other = (neighbours.obstacles(NOW + 600_000).positions for neighbours in results)
+    np.testing.assert_array_equal(one, other)
+    np.testing.assert_allclose(one[0, 0], X + 0.6 * v, atol=2 * GRAIN)
+    assert results[0].ages(NOW + 500_000) == results[1].ages(NOW + 500_000) == {OTHER: 0}
+
+
+@LAWS
 @given(shift=st.integers(0, 10**12), late=st.integers(0, 600_000), speed=numbers(-3.0, 3.0))
 def test_only_differences_of_time_matter(shift, late, speed):
     v = speed * V

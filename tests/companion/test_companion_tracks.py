@@ -42,6 +42,37 @@ def test_nothing_heard_is_no_state():
     track = Track(CONFIG)
     assert track.at(START) is None
     assert track.time is None
+    for ask in (lambda: track.last, track.covariance):
+        with pytest.raises(ValueError, match="nothing has been heard"):
+            ask()
+
+
+@LAWS
+@given(x=vectors(50.0), v=vectors(8.0), ages=st.lists(st.integers(0, 10**8), min_size=2, max_size=5))
+def test_the_older_a_state_the_less_is_known_without_bound(x, v, ages):
+    track, true = followed(x, v)
+    sigmas = [track.at(true + age).sigma for age in sorted(ages)]
+    assert sigmas == sorted(sigmas)
+    for age, sigma in zip(sorted(ages), sigmas, strict=True):
+        P = track.covariance(true + age)
+        np.testing.assert_allclose(np.sqrt(np.diag(P)[:3]), sigma, rtol=1e-9)
+    assert track.at(true + 10**9).sigma > 1e3
+
+
+@pytest.mark.parametrize("up", [False, True])
+def test_the_vertical_speed_has_the_sign_that_the_sender_is_said_to_give_it(up):
+    track = Track(TrackConfig(velocity_up=up))
+    track.measure(START, np.zeros(3), np.array([1.0, 2.0, 3.0]))
+    np.testing.assert_array_equal(track.at(START).velocity, [1.0, 2.0, -3.0 if up else 3.0])
+
+
+def test_what_is_handed_out_is_the_callers_own():
+    track, true = followed(np.zeros(3), np.ones(3))
+    for now in (true, true + PERIOD):
+        state = track.at(now)
+        state.position[:], state.velocity[:] = 7.0, 7.0
+    np.testing.assert_allclose(track.at(true).velocity, 1.0)
+    np.testing.assert_allclose(track.last[3:], 1.0)
 
 
 @LAWS
@@ -120,12 +151,13 @@ def test_teleports_that_do_not_agree_are_no_witnesses(x, data):
 
 @LAWS
 @given(x=vectors(50.0), v=vectors(8.0), late=st.integers(1, 10**7), wrong=vectors(50.0))
-def test_a_late_message_is_refused_and_changes_nothing(x, v, late, wrong):
+def test_what_is_older_than_the_track_remembers_is_refused_and_changes_nothing(x, v, late, wrong):
     track, true = followed(x, v)
     before = track.at(true)
-    assert not track.measure(true + CONFIG.delay_us - late, wrong, v)
-    np.testing.assert_array_equal(track.at(true).position, before.position)
-    assert track.at(true).age == before.age
+    assert not track.measure(true + CONFIG.delay_us - CONFIG.rewind_us - late, wrong, v)
+    after = track.at(true)
+    np.testing.assert_array_equal(after.position, before.position)
+    assert after[2:] == before[2:]
     assert track.rejected == 1
 
 

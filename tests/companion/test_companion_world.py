@@ -19,6 +19,7 @@ FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 AUTOPILOT, TARGET = Source(11, 1), Source(1, 1)
 NOW = 1_767_225_600_000_000
 CONFIG = CompanionConfig()
+HERE = np.broadcast_to(np.array([0.0, 0.0, 5.0]), (16, 3))
 AT_FLEET_ZERO = GpsGlobalOrigin(AUTOPILOT, 47.397742, 8.545594, 488.0, 0)
 
 
@@ -117,11 +118,11 @@ def test_a_target_is_who_is_named_and_only_on_its_link():
 def test_the_target_is_an_obstacle_only_if_told_so():
     x, v = np.array([3.0, 1.0, 5.0]), (0.5, -1.0, 0.0)
     picture = world(("target", target(x, v)))
-    assert picture.obstacles(NOW, picture.at(NOW)).ids == ()
+    assert picture.obstacles(NOW, picture.at(NOW), HERE).ids == ()
     config = CompanionConfig(target_d_min=1.0, target_d_safe=4.0)
     picture = world(("target", target(x, v)), ("swarm", target(-x, source=Source(12, 1))), config=config)
     view = picture.at(NOW)
-    obstacles = picture.obstacles(NOW, view)
+    obstacles = picture.obstacles(NOW, view, HERE)
     assert obstacles.ids == (12, 1)
     np.testing.assert_array_equal(obstacles.d_min, [config.field.d_min, 1.0])
     np.testing.assert_array_equal(obstacles.d_safe, [config.field.d_safe, 4.0])

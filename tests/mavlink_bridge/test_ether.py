@@ -64,17 +64,15 @@ def test_arrivals_are_ordered_by_time_then_sender_then_sequence() -> None:
     assert values == [97, 197, 98, 198, 99, 199, 0]
 
 
-@given(
-    st.builds(
-        Faults,
-        st.integers(0, 50_000),
-        st.integers(0, 50_000),
-        st.floats(0, 1),
-        st.floats(0, 1),
-        st.floats(0, 1),
-    ),
-    st.integers(0, 2**32),
-)
+def any_faults(loss: st.SearchStrategy[float], burst: st.SearchStrategy[float]) -> st.SearchStrategy[Faults]:
+    share, time = st.floats(0, 1), st.integers(0, 50_000)
+    return st.builds(Faults, time, time, loss, share, share, burst)
+
+
+SOME_FAULTS = any_faults(st.floats(0, 1), st.just(0.0)) | any_faults(st.floats(0, 0.5), st.floats(1, 20))
+
+
+@given(SOME_FAULTS, st.integers(0, 2**32))
 @settings(max_examples=30)
 def test_nothing_is_early_and_the_books_balance(faults: Faults, seed: int) -> None:
     ether = Ether([Channel("air", CREW, faults)], seed, TICK)

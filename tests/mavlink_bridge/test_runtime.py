@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
 
 import pytest
+from chatter import TICK, Chatter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,25 +14,7 @@ from mavlink_bridge.ether import Channel, Ether, Faults
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.runtime import LockStep, Scheduled
 
-TICK = 2500
 CLEAN = Faults()
-
-
-class Chatter:
-    """Says when it is and a digest of all it has heard, so that any difference spreads."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.steps: list[int] = []
-        self.heard: list[tuple[int, bytes]] = []
-        self._digest = 1
-
-    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        self.steps.append(now)
-        for _, data in inbox:
-            self.heard.append((now, data))
-            self._digest = (self._digest * 31 + int.from_bytes(data, "big")) % (1 << 61)
-        return [Datagram("swarm", now.to_bytes(8, "big") + self._digest.to_bytes(8, "big"))]
 
 
 def crew(names: str, period: int = 4 * TICK) -> list[Scheduled]:
@@ -59,7 +41,7 @@ def test_nodes_step_at_phase_plus_multiples_of_their_period(
     for stop in [*sorted(stops), 200_000]:
         loop.run(stop, ticks.append)
         assert loop.now == stop
-    for node, period, phase in scheduled:
+    for node, period, phase, _ in scheduled:
         assert isinstance(node, Chatter)
         assert node.steps == list(range(phase, 200_000, period))
     assert ticks == sorted({step for entry in scheduled for step in entry.node.steps})  # type: ignore[attr-defined]
@@ -68,7 +50,7 @@ def test_nodes_step_at_phase_plus_multiples_of_their_period(
 def test_no_node_sees_what_another_sends_on_the_same_tick() -> None:
     scheduled = [Scheduled(Chatter(name), TICK, 0) for name in "ab"]
     LockStep(scheduled, air(scheduled), TICK).run(10 * TICK)
-    for node, _, _ in scheduled:
+    for node, *_ in scheduled:
         assert isinstance(node, Chatter)
         assert [now - int.from_bytes(data[:8], "big") for now, data in node.heard] == [TICK] * 9
 
@@ -97,7 +79,7 @@ def test_taps_see_all_that_enters_and_leaves() -> None:
     scheduled = crew("abc")
     seen: list[Event] = []
     LockStep(scheduled, air(scheduled), TICK, [lambda *event: seen.append(event)]).run(100 * TICK)
-    for node, _, _ in scheduled:
+    for node, *_ in scheduled:
         assert isinstance(node, Chatter)
         mine = [event for event in seen if event[1] == node.name]
         assert [(now, datagram.data) for now, _, way, datagram in mine if way == "in"] == node.heard

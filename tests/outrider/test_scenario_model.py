@@ -116,7 +116,7 @@ def test_flights_begin_on_a_tick_whatever_the_tick() -> None:
 
 
 def test_the_defaults_of_a_companion_fit_the_defaults_of_a_scenario() -> None:
-    assert scenario("antipodal-8", companion=CompanionConfig().model_dump()).companion == CompanionConfig()
+    assert scenario("scenario-1", companion=CompanionConfig().model_dump()).companion == CompanionConfig()
 
 
 # Hypothesis: shipped files gone wrong

@@ -16,7 +16,7 @@ from hypothesis.extra import numpy as hnp
 from shipped import scenario
 
 from companion.node import Tally
-from outrider.flight import Flight
+from outrider.outcome import Messages, Outcome, Punctuality
 from outrider.scenario import Scenario
 from outrider.summary import (
     WALL_FIELDS,
@@ -48,8 +48,6 @@ INNER = {
 NAN = float("nan")
 # Per companion, at the start of the clock and at the end.
 TALLIES = ((Tally(10, 1, 2, 3, 1, (5, 5)), Tally(30, 4, 7, 8, 2, (5, 5, 1_000_000, 3_000_000))),) * 2
-ETHER = SimpleNamespace(counters=SimpleNamespace(sent=100, dropped=7))
-COMPANIONS = (SimpleNamespace(bad_frames=1), SimpleNamespace(bad_frames=2))
 ANTIPODAL, JUMP, ESCORT = scenario("antipodal-8", vehicles=2), scenario("scenario-1", vehicles=2), "escort"
 
 
@@ -57,7 +55,7 @@ def hovering(count: int, vehicles: int = 2) -> Samples:
     """Still, everything zero, a sample every 20 ms."""
     flat, deep = np.zeros((count, vehicles)), np.zeros((count, vehicles, 3))
     time = np.arange(count, dtype=np.int64) * 20_000
-    return Samples(time, deep, deep, deep, deep, flat, flat, np.zeros((count, 3)), np.full(count, 4.0))
+    return Samples(time, deep, deep, deep, deep, deep, flat, flat, np.zeros((count, 3)), np.full(count, 4.0))
 
 
 @dataclass
@@ -67,6 +65,7 @@ class Seen:
     all: Samples
     vehicles: Any = field(default_factory=lambda: SimpleNamespace(count=0, minimum=1.5))
     target: Any = field(default_factory=lambda: SimpleNamespace(count=0, minimum=2.5))
+    obstacles: Any = field(default_factory=lambda: SimpleNamespace(count=0, minimum=float("inf")))
 
     def samples(self, since: int = 0, until: int | None = None) -> Samples:
         chosen = (self.all.time >= since) & (self.all.time < (until if until is not None else 1 << 62))
@@ -85,13 +84,14 @@ class Flown:
     failure: str | None = None
     span: float = 0.63
     tallies: Any = TALLIES
-    ether: Any = field(default_factory=lambda: ETHER)
-    companions: Any = COMPANIONS
+    seed: int = 7
+    messages: Messages = field(default_factory=lambda: Messages(100, 7, 3))
+    punctuality: Punctuality | None = None
 
 
 def summary(**changes: Any) -> dict[str, Value]:
-    flown = cast("Flight", Flown(**changes))
-    return summarise(flown, Cost(2.0, 1.5), 7, Path("runs/x"))
+    flown = cast("Outcome", Flown(**changes))
+    return summarise(flown, Cost(2.0, 1.5), Path("runs/x"))
 
 
 def no_constant(word: str) -> None:
@@ -224,7 +224,7 @@ def test_the_standoff_error_is_the_distance_to_the_nearest_point_of_the_circle(
     surface = of.companion.surface
     target = np.array([3.0, -2.0, 1.0])
     place = target + np.array([across * np.cos(bearing), across * np.sin(bearing), up])
-    (error,) = standoff_errors(cast("Flight", Flown(scenario=of)), place[None, None], target[None])[0]
+    (error,) = standoff_errors(cast("Outcome", Flown(scenario=of)), place[None, None], target[None])[0]
     angles = np.linspace(0.0, 2.0 * np.pi, 2_000)
     circle = target + np.column_stack(
         [surface.radius * np.cos(angles), surface.radius * np.sin(angles), np.full(2_000, surface.height)]

@@ -16,7 +16,8 @@ from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.node import Datagram
 from outrider.scenario import FixedTarget
 from outrider.targets import Standing
-from outrider.truth import SAMPLE, Encounters, Truth
+from outrider.truth import SAMPLE, Encounters, Limits, Truth
+from outrider.witness import Witness
 from sitl.autopilot_config import AutopilotConfig
 from sitl.node import Autopilot
 from sitl.vehicle import Reference, VehicleState
@@ -113,6 +114,7 @@ class OnRails:
         self._path = path
         self._referenced = reference
         self.airborne = airborne
+        self.estimate_error = np.zeros(3)
         self.trace = np.empty((0, 3))
         self.trace_times = np.empty(0, dtype=np.int64)
 
@@ -137,13 +139,20 @@ class OnRails:
         return Reference.hover(self.trace[-1], 0.0) if self._referenced else None
 
 
-def truth(vehicles: Sequence[OnRails], d_min_target: float | None = None, at: Any = (0.0, 0.0, 0.0)) -> Truth:
+def truth(vehicles: Sequence[OnRails], d_min_target: float | None = None) -> Truth:
+    return Truth(len(vehicles), Limits(LEAST, d_min_target))
+
+
+def watch(
+    vehicles: Sequence[OnRails],
+    truth: Truth,
+    seconds: float,
+    tick: int = 5_000,
+    at: Any = (0.0, 0.0, 0.0),
+) -> list[int]:
+    """Times at which a sample was taken, the target being ``at`` (m)."""
     target = Standing(FixedTarget(kind="fixed", at=at), FLEET)
-    return Truth(cast("list[Autopilot]", list(vehicles)), target, LEAST, d_min_target)
-
-
-def watch(vehicles: Sequence[OnRails], seen: Truth, seconds: float, tick: int = 5_000) -> list[int]:
-    """Times at which a sample was taken."""
+    seen = Witness(cast("list[Autopilot]", list(vehicles)), target, truth)
     taken = []
     for now in range(tick, round(seconds * 1e6) + 1, tick):
         for vehicle in vehicles:
@@ -179,8 +188,8 @@ def test_vehicles_on_the_ground_do_not_count() -> None:
 @pytest.mark.parametrize(("d_min", "count"), [(None, 0), (1.0, 1), (0.05, 0)])
 def test_the_target_counts_where_it_is_an_obstacle(d_min: float | None, count: int) -> None:
     vehicles = [OnRails(passing(0.1, 4.0))]
-    seen = truth(vehicles, d_min, at=(0.0, 0.0, 5.0))
-    watch(vehicles, seen, 1.0)
+    seen = truth(vehicles, d_min)
+    watch(vehicles, seen, 1.0, at=(0.0, 0.0, 5.0))
     assert seen.target.count == count
     assert seen.vehicles.count == 0
     if d_min is not None:
@@ -189,8 +198,8 @@ def test_the_target_counts_where_it_is_an_obstacle(d_min: float | None, count: i
 
 def test_samples_are_in_fleet_enu_and_nan_where_there_is_nothing() -> None:
     vehicles = [OnRails(passing(0.3, 2.0)), OnRails(lambda _: (1.0, 2.0, 3.0), reference=False)]
-    seen = truth(vehicles, at=(7.0, 8.0, 9.0))
-    taken = watch(vehicles, seen, 1.0)
+    seen = truth(vehicles)
+    taken = watch(vehicles, seen, 1.0, at=(7.0, 8.0, 9.0))
     samples = seen.samples()
     assert samples.time.tolist() == taken
     count = len(taken)
@@ -227,10 +236,13 @@ def test_samples_can_be_had_for_a_time() -> None:
 def test_nothing_is_seen_twice() -> None:
     vehicles = [OnRails(lambda _: (0.0, 0.0, 5.0)), OnRails(lambda _: (0.1, 0.0, 5.0))]
     seen = truth(vehicles)
-    watch(vehicles, seen, 0.1)
-    before = len(seen.samples().time)
-    assert not seen.see(10_000_000)
-    assert len(seen.samples().time) == before
+    target = Standing(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET)
+    witness = Witness(cast("list[Autopilot]", vehicles), target, seen)
+    for vehicle in vehicles:
+        vehicle.move(0, 5_000)
+    assert witness.see(5_000)
+    assert not witness.see(10_000_000)
+    assert len(seen.samples().time) == 1
     assert seen.vehicles.count == 1
 
 
@@ -250,12 +262,13 @@ def test_separation_is_the_least_of_every_step(offset: float, speed: float) -> N
 def test_the_emulated_autopilot_is_watched_at_every_physics_step() -> None:
     config = AutopilotConfig(system_id=11, latitude=47.397742, longitude=8.545594, altitude=488.0)
     autopilot = Autopilot(config, FIREFLY, FLEET, 1)
-    seen = Truth([autopilot], Standing(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET), LEAST, 1.0)
+    seen = Truth(1, Limits(LEAST, 1.0))
+    witness = Witness([autopilot], Standing(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET), seen)
     inbox: list[Datagram] = []
     taken = []
     for now in range(0, 200_001, 5_000):
         autopilot.step(now, inbox)
-        if seen.see(now):
+        if witness.see(now):
             taken.append(now)
     assert taken == list(range(5_000, 200_001, SAMPLE))
     samples = seen.samples()

@@ -13,7 +13,8 @@ from companion.pilot import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.tlog import read_tlog
-from outrider.flight import Flight, Stage
+from outrider.conductor import Stage
+from outrider.flight import Flight
 from outrider.resources import config_root, find
 from outrider.scenario import Scenario
 from outrider.summary import Cost, Value, summarise
@@ -39,7 +40,12 @@ def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     result = deepcopy(base)
     for key, value in changes.items():
         inner = result.get(key)
-        if isinstance(inner, dict) and isinstance(value, dict):
+        # What is of another kind has other keys: it replaces the old one.
+        if (
+            isinstance(inner, dict)
+            and isinstance(value, dict)
+            and value.get("kind", inner.get("kind")) == inner.get("kind")
+        ):
             value = _merged(inner, value)
         result[key] = value
     return result
@@ -95,7 +101,7 @@ def fly(of: Scenario, seed: int, directory: Path, *, reverse_nodes: bool = False
     )
     watch.flight = flight
     flight.run()
-    return Flown(flight, summarise(flight, Cost(1.0, 1.0), seed, directory), watch, directory)
+    return Flown(flight, summarise(flight.outcome, Cost(1.0, 1.0), directory), watch, directory)
 
 
 def setpoints(log: Path) -> list[SetpointLocal]:
@@ -109,8 +115,8 @@ def check(flown: Flown) -> None:
     """What holds for every flight: nobody too near, nothing beyond the limits, all down at the end."""
     flight, summary = flown.flight, flown.summary
     of = flight.scenario
-    assert flight.failure is None
-    assert flight.stage is Stage.DONE
+    assert flight.conductor.failure is None
+    assert flight.conductor.stage is Stage.DONE
     assert flown.watch.stages == [Stage.PREPARE, Stage.CLOCK, Stage.LAND]
     _check_separation(flown)
     assert summary["solver_failures"] == 0

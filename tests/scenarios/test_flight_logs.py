@@ -126,7 +126,7 @@ def test_setpoints_flow_evenly_and_without_jumps(flown: Flown) -> None:
 
 def test_the_vehicles_were_where_their_setpoints_said(flown: Flown) -> None:
     flight = flown.flight
-    samples = flight.truth.samples(flight.clock_start or 0, flight.clock_end)
+    samples = flight.truth.samples(flight.conductor.clock_start or 0, flight.conductor.clock_end)
     for k, path in enumerate(flown.logs):
         times, places = [], []
         codec = Codec(lambda identifier, _system, _component: identifier == 84)
@@ -136,7 +136,7 @@ def test_the_vehicles_were_where_their_setpoints_said(flown: Flown) -> None:
                 north, east, down = message.position
                 times.append(record.time)
                 places.append((east, north, -down))
-        start = flight.starts.positions[k] * (1.0, 1.0, 0.0)
+        start = flight.fleet.starts.positions[k] * (1.0, 1.0, 0.0)
         said = np.column_stack([np.interp(samples.time, times, axis) for axis in np.array(places).T]) + start
         off = np.linalg.norm(said - samples.position[:, k], axis=1)
         assert np.percentile(off, 95) < 0.6

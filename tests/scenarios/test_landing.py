@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from lockstep_flights import fly, scenario
 
-from outrider import flight as flights
-from outrider.flight import Flight, Stage
+from outrider import conductor
+from outrider.conductor import Stage
+from outrider.flight import Flight
 from outrider.operator import Operator
 
 
@@ -18,7 +19,7 @@ def test_who_hovers_above_a_landed_vehicle_lands_beside_it(
 ) -> None:
     """The first vehicle lands where it is, which is where the second has to go: it must move aside in the
     end."""
-    monkeypatch.setattr(flights, "_LAND_CAP", 25_000_000)
+    monkeypatch.setattr(conductor, "_LAND_CAP", 25_000_000)
 
     def stay(self: Operator, system: int, position: np.ndarray) -> None:
         if system == 11:
@@ -30,11 +31,11 @@ def test_who_hovers_above_a_landed_vehicle_lands_beside_it(
     monkeypatch.setattr(Operator, "goal", stay)
     flown = fly(scenario("antipodal-8", {"vehicles": 2, "cap_s": 12.0}), 1, tmp_path)
     flight: Flight = flown.flight
-    assert flight.stage is Stage.DONE
-    samples = flight.truth.samples(flight.clock_start or 0, flight.clock_end)
+    assert flight.conductor.stage is Stage.DONE
+    samples = flight.truth.samples(flight.conductor.clock_start or 0, flight.conductor.clock_end)
     above = samples.position[-1, 1] - samples.position[-1, 0]
     assert np.hypot(above[0], above[1]) < 0.6
     assert above[2] > 4.0
-    assert flight.failure is None
+    assert flight.conductor.failure is None
     first, second = flight.truth.samples().position[-1]
-    assert np.hypot(*(second - first)[:2]) > flight.span
+    assert np.hypot(*(second - first)[:2]) > flight.fleet.vehicle.span

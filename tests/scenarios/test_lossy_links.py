@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from lockstep_flights import Flown, check, fly, scenario
 
-from outrider import flight as flights
+from outrider import conductor
 from outrider.figures import draw
 from outrider.summary import exit_status
 
@@ -54,12 +54,12 @@ def test_poor_links_hold_up_nobody(row: Poor, tmp_path: Path) -> None:
 def test_without_a_link_nobody_takes_off_and_it_is_said_why(
     link: str, missing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(flights, "_PREPARE_CAP", 4_000_000)
+    monkeypatch.setattr(conductor, "_PREPARE_CAP", 4_000_000)
     of = scenario("antipodal-8", {"vehicles": 2, "links": {link: {"loss": 1.0}}})
     flown = fly(of, 1, tmp_path)
     assert flown.summary["failure"] == "; ".join(f"companion-{k} waits for {missing}" for k in (11, 12))
     assert exit_status(flown.summary) == 1
-    assert flown.flight.clock_start is None
+    assert flown.flight.conductor.clock_start is None
     assert not any(autopilot.airborne for autopilot in flown.flight.autopilots)
-    draw(flown.flight, flown.summary, tmp_path / "flight.png")
+    draw(flown.flight.outcome, flown.summary, tmp_path / "flight.png")
     assert (tmp_path / "flight.png").stat().st_size > 1_000

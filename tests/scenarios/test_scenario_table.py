@@ -49,7 +49,7 @@ def test_a_flight(row: Row, tmp_path: Path) -> None:
     flown = fly(of, row.seed, tmp_path)
     check(flown)
     summary, flight = flown.summary, flown.flight
-    assert (flight.converged_at is not None) == bool(row.within_s)
+    assert (flight.conductor.converged_at is not None) == bool(row.within_s)
     if row.within_s:
         seconds = summary["convergence_time_s"]
         assert isinstance(seconds, float)
@@ -62,5 +62,6 @@ def test_a_flight(row: Row, tmp_path: Path) -> None:
         # PX4 refuses OFFBOARD until set-points have flowed for a while.
         assert [companion.pilot.refusals for companion in flight.companions] == [[]] * of.vehicles
     if of.companion.planar:
-        heights = flight.truth.samples(flight.clock_start or 0, flight.clock_end).position[..., 2]
+        start, end = flight.conductor.clock_start or 0, flight.conductor.clock_end
+        heights = flight.truth.samples(start, end).position[..., 2]
         assert np.abs(heights - of.starts.height).max() < 0.2

@@ -285,7 +285,8 @@ def test_vehicles_with_different_origins_agree_on_where_they_are(flavour):
             frame.velocity_to_fleet(local.velocity_ned), ned_to_enu(rig.autopilot.state.velocity), atol=1e-5
         )
         attitude = rig.all(Attitude)[-1]
-        true_yaw = yaw_to_enu(rig.autopilot._vehicle.yaw)
+        w, x, y, z = rig.autopilot.state.attitude
+        true_yaw = yaw_to_enu(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
         assert math.remainder(frame.yaw_to_fleet(attitude.yaw) - true_yaw, math.tau) == pytest.approx(
             0, abs=1e-4
         )

@@ -61,6 +61,11 @@ def helix(t):
 
 
 @kernel
+def heading(yaw):
+    return (math.cos(yaw), math.sin(yaw), 0.0)
+
+
+@kernel
 def fly(motion, airframes, steps, on_helix):
     """Errors ‖e_x‖, Ψ and the thrust at each step, the controller's wrench acting directly on the body."""
     model = airframes[0]
@@ -72,12 +77,22 @@ def fly(motion, airframes, steps, on_helix):
         yaw_rate = math.pi if on_helix else 0.0
         axes = body_axes(motion[2])
         # The paper takes the acceleration from its model, and f does not depend on it.
-        f, _ = desired_force(motion[0], motion[1], zero, axes, motion[3], target, model)
+        f, _ = desired_force(motion[0], motion[1], zero, axes, motion[3], target, zero, model)
         acceleration = plus((0.0, 0.0, model.gravity), -f / model.mass, axes[2])
-        _, A = desired_force(motion[0], motion[1], acceleration, axes, motion[3], target, model)
-        R_c, _, _ = commanded_attitude(A, yaw_rate * t, yaw_rate, 0.0, axes, model)
+        _, A = desired_force(motion[0], motion[1], acceleration, axes, motion[3], target, zero, model)
+        R_c, _, _ = commanded_attitude(A, heading(yaw_rate * t), yaw_rate, 0.0, axes, model)
         f, moment = control(
-            motion[0], motion[1], acceleration, axes, motion[3], target, yaw_rate * t, yaw_rate, 0.0, model
+            motion[0],
+            motion[1],
+            acceleration,
+            axes,
+            motion[3],
+            target,
+            yaw_rate * t,
+            yaw_rate,
+            0.0,
+            (zero, zero),
+            model,
         )
         e = (motion[0][0] - target[0][0], motion[0][1] - target[0][1], motion[0][2] - target[0][2])
         history[i, 0] = math.sqrt(e[0] ** 2 + e[1] ** 2 + e[2] ** 2)
@@ -131,7 +146,7 @@ LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @kernel
 def command(A, yaw, yaw_rate, yaw_acceleration, axes, airframes):
-    return commanded_attitude(A, yaw, yaw_rate, yaw_acceleration, axes, airframes[0])
+    return commanded_attitude(A, heading(yaw), yaw_rate, yaw_acceleration, axes, airframes[0])
 
 
 @pytest.mark.parametrize("heading", ["paper", "euler"])

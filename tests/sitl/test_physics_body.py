@@ -35,7 +35,7 @@ def tumbling(rates, speeds=0.0, velocity=(1.0, -2.0, 3.0)):
     states = initial_states(FIREFLY, [[0.0, 0.0, -100.0]], [0.3], FAR_BELOW)
     states[0, 3:6] = velocity
     states[0, 10:13] = rates
-    states[0, STATE_SIZE:] = speeds
+    states[0, STATE_SIZE : STATE_SIZE + 6] = speeds
     return states
 
 

@@ -102,11 +102,12 @@ def some_commands(count, rng):
     return np.array(commands)
 
 
-@pytest.mark.parametrize("count", [2, 9])
+@pytest.mark.parametrize("count", [2, 5, 9, 20])
 def test_vehicle_in_a_batch_moves_as_alone_to_the_last_bit(count):
     rng = np.random.default_rng(count)
     record = airframe_record(airframe(FIREFLY))
     together = initial_states(FIREFLY, rng.normal(0.0, 5.0, (count, 3)), rng.normal(size=count), 0.0)
+    together[0, -6] = 0.3  # its first rotor
     apart = [together[k : k + 1].copy() for k in range(count)]
     for _ in range(5):
         commands = some_commands(count, rng)
@@ -145,6 +146,118 @@ def test_what_is_not_finite_is_refused_and_moves_nothing(column, value):
     for old, new in zip(before, vehicle.state, strict=True):
         np.testing.assert_array_equal(old, new)
     assert np.all(np.isfinite(vehicle.advance(2, HOVER)))
+
+
+def mirrored(vector):
+    return np.asarray(vector) * (1.0, -1.0, 1.0)
+
+
+def failing(rotor, left, sign=1.0):
+    """Positions and states of a flight in which a rotor fails, mirrored left to right for ``sign`` −1.
+
+    Without the rolling moment of RotorS, which is along the velocity whichever way a rotor turns and so has
+    no mirror image.
+    """
+    config = FIREFLY.model_copy(update={"rolling_moment": 0.0})
+    mirror = (1.0, sign, 1.0)
+    vehicle = Vehicle(config, np.array([1.0, 2.0, -20.0]) * mirror, yaw=0.3 * sign, hovering=True)
+    reference = Reference(
+        np.array([3.0, 0.5, -21.0]) * mirror, np.array([0.5, -1.0, 0.0]) * mirror, yaw=0.7 * sign
+    )
+    wind = np.array([2.0, -1.0, 0.5]) * mirror
+    tracks = [vehicle.advance(80, reference, wind)]
+    vehicle.fail_rotor(rotor, left)
+    tracks.extend(vehicle.advance(40, reference, wind) for _ in range(10))
+    return np.vstack(tracks), vehicle.state
+
+
+def test_a_rotor_with_all_its_speed_left_changes_nothing_to_the_bit():
+    (track, state), (other, other_state) = failing(0, 1.0), failing(4, 1.0)
+    np.testing.assert_array_equal(track, other)
+    for one, two in zip(state, other_state, strict=True):
+        np.testing.assert_array_equal(one, two)
+    assert np.abs(track - failing(4, 0.99)[0]).max() > 1e-3
+
+
+@pytest.mark.parametrize("left", [0.0, 0.6])
+def test_the_failure_of_the_rotor_opposite_is_the_mirror_image(left):
+    """Rotors 0 and 5, 1 and 4, 2 and 3 lie left and right of each other and turn the other way."""
+    for one, other in ((0, 5), (1, 4)):
+        (track, state), (image, image_state) = failing(one, left), failing(other, left, -1.0)
+        np.testing.assert_allclose(mirrored(image), track, atol=1e-7)
+        np.testing.assert_allclose(image_state.body_rates * (-1.0, 1.0, -1.0), state.body_rates, atol=1e-6)
+        np.testing.assert_allclose(image_state.rotor_speeds[::-1], state.rotor_speeds, atol=1e-4)
+
+
+def test_a_failed_rotor_turns_at_its_part_of_the_motors_speed():
+    vehicle = Vehicle(FIREFLY, (0.0, 0.0, 0.0))
+    vehicle.fail_rotor(2, 0.25)
+    vehicle.advance(400, None, idle=True)
+    expected = FIREFLY.omega_idle * np.array([1.0, 1.0, 0.25, 1.0, 1.0, 1.0])
+    np.testing.assert_allclose(vehicle.state.rotor_speeds, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("dead", range(6))
+def test_with_one_dead_rotor_it_stays_up_and_in_place_but_spins(dead):
+    vehicle = Vehicle(FIREFLY, HOVER.position, hovering=True)
+    vehicle.fail_rotor(dead, 0.0)
+    for _ in range(500):
+        vehicle.advance(8, HOVER)
+        assert np.linalg.norm(vehicle.state.position - HOVER.position) < 0.6
+    assert np.linalg.norm(vehicle.state.position - HOVER.position) < 0.3
+    assert abs(vehicle.state.body_rates[2]) > 1.0
+
+
+@pytest.mark.parametrize("left", [0.0, 0.2])
+def test_the_failure_of_all_rotors_is_a_fall_and_stays_finite(left):
+    vehicle = Vehicle(FIREFLY, (0.0, 0.0, -30.0), hovering=True)
+    for k in range(6):
+        vehicle.fail_rotor(k, left)
+    reference = Reference.hover((5.0, -3.0, -30.0), yaw=2.0)
+    for _ in range(500):
+        vehicle.advance(8, reference, (6.0, -2.0, 1.0))
+        for value in vehicle.state:
+            assert np.all(np.isfinite(value))
+    assert vehicle.on_ground
+
+
+@given(left=st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6), yaw=st.floats(-3.0, 3.0))
+@settings(max_examples=25, deadline=None)
+def test_whatever_fails_the_state_stays_finite(left, yaw):
+    vehicle = Vehicle(FIREFLY, (0.0, 0.0, -60.0), hovering=True)
+    for k in range(6):
+        vehicle.fail_rotor(k, left[k])
+    for i in range(40):
+        vehicle.advance(40, Reference.hover((i % 7, -i % 5, -60.0 + i), yaw=yaw), (3.0, 3.0, 0.0))
+        for value in vehicle.state:
+            assert np.all(np.isfinite(value))
+
+
+@pytest.mark.parametrize(
+    ("index", "left", "error"),
+    [(6, 0.5, IndexError), (-1, 0.5, IndexError), (0, 1.1, ValueError), (0, np.nan, ValueError)],
+)
+def test_an_impossible_failure_is_refused(index, left, error):
+    vehicle = Vehicle(FIREFLY, (0.0, 0.0, 0.0))
+    with pytest.raises(error, match="firefly"):
+        vehicle.fail_rotor(index, left)
+    np.testing.assert_array_equal(
+        vehicle.advance(8, HOVER), Vehicle(FIREFLY, (0.0, 0.0, 0.0)).advance(8, HOVER)
+    )
+
+
+@pytest.mark.parametrize("yaw", [0.0, 2.1])
+@pytest.mark.parametrize("gravity", [9.80665, 9.78])
+def test_who_starts_in_the_air_hovers_there_at_once(yaw, gravity):
+    vehicle = Vehicle(FIREFLY, (4.0, -2.0, -3.0), yaw, gravity=gravity, hovering=True)
+    track = vehicle.advance(800, Reference.hover((4.0, -2.0, -3.0), yaw))
+    assert np.linalg.norm(track - [4.0, -2.0, -3.0], axis=1).max() < 1e-3
+    assert vehicle.yaw == pytest.approx(yaw, abs=1e-6)
+
+
+def test_nobody_hovers_on_the_ground():
+    with pytest.raises(ValueError, match="vehicle 1 cannot hover"):
+        initial_states(FIREFLY, [[0.0, 0.0, -3.0], [0.0, 0.0, 0.0]], [0.0, 0.0], 0.0, hovering=True)
 
 
 def test_a_quadrotor_flies_too():

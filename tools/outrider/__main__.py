@@ -38,26 +38,50 @@ def swarm(
     seed: Annotated[int, typer.Option(min=0, help="Of jitter, phases and link faults.")] = 1,
     loss: Annotated[Optional[float], typer.Option(min=0.0, max=1.0, help="Share of messages lost.")] = None,  # noqa: UP045
     delay_ms: Annotated[Optional[float], typer.Option(min=0.0, help="Of the swarm and target links.")] = None,  # noqa: UP045
-    sensors: Annotated[Optional[str], typer.Option(help="truth.")] = None,  # noqa: UP045
+    sensors: Annotated[Optional[str], typer.Option(help="truth, rtk or gnss.")] = None,  # noqa: UP045
+    wind: Annotated[Optional[str], typer.Option(help="m/s towards east, or EAST,NORTH[,UP].")] = None,  # noqa: UP045
     replan_hz: Annotated[Optional[float], typer.Option(help="Plans per second.")] = None,  # noqa: UP045
+    real_time: Annotated[
+        bool, typer.Option("--real-time", help="Under the wall clock: a process per node, over UDP.")
+    ] = False,
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="Ask for real-time priority; implies --real-time.")
+    ] = False,
     out: Annotated[Optional[Path], typer.Option(help="Run directory; new or empty.")] = None,  # noqa: UP045
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
-    """Fly a scenario in lock-step and leave logs, summary and picture in a run directory."""
+    """Fly a scenario, in lock-step unless told otherwise, and leave logs, summary and picture in a run
+    directory."""
     from outrider import swarm as flying
     from outrider.console import progress, show
     from outrider.summary import exit_status
 
-    options = flying.Options(method, avoidance, planar, vehicles, loss, delay_ms, sensors, replan_hz)
+    options = flying.Options(method, avoidance, planar, vehicles, loss, delay_ms, sensors, replan_hz, wind)
     prepared = flying.prepare(scenario, options)
     directory = flying.run_directory(out, prepared.scenario, seed)
     with progress(prepared.scenario.duration_s) as watch:
-        summary = flying.fly(prepared, seed, directory, watch)
+        pace = flying.Pace(real_time or realtime, realtime)
+        summary = flying.fly(prepared, seed, directory, watch, pace)
     if as_json:
         sys.stdout.write(json.dumps(summary) + "\n")
     else:
         show(summary)
     raise typer.Exit(exit_status(summary))
+
+
+@app.command()
+def sweep(
+    name: Annotated[str, typer.Argument(help="A file, or the name of a shipped sweep.")],
+    runs: Annotated[Optional[int], typer.Option(min=1, max=1_000_000, help="Seeds per cell.")] = None,  # noqa: UP045
+    jobs: Annotated[Optional[int], typer.Option(min=1, help="Processes; as many as cores.")] = None,  # noqa: UP045
+    out: Annotated[Optional[Path], typer.Option(help="Directory; one begun is gone on with.")] = None,  # noqa: UP045
+    wall_limit: Annotated[float, typer.Option(min=1.0, help="s of wall time for one run.")] = 1800.0,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Fly many seeds of a grid of scenarios or random scenes. What was killed can be gone on with."""
+    from outrider.sweeps.command import sweep as sweeping
+
+    raise typer.Exit(sweeping(name, runs, jobs, out, as_json, wall_limit))
 
 
 @app.command()

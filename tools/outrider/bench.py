@@ -98,7 +98,7 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
         ):
             prediction = position + np.vstack([np.zeros(1), ahead[:-1, None]]) * velocity
             started = time.thread_time_ns()
-            obstacles = world.obstacles(now, world.at(now))
+            obstacles = world.obstacles(now, world.at(now), prediction)
             plan = planner.plan(now, position, velocity, prediction, aim, obstacles)
             targets = np.broadcast_to(aim.target, (horizon.steps + 1, 3))
             heading.plan(now, plan.horizon.knots[1:, 0:3], targets)

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from outrider.flight import Stage
+from outrider.conductor import Stage
 from outrider.summary import Value
 
 _WORDS = {
@@ -17,12 +17,14 @@ _WORDS = {
     "convergence_time_s": "convergence time, s",
     "min_separation_m": "least separation, m",
     "min_target_distance_m": "least distance to the target, m",
+    "min_obstacle_distance_m": "least distance to an obstacle, m",
     "d_min_m": "d_min, m",
     "span_m": "vehicle tip to tip, m",
     "d_min_violations": "violations of d_min",
     "standoff_error_m": "stand-off error, m",
     "yaw_error_deg": "yaw error, deg",
     "tracking_error_m": "tracking error, m",
+    "estimate_error_m": "estimate's error, m",
     "max_speed_m_s": "largest speed, m/s",
     "max_acceleration_m_s2": "largest acceleration, m/s²",
     "max_tilt_deg": "largest tilt, deg",
@@ -32,6 +34,8 @@ _WORDS = {
     "solver_failures": "solver failures",
     "held_epochs": "held plans",
     "messages": "messages",
+    "deadline_misses": "missed deadlines",
+    "lateness_ms": "lateness of the control, ms",
     "simulated_s": "simulated, s",
     "wall_s": "wall, s",
     "real_time_factor": "real-time factor",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from outrider.flight import EPOCH, Flight
+from outrider.outcome import Outcome
 from outrider.scenario import TARGET_SYSTEM
 from outrider.summary import Value, standoff_errors, yaw_errors
 from outrider.truth import Samples
@@ -19,7 +19,7 @@ _TARGET = "0.25"
 _LIMIT = "#b00020"
 
 
-def draw(flight: Flight, summary: dict[str, Value], path: Path) -> None:
+def draw(flight: Outcome, summary: dict[str, Value], path: Path) -> None:
     """Write the PNG of a finished flight to ``path``."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ def draw(flight: Flight, summary: dict[str, Value], path: Path) -> None:
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(4, 2, width_ratios=(1.15, 1.0))
     _paths(figure.add_subplot(grid[:, 0]), flight, samples)
-    time = (samples.time - (flight.clock_start or EPOCH)) * 1e-6
+    time = (samples.time - (flight.clock_start or samples.time[0])) * 1e-6
     right = [figure.add_subplot(grid[row, 1]) for row in range(4)]
     for axes in right[1:3]:
         axes.sharex(right[0])
@@ -40,7 +40,7 @@ def draw(flight: Flight, summary: dict[str, Value], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
-def _headline(flight: Flight, summary: dict[str, Value]) -> str:
+def _headline(flight: Outcome, summary: dict[str, Value]) -> str:
     words = [flight.scenario.name, str(summary["method"]), f"seed {flight.seed}"]
     if summary["converged"] is not None:
         seconds = summary["convergence_time_s"]
@@ -50,16 +50,20 @@ def _headline(flight: Flight, summary: dict[str, Value]) -> str:
     return " · ".join(words)
 
 
-def _paths(axes: Axes, flight: Flight, samples: Samples) -> None:
-    """From above, with the surface around the target's last place."""
+def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
+    """From above, with obstacles and the surface around the target's last place."""
+    from matplotlib.patches import Circle
+
     for k, system in enumerate(flight.systems):
         (line,) = axes.plot(samples.position[:, k, 0], samples.position[:, k, 1], lw=1.0, label=f"{system}")
         axes.plot(*samples.position[0, k, :2], "o", ms=4, mfc="none", color=line.get_color())
         axes.plot(*samples.position[-1, k, :2], "o", ms=5, color=line.get_color())
+    for obstacle in flight.scenario.obstacles:
+        axes.add_patch(Circle(obstacle.at[:2], obstacle.radius, color="0.6", lw=0.0))
     there = samples.target[np.isfinite(samples.target).all(axis=1)]
     if len(there):
         axes.plot(there[:, 0], there[:, 1], color=_TARGET, lw=1.6, ls=":")
-        name = "target" if flight.target.system == TARGET_SYSTEM else f"target {flight.target.system}"
+        name = "target" if flight.target_system == TARGET_SYSTEM else f"target {flight.target_system}"
         axes.plot(*there[-1, :2], "*", ms=12, color=_TARGET, label=name)
         if flight.scenario.task == "escort":
             angle = np.linspace(0.0, 2.0 * np.pi, 200)
@@ -77,7 +81,7 @@ def _paths(axes: Axes, flight: Flight, samples: Samples) -> None:
     axes.legend(loc="upper right", fontsize=8, ncols=2)
 
 
-def _separation(axes: Axes, flight: Flight, samples: Samples, time: np.ndarray) -> None:
+def _separation(axes: Axes, flight: Outcome, samples: Samples, time: np.ndarray) -> None:
     """Least distance of any pair at every physics step, against d_min and the vehicles' own size."""
     separation = np.where(np.isfinite(samples.separation), samples.separation, np.nan)
     axes.plot(time, separation, lw=1.2, color="C0", label="vehicle to vehicle")
@@ -91,7 +95,7 @@ def _separation(axes: Axes, flight: Flight, samples: Samples, time: np.ndarray) 
     _finish(axes, flight)
 
 
-def _errors(standoff: Axes, yaw: Axes, flight: Flight, samples: Samples, time: np.ndarray) -> None:
+def _errors(standoff: Axes, yaw: Axes, flight: Outcome, samples: Samples, time: np.ndarray) -> None:
     """How far from where it should be, and how far off the bow the target is, per vehicle, from the clock's
     start on."""
     on_clock = (time >= 0.0) & (samples.time <= (flight.clock_end or samples.time[-1]))
@@ -112,7 +116,7 @@ def _errors(standoff: Axes, yaw: Axes, flight: Flight, samples: Samples, time: n
     _finish(yaw, flight)
 
 
-def _plan_time(axes: Axes, flight: Flight) -> None:
+def _plan_time(axes: Axes, flight: Outcome) -> None:
     """CPU time of every plan on the clock."""
     tallies = flight.tallies
     values = np.array([n for before, after in tallies for n in after.plan_ns[len(before.plan_ns) :]]) * 1e-6
@@ -130,7 +134,7 @@ def _plan_time(axes: Axes, flight: Flight) -> None:
     axes.grid(alpha=0.3)
 
 
-def _finish(axes: Axes, flight: Flight) -> None:
+def _finish(axes: Axes, flight: Outcome) -> None:
     axes.axvline(0.0, color="0.6", lw=0.8)
     if flight.clock_end is not None and flight.clock_start is not None:
         axes.axvline((flight.clock_end - flight.clock_start) * 1e-6, color="0.6", lw=0.8)

@@ -2,88 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from companion.config import CompanionConfig
+from companion.config import CompanionConfig, Obstacle
+from outrider.scenario_faults import Clocks, FaultPart
+from outrider.scenario_links import ROLES, AllLinks, PartitionPart
+from outrider.scenario_part import FIRST_SYSTEM, TARGET_SYSTEM, Length, Part, Period
+from outrider.scenario_places import FixedTarget, Origin, Points, RecordedTarget, Ring, Starts, Target
+from sitl.weather import WeatherConfig
 
-Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
-Position = tuple[Coordinate, Coordinate, Coordinate]
-Length = Annotated[float, Field(gt=0.0, le=1000.0)]
-Milliseconds = Annotated[float, Field(ge=0.0, le=10_000.0)]
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
-Period = Annotated[int, Field(gt=0, le=1_000_000, multiple_of=4)]
-
-FIRST_SYSTEM = 11
-"""System id of the first vehicle of a fleet; a recorded target keeps its own."""
-TARGET_SYSTEM = 10
-"""System id of a target that is not recorded: below the fleet, so that no vehicle can have it."""
-
-
-class Part(BaseModel):
-    """Base of all parts: an unknown key is an error, nothing changes after load."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Origin(Part):
-    """The fleet origin: where the fleet-local ENU frame has its zero."""
-
-    latitude: float = Field(47.397742, ge=-89.0, le=89.0, description="degrees")
-    longitude: float = Field(8.545594, ge=-180.0, le=180.0, description="degrees")
-    altitude: float = Field(488.0, ge=-500.0, le=9000.0, description="m above mean sea level")
-
-
-class Ring(Part):
-    """Starts: evenly on a circle, hovering at ``height`` above the ground, jittered within a ball per
-    seed."""
-
-    centre: tuple[Coordinate, Coordinate] = (0.0, 0.0)
-    radius: Length
-    height: float = Field(
-        5.0, ge=0.5, le=100.0, description="m above ground, where the vehicles hover at first"
-    )
-    jitter: float = Field(0.0, ge=0.0, le=2.0, description="m, radius of the ball around each start")
-    first_deg: float = Field(0.0, ge=-360.0, le=360.0, description="bearing of the first vehicle, ENU")
-
-
-class FixedTarget(Part):
-    """A target that stays; with ``jump_to`` it is suddenly elsewhere at the goal event."""
-
-    kind: Literal["fixed"]
-    at: Position
-    jump_to: Position | None = None
-    rate_hz: float = Field(5.0, gt=0.0, le=50.0)
-
-
-class RecordedTarget(Part):
-    """A target that really flew: GLOBAL_POSITION_INT frames of a tlog, unchanged, at their recorded times."""
-
-    kind: Literal["recorded"]
-    log: str = Field(description="tlog, relative to config/logs")
-    system: int = Field(ge=1, le=255)
-    start_s: float = Field(ge=0.0, description="after the log's first record")
-    duration_s: float = Field(gt=0.0, le=3600.0)
-
-
-class Links(Part):
-    """Faults of one kind of link."""
-
-    delay_ms: Milliseconds = 20.0
-    jitter_ms: Milliseconds = 0.0
-    loss: Share = 0.0
-    duplication: Share = 0.0
-    reordering: Share = 0.0
-
-
-class AllLinks(Part):
-    """The four links of a companion."""
-
-    autopilot: Links = Links(delay_ms=5.0)
-    swarm: Links = Links()
-    target: Links = Links()
-    ground: Links = Links()
+__all__ = [
+    "FIRST_SYSTEM",
+    "TARGET_SYSTEM",
+    "FixedTarget",
+    "Origin",
+    "Points",
+    "RecordedTarget",
+    "Ring",
+    "Scenario",
+]
 
 
 class Timing(Part):
@@ -91,7 +31,7 @@ class Timing(Part):
 
     base_tick_us: Period = 2_500
     autopilot_us: Period = Field(
-        5_000, description="how often an autopilot's node runs; its physics has its own"
+        10_000, description="how often an autopilot's node runs; its physics has its own"
     )
     companion_us: Period = Field(10_000, description="how often a companion's node runs")
 
@@ -101,26 +41,36 @@ class Scenario(Part):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     description: str = ""
-    task: Literal["escort", "antipodal"]
+    task: Literal["escort", "antipodal", "goto"]
     vehicles: int = Field(ge=1, le=244)
     vehicle: str = Field("firefly", description="file in config/vehicles")
     flavour: Literal["ardupilot", "px4"] = "ardupilot"
     origin: Origin = Origin()
-    starts: Ring
-    target: Annotated[FixedTarget | RecordedTarget, Field(discriminator="kind")]
-    sensors: Literal["truth"] = "truth"
+    starts: Starts
+    airborne: bool = Field(
+        False, description="begin in the air, hovering at the starts, and end there: no take-off, no landing"
+    )
+    target: Target
+    obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed, known to all companions")
+    sensors: Literal["truth", "rtk", "gnss"] = "truth"
+    weather: WeatherConfig = WeatherConfig()
     d_min: Length = Field(0.5, description="m between centres of vehicles; below it is a violation")
     d_min_target: Length | None = Field(None, description="m to the target; null: the target is no obstacle")
+    d_min_obstacle: Length = Field(0.5, description="m from a vehicle's centre to an obstacle's surface")
     cap_s: float = Field(60.0, gt=0.0, le=3600.0, description="simulated seconds after the goal event")
     links: AllLinks = AllLinks()
+    partitions: tuple[PartitionPart, ...] = ()
+    faults: tuple[FaultPart, ...] = ()
+    clocks: Clocks = Clocks()
     timing: Timing = Timing()
     companion: CompanionConfig = CompanionConfig()
 
     @property
     def has_goal(self) -> bool:
         """Whether there is a goal event, and so a time of convergence."""
-        return self.task == "antipodal" or (
-            isinstance(self.target, FixedTarget) and self.target.jump_to is not None
+        return self.task in ("antipodal", "goto") or (
+            isinstance(self.target, FixedTarget)
+            and (self.target.jump_to is not None or bool(self.target.jumps))
         )
 
     @property
@@ -128,12 +78,22 @@ class Scenario(Part):
         """How long it is flown at most after the goal event (or after the start of a record)."""
         return self.target.duration_s if isinstance(self.target, RecordedTarget) else self.cap_s
 
+    @property
+    def systems(self) -> range:
+        """System ids of the fleet."""
+        return range(FIRST_SYSTEM, FIRST_SYSTEM + self.vehicles)
+
     @model_validator(mode="after")
     def _consistent(self) -> Scenario:
+        for fault in (*self._timing_faults(), *self._place_faults(), *self._name_faults()):
+            raise ValueError(fault)
+        return self
+
+    def _timing_faults(self) -> Iterator[str]:
         timing, rates = self.timing, self.companion.rates
         tick = timing.base_tick_us
         if 1_000_000 % tick:
-            raise ValueError(f"timing.base_tick_us = {tick} does not divide a second")
+            yield f"timing.base_tick_us = {tick} does not divide a second"
         periods = {
             "timing.autopilot_us": timing.autopilot_us,
             "timing.companion_us": timing.companion_us,
@@ -142,14 +102,43 @@ class Scenario(Part):
         }
         for name, period in periods.items():
             if period % tick:
-                raise ValueError(f"{name} = {period} is not a whole number of base ticks of {tick} µs")
+                yield f"{name} = {period} is not a whole number of base ticks of {tick} µs"
         if min(rates.replan_us, rates.setpoint_us) < timing.companion_us:
-            raise ValueError(
+            yield (
                 f"companion.rates.replan_us and setpoint_us must be at least timing.companion_us = "
                 f"{timing.companion_us}"
             )
-        if isinstance(self.target, RecordedTarget) and 0 <= self.target.system - FIRST_SYSTEM < self.vehicles:
-            raise ValueError(f"target.system = {self.target.system} is the id of a vehicle of the fleet")
-        if self.task == "antipodal" and not isinstance(self.target, FixedTarget):
-            raise ValueError("task 'antipodal' needs a target of kind 'fixed': what the vehicles face")
-        return self
+
+    def _place_faults(self) -> Iterator[str]:
+        if self.task == "antipodal" and not isinstance(self.starts, Ring):
+            yield "task 'antipodal' needs starts of kind 'ring'"
+        if isinstance(self.starts, Points) and self.vehicles != len(self.starts.at):
+            places = len(self.starts.at)
+            yield f"vehicles = {self.vehicles}, but starts.at has {places} places; one each is allowed"
+        if (self.task == "goto") != (isinstance(self.starts, Points) and self.starts.goals is not None):
+            yield "task 'goto' and starts.goals come together"
+        if self.task in ("antipodal", "goto"):
+            if not isinstance(self.target, FixedTarget):
+                yield f"task {self.task!r} needs a target of kind 'fixed': what the vehicles face"
+            if self.companion.task != "goto":
+                yield f"task {self.task!r} needs companion.task: goto; it is {self.companion.task!r}"
+
+    def _name_faults(self) -> Iterator[str]:
+        allowed = f"{self.systems[0]} to {self.systems[-1]}"
+        if isinstance(self.target, RecordedTarget) and self.target.system in self.systems:
+            yield f"target.system = {self.target.system} is the id of a vehicle of the fleet"
+        for index, fault in enumerate(self.faults):
+            if fault.vehicle not in self.systems:
+                yield f"faults[{index}].vehicle = {fault.vehicle} is none of the fleet: {allowed} are allowed"
+        for index, cut in enumerate(self.partitions):
+            for member in cut.members:
+                if member not in self.systems:
+                    yield f"partitions[{index}].members: {member} is none of the fleet: {allowed} are allowed"
+        for name in AllLinks.model_fields:
+            for index, direction in enumerate(getattr(self.links, name).directions):
+                for end in (direction.sender, direction.receiver):
+                    if end is not None and end not in ROLES and end not in self.systems:
+                        yield (
+                            f"links.{name}.directions[{index}]: {end!r} is neither a vehicle ({allowed}) "
+                            f"nor one of {', '.join(ROLES)}"
+                        )

@@ -14,9 +14,16 @@ from typing import Any
 from pydantic import BaseModel
 
 from outrider.scenario import Scenario
+from outrider.sweeps.grid import Sweep
+from outrider.sweeps.scenes import Scene
 from sitl.config import VehicleConfig
 
-SCHEMAS: list[tuple[str, type[BaseModel]]] = [("scenario", Scenario), ("vehicle", VehicleConfig)]
+SCHEMAS: list[tuple[str, type[BaseModel]]] = [
+    ("scenario", Scenario),
+    ("vehicle", VehicleConfig),
+    ("sweep", Sweep),
+    ("scene", Scene),
+]
 """The name of each schema file, and the model that it is made from."""
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.surface import circle_error
-from outrider.flight import Flight
+from outrider.outcome import Outcome
 
 Array = NDArray[np.float64]
-Value = float | int | str | bool | None | dict[str, float | None] | dict[str, int]
+Value = float | int | str | bool | None | dict[str, float] | dict[str, float | None] | dict[str, int]
 
 WALL_FIELDS = ("plan_ms", "wall_s", "cpu_s", "real_time_factor", "run_dir")
 """Keys that may differ between two runs of one seed."""
@@ -27,7 +27,7 @@ class Cost(NamedTuple):
     cpu: float
 
 
-def summarise(flight: Flight, cost: Cost, seed: int, run_dir: Path) -> dict[str, Value]:
+def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Value]:
     """The summary of a finished flight; keys and words as in the design. Errors, speeds and counters are
     those of the clock; separation, solver failures and relaxed QPs count from the start of the flight. What a
     lock-step flight with the field has no figure for is null."""
@@ -45,7 +45,7 @@ def summarise(flight: Flight, cost: Cost, seed: int, run_dir: Path) -> dict[str,
         converged = flight.converged_at is not None
         if flight.converged_at is not None and start is not None:
             seconds = round((flight.converged_at - start) * 1e-6, 3)
-    ether = flight.ether.counters
+    late = flight.punctuality
     near_target = truth.target.minimum if scenario.d_min_target is not None else float("inf")
     return {
         "scenario": scenario.name,
@@ -53,18 +53,19 @@ def summarise(flight: Flight, cost: Cost, seed: int, run_dir: Path) -> dict[str,
         "avoidance": "field",
         "planar": config.planar,
         "turning_sense": config.tangential.turning_sense if "tangential" in config.methods else "own",
-        "seed": seed,
+        "seed": flight.seed,
         "vehicles": scenario.vehicles,
         "sensors": scenario.sensors,
         "converged": converged,
         "convergence_time_s": seconds,
         "min_separation_m": _finite(truth.vehicles.minimum),
-        "min_obstacle_distance_m": None,
+        "min_obstacle_distance_m": _finite(truth.obstacles.minimum),
         "min_target_distance_m": _finite(near_target),
         "d_min_m": scenario.d_min,
         "d_min_target_m": scenario.d_min_target,
         "span_m": flight.span,
-        "d_min_violations": truth.vehicles.count + truth.target.count,
+        "d_min_obstacle_m": scenario.d_min_obstacle if scenario.obstacles else None,
+        "d_min_violations": truth.vehicles.count + truth.target.count + truth.obstacles.count,
         "max_speed_m_s": _largest(np.linalg.norm(samples.velocity, axis=-1)),
         "max_acceleration_m_s2": _largest(np.linalg.norm(samples.acceleration, axis=-1)),
         "max_tilt_deg": _largest(np.degrees(samples.tilt)),
@@ -78,20 +79,18 @@ def summarise(flight: Flight, cost: Cost, seed: int, run_dir: Path) -> dict[str,
         "anchored_anew": sum(after.anchored_anew - before.anchored_anew for before, after in tallies),
         "slack_max_m": None,
         "tracking_error_m": _percentiles(
-            np.linalg.norm(samples.position - samples.reference, axis=-1), 95, "max"
+            np.linalg.norm(samples.position + samples.estimate_error - samples.reference, axis=-1), 95, "max"
         ),
-        "messages": {
-            "sent": ether.sent,
-            "dropped": ether.dropped,
-            "bad": sum(companion.bad_frames for companion in flight.companions),
-        },
-        "deadline_misses": None,
+        "estimate_error_m": _percentiles(np.linalg.norm(samples.estimate_error, axis=-1), 95, "max"),
+        "messages": flight.messages._asdict(),
+        "deadline_misses": None if late is None else late.misses,
+        "lateness_ms": None if late is None else {"p50": late.p50_ms, "p99": late.p99_ms, "max": late.max_ms},
         "failure": flight.failure,
         "simulated_s": round(simulated, 3),
         "wall_s": round(cost.wall, 3),
         "cpu_s": round(cost.cpu, 3),
         "real_time_factor": round(simulated / cost.wall, 2) if cost.wall > 0 else 0.0,
-        "run_dir": str(run_dir),
+        "run_dir": None if run_dir is None else str(run_dir),
     }
 
 
@@ -115,7 +114,7 @@ def yaw_errors(position: Array, yaw: Array, target: Array) -> Array:
     return result
 
 
-def standoff_errors(flight: Flight, position: Array, target: Array) -> Array:
+def standoff_errors(flight: Outcome, position: Array, target: Array) -> Array:
     """Distance (T, K) from the surface around the true target, m; empty where the task is no escort."""
     if flight.scenario.task != "escort":
         return np.empty((0, position.shape[1] if position.ndim > 1 else 0))

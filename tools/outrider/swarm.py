@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +15,8 @@ from pydantic_core import ErrorDetails
 from mavlink_bridge.frames import FleetFrame
 from outrider import figures
 from outrider.errors import InputError
-from outrider.flight import Flight, Stage
+from outrider.flight import Flight, Progress
+from outrider.outcome import Outcome
 from outrider.resources import config_root, find
 from outrider.scenario import RecordedTarget, Scenario
 from outrider.summary import Cost, Value, summarise, write
@@ -23,7 +25,6 @@ from outrider.yaml_file import load
 from sitl.config import VehicleConfig
 
 METHODS = ("baseline", "tangential")
-Progress = Callable[[Stage, float], None]
 
 
 class Options(NamedTuple):
@@ -37,6 +38,17 @@ class Options(NamedTuple):
     delay_ms: float | None = None
     sensors: str | None = None
     replan_hz: float | None = None
+    wind: str | None = None
+
+
+class Pace(NamedTuple):
+    """In lock-step, or in real time with one process per node, and those with real-time ``priority``."""
+
+    real_time: bool = False
+    priority: bool = False
+
+
+LOCK_STEP = Pace()
 
 
 class Prepared(NamedTuple):
@@ -72,6 +84,8 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
         changes["vehicles"] = options.vehicles
     if options.sensors is not None:
         changes["sensors"] = options.sensors
+    if options.wind is not None:
+        changes["weather"] = {**scenario.weather.model_dump(), "wind": _wind(options.wind)}
     if options.replan_hz is not None:
         if not 0.1 <= options.replan_hz <= 1000.0:
             raise InputError(f"--replan-hz {options.replan_hz}: allowed are 0.1 to 1000")
@@ -106,23 +120,57 @@ def _option_fault(error: ErrorDetails) -> str:
     return f"{option} ({name} = {error['input']!r}): {error['msg']}"
 
 
-def fly(prepared: Prepared, seed: int, directory: Path, progress: Progress) -> dict[str, Value]:
+def fly(
+    prepared: Prepared, seed: int, directory: Path, progress: Progress, pace: Pace = LOCK_STEP
+) -> dict[str, Value]:
     """Fly it, and leave logs, the resolved configuration, the summary and the picture in ``directory``."""
-    scenario, vehicle = prepared
+    scenario = prepared.scenario
     resolved = {"seed": seed, "scenario": scenario.model_dump(mode="json")}
     (directory / "configuration.yaml").write_text(
         yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True), encoding="utf-8"
     )
+    if pace.real_time:
+        outcome, cost = _flown_in_real_time(prepared, seed, progress, directory, pace)
+    else:
+        outcome, cost = _flown(prepared, seed, progress, directory)
+    summary = summarise(outcome, cost, directory)
+    write(summary, directory / "summary.json")
+    figures.draw(outcome, summary, directory / "flight.png")
+    return summary
+
+
+def measure(prepared: Prepared, seed: int) -> dict[str, Value]:
+    """Fly it for its summary alone: no files."""
+    outcome, cost = _flown(prepared, seed, lambda _stage, _seconds: None, None)
+    return summarise(outcome, cost, None)
+
+
+def _flown(prepared: Prepared, seed: int, progress: Progress, directory: Path | None) -> tuple[Outcome, Cost]:
     wall, cpu = time.perf_counter(), time.process_time()
-    flight = Flight(
-        scenario, vehicle, seed, config_root() / "logs", progress=progress, run_directory=directory
+    flight = Flight(*prepared, seed, config_root() / "logs", progress=progress, run_directory=directory)
+    flight.run()
+    return flight.outcome, Cost(time.perf_counter() - wall, time.process_time() - cpu)
+
+
+def _flown_in_real_time(
+    prepared: Prepared, seed: int, progress: Progress, directory: Path, pace: Pace
+) -> tuple[Outcome, Cost]:
+    from outrider.realtime.flight import RealTimeFlight
+
+    wall, cpu = time.perf_counter(), _cpu_of_all()
+    flight = RealTimeFlight(
+        *prepared, seed, config_root() / "logs", directory, progress, priority=pace.priority
     )
     flight.run()
-    cost = Cost(time.perf_counter() - wall, time.process_time() - cpu)
-    summary = summarise(flight, cost, seed, directory)
-    write(summary, directory / "summary.json")
-    figures.draw(flight, summary, directory / "flight.png")
-    return summary
+    if flight.priority_told:
+        sys.stderr.write(f"{flight.priority_told}\n")
+    return flight.outcome, Cost(time.perf_counter() - wall, _cpu_of_all() - cpu)
+
+
+def _cpu_of_all() -> float:
+    """CPU time (s) of this process and of its children that have ended."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def run_directory(out: Path | None, scenario: Scenario, seed: int) -> Path:
@@ -157,6 +205,19 @@ def _made(path: Path) -> Path:
     except OSError as error:
         raise InputError(f"{path}: cannot be made: {error.strerror}") from None
     return path
+
+
+def _wind(text: str) -> list[float]:
+    """``V`` m/s towards east, or ``EAST,NORTH`` or ``EAST,NORTH,UP``."""
+    try:
+        parts = [float(word) for word in text.split(",")]
+    except ValueError:
+        parts = []
+    if not 1 <= len(parts) <= 3:
+        raise InputError(
+            f"--wind {text}: allowed is a speed in m/s (towards east), or EAST,NORTH or EAST,NORTH,UP"
+        )
+    return parts + [0.0] * (3 - len(parts))
 
 
 def _methods(text: str) -> tuple[str, ...]:

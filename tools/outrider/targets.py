@@ -3,6 +3,7 @@ is."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -17,7 +18,8 @@ from mavlink_bridge.messages import GlobalPosition, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog import read_tlog
 from outrider.errors import InputError
-from outrider.scenario import TARGET_SYSTEM, FixedTarget, RecordedTarget
+from outrider.scenario_part import TARGET_SYSTEM
+from outrider.scenario_places import FixedTarget, RecordedTarget
 
 Array = NDArray[np.float64]
 LINK = "target"
@@ -52,7 +54,7 @@ class Target(Protocol):
 
 
 class Standing:
-    """Stays at one place; jumps to another at the goal event if it has one."""
+    """Stays at one place; jumps to others at the goal event and later if it has them."""
 
     name = "target"
     system = TARGET_SYSTEM
@@ -62,35 +64,47 @@ class Standing:
         self._fleet = fleet
         self._period = round(1e6 / config.rate_hz)
         self._place = np.array(config.at)
+        self._jumps: deque[tuple[int, Array]] = deque()
         self._next: int | None = None
         self._boot = 0
         self._codec = Codec()
 
     def begin(self, now: int) -> None:
-        """Jump, and say so at once."""
-        if self._config.jump_to is not None:
-            self._place = np.array(self._config.jump_to)
-            self._next = now
+        """Jump, and say so at once; what comes later counts from now."""
+        config = self._config
+        self._jumps.extend((now + round(1e6 * jump.after_s), np.array(jump.to)) for jump in config.jumps)
+        if config.jump_to is not None:
+            self._jump(now, np.array(config.jump_to))
 
     def position(self, now: int) -> Array | None:
         """Where it stands."""
+        self._move(now)
         return self._place
+
+    def _move(self, now: int) -> None:
+        while self._jumps and self._jumps[0][0] <= now:
+            self._jump(*self._jumps.popleft())
+
+    def _jump(self, when: int, place: Array) -> None:
+        self._place, self._next = place, when
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Its position, at its rate."""
         if self._next is None:
             self._boot = self._next = now
+        self._move(now)
         if now < self._next:
             return []
         self._next += self._period
-        latitude, longitude, altitude = self._fleet.to_geodetic(self._place)
+        place = self._place
+        latitude, longitude, altitude = self._fleet.to_geodetic(place)
         message = GlobalPosition(
             Source(self.system, 1),
             now - self._boot,
             latitude,
             longitude,
             altitude,
-            float(self._place[2]),
+            float(place[2]),
             (0.0, 0.0, 0.0),
             None,
         )

@@ -1,0 +1,90 @@
+"""Fixed obstacles that every companion knows: spheres, and posts that stand on the ground.
+
+For the field and its methods each is a point at its axis (a sphere: its centre) that is ``radius`` larger:
+the point of the axis nearest to where the vehicle will be, so that the force is horizontal beside a post and
+points up above it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from companion.horizon import Array
+from companion.settings import Settings
+
+_Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
+_Size = Annotated[float, Field(gt=0.0, le=1000.0)]
+
+FIRST_ID = 1000
+"""Ids of fixed obstacles begin here: above every system id."""
+
+
+class Sphere(Settings):
+    """A ball."""
+
+    kind: Literal["sphere"]
+    at: tuple[_Coordinate, _Coordinate, _Coordinate] = Field(description="centre, m, fleet-local ENU")
+    radius: _Size = Field(description="m")
+
+
+class Post(Settings):
+    """A vertical cylinder from below up to ``height``."""
+
+    kind: Literal["post"]
+    at: tuple[_Coordinate, _Coordinate] = Field(description="axis, m east and north of the fleet origin")
+    radius: _Size = Field(description="m")
+    height: _Size = Field(100.0, description="m above the fleet origin")
+
+
+Obstacle = Annotated[Sphere | Post, Field(discriminator="kind")]
+
+
+class Axes(NamedTuple):
+    """Obstacles near a vehicle: ids (M,), the nearest points of their axes (M, N + 1, 3) and radii (M,),
+    m."""
+
+    ids: tuple[int, ...]
+    positions: Array
+    radius: Array
+
+
+class FixedObstacles:
+    """All fixed obstacles as arrays: x, y of the axis (M, 2), the z that it spans (M,), radius (M,)."""
+
+    def __init__(self, obstacles: tuple[Sphere | Post, ...]) -> None:
+        self._ids = np.arange(FIRST_ID, FIRST_ID + len(obstacles))
+        self._xy: Array = np.array([o.at[:2] for o in obstacles]).reshape(-1, 2)
+        self._low: Array = np.array([o.at[2] if isinstance(o, Sphere) else -np.inf for o in obstacles])
+        self._high: Array = np.array([o.at[2] if isinstance(o, Sphere) else o.height for o in obstacles])
+        self._ball = np.array([isinstance(o, Sphere) for o in obstacles], dtype=bool)
+        self._radius: Array = np.array([o.radius for o in obstacles], dtype=np.float64)
+
+    def __len__(self) -> int:
+        return len(self._radius)
+
+    def around(self, prediction: Array, reach: float) -> Axes:
+        """Those with their surface within ``reach`` (m, horizontally) of some predicted position (N + 1,
+        3)."""
+        low, high = prediction[:, :2].min(axis=0) - reach, prediction[:, :2].max(axis=0) + reach
+        off = np.maximum(np.maximum(low - self._xy, self._xy - high), 0.0)
+        near = np.flatnonzero((off * off).sum(axis=1) <= self._radius**2)
+        positions = np.empty((len(near), len(prediction), 3))
+        positions[..., :2] = self._xy[near, None]
+        positions[..., 2] = np.clip(prediction[None, :, 2], self._low[near, None], self._high[near, None])
+        return Axes(tuple(self._ids[near].tolist()), positions, self._radius[near])
+
+    def distance(self, positions: Array) -> Array:
+        """From points (…, 3) to every surface (…, M), m; negative inside. A post has a flat top."""
+        off = positions[..., None, :2] - self._xy
+        across = np.sqrt(np.einsum("...i,...i->...", off, off))
+        height = positions[..., 2, None]
+        up = height - self._high
+        ball = np.sqrt(across**2 + (height - np.where(self._ball, self._high, 0.0)) ** 2) - self._radius
+        beside = across - self._radius
+        outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(up, 0.0) ** 2)
+        post = np.where((beside < 0.0) & (up < 0.0), np.maximum(beside, up), outside)
+        result: Array = np.where(self._ball, ball, post)
+        return result

@@ -1,0 +1,98 @@
+"""What an ether is made of: channels, what they do to datagrams in each direction, and when they are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from mavlink_bridge.errors import BridgeError
+
+
+class Faults(NamedTuple):
+    """What a channel does to each datagram on its way to each receiver, independently.
+
+    ``delay`` µs always, plus up to ``jitter`` µs, uniform; ``loss``, ``duplication``, ``reordering`` are
+    probabilities in 0…1. A reordered datagram waits until one tick after the next one on its path has arrived
+    (and for ever if none follows); jitter that exceeds the spacing of datagrams reorders too.
+
+    ``burst``: with 0 each datagram is lost or not whatever became of the one before. Otherwise losses come in
+    bursts of so many datagrams on average, and ``loss`` stays their share: the chain of Gilbert (1960) with
+    two states, one that passes all and one that loses all. A burst below ``loss / (1 - loss)`` or 1 cannot
+    be.
+    """
+
+    delay: int = 0
+    jitter: int = 0
+    loss: float = 0.0
+    duplication: float = 0.0
+    reordering: float = 0.0
+    burst: float = 0.0
+
+    @property
+    def loss_after_loss(self) -> float:
+        """Probability that a datagram is lost if the one before on its path was."""
+        return 1.0 - 1.0 / self.burst if self.burst and self.loss < 1 else self.loss
+
+    @property
+    def loss_after_passing(self) -> float:
+        """Probability that a datagram is lost if the one before on its path was not: the share of losses is
+        then ``loss``."""
+        return self.loss / (self.burst * (1.0 - self.loss)) if self.burst and self.loss < 1 else self.loss
+
+
+class Partition(NamedTuple):
+    """From ``start`` until before ``end`` (µs, time of sending) nothing passes between ``members`` (node
+    names) and the others."""
+
+    start: int
+    end: int
+    members: frozenset[str]
+
+
+Direction = tuple[str | None, str | None]
+"""Sender and receiver, node names; None is any."""
+
+
+class Channel(NamedTuple):
+    """A broadcast domain: what a member sends on its link reaches every other under *their* link's name.
+
+    ``members``: node name → name of its link into this channel. ``overrides``: faults in place of ``faults``
+    for one direction.
+    """
+
+    name: str
+    members: Mapping[str, str]
+    faults: Faults = Faults()
+    partitions: tuple[Partition, ...] = ()
+    overrides: Mapping[Direction, Faults] = MappingProxyType({})
+
+    def between(self, sender: str, receiver: str) -> Faults:
+        """The faults from ``sender`` to ``receiver``: the override for both, else for the sender, else for
+        the receiver, else for any, else the channel's own."""
+        for direction in ((sender, receiver), (sender, None), (None, receiver), (None, None)):
+            if direction in self.overrides:
+                return self.overrides[direction]
+        return self.faults
+
+    def check(self) -> None:
+        """Raise BridgeError for faults that make no sense and for overrides of nodes that are no members."""
+        _check(f"channel {self.name!r}", self.faults)
+        for (sender, receiver), faults in self.overrides.items():
+            where = f"channel {self.name!r}, from {sender or 'any'} to {receiver or 'any'}"
+            for name in (sender, receiver):
+                if name is not None and name not in self.members:
+                    raise BridgeError(f"{where}: {name!r} is not a member; {', '.join(self.members)} are")
+            _check(where, faults)
+
+
+def _check(where: str, faults: Faults) -> None:
+    for name in ("delay", "jitter"):
+        if getattr(faults, name) < 0:
+            raise BridgeError(f"{where}: {name} = {getattr(faults, name)} µs is negative")
+    for name in ("loss", "duplication", "reordering"):
+        if not 0 <= getattr(faults, name) <= 1:
+            raise BridgeError(f"{where}: {name} = {getattr(faults, name)} is not in 0…1")
+    least = max(1.0, faults.loss / (1.0 - faults.loss)) if faults.loss < 1 else 1.0
+    if faults.burst != 0 and not faults.burst >= least:
+        raise BridgeError(f"{where}: burst = {faults.burst} is neither 0 nor at least {least:.3g} datagrams")

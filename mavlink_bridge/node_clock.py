@@ -1,0 +1,56 @@
+"""The clock of one node's computer against true time: off by some µs, and fast or slow by some ppm.
+
+Integer arithmetic throughout, so that a reading and the instant of a reading are exact inverses on any
+machine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from mavlink_bridge.errors import ScheduleError
+
+QUANTUM = 4
+"""µs; the two low bits of a tlog's time stamp carry the link, so every time that a node is told is a
+multiple."""
+LARGEST_DRIFT_PPM = 100_000.0
+
+_BILLION = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class NodeClock:
+    """At true time ``since`` (µs) it shows ``since + offset`` (µs; negative: late), and from there on runs
+    ``drift_ppm`` fast (negative: slow; resolved to 0.001 ppm).
+
+    Raises ScheduleError for a drift that is not within ±100 000 ppm.
+    """
+
+    offset: int = 0
+    drift_ppm: float = 0.0
+    since: int = 0
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.drift_ppm) and abs(self.drift_ppm) <= LARGEST_DRIFT_PPM):
+            raise ScheduleError(
+                f"drift = {self.drift_ppm} ppm of a clock is not within ±{LARGEST_DRIFT_PPM:.0f} ppm"
+            )
+
+    @property
+    def _rate(self) -> int:
+        """How far it goes in 10⁹ µs."""
+        return _BILLION + round(self.drift_ppm * 1000)
+
+    def reading(self, true: int) -> int:
+        """What it shows at ``true`` (µs), to the µs; never decreases."""
+        return self.since + self.offset + (true - self.since) * self._rate // _BILLION
+
+    def local(self, true: int) -> int:
+        """What a node is told at ``true`` (µs): rounded down to a multiple of 4 µs."""
+        shown = self.reading(true)
+        return shown - shown % QUANTUM
+
+    def instant(self, shown: int) -> int:
+        """The first true time (µs) at which it shows ``shown`` (µs) or more."""
+        return self.since - (self.since + self.offset - shown) * _BILLION // self._rate

@@ -1,0 +1,43 @@
+"""From an endpoint to an open link."""
+
+from __future__ import annotations
+
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.endpoints import (
+    Endpoint,
+    Multicast,
+    Replay,
+    Serial,
+    TcpIn,
+    TcpOut,
+    UdpIn,
+    UdpOut,
+    parse_endpoint,
+)
+from mavlink_bridge.link import Link
+from mavlink_bridge.replay import ReplayLink
+from mavlink_bridge.serial_port import SerialPort
+from mavlink_bridge.tcp import TcpCaller, TcpListener
+from mavlink_bridge.udp import MulticastLink, UdpCaller, UdpListener
+
+
+def open_link(endpoint: Endpoint | str, clock: Clock) -> Link:
+    """The link to ``endpoint``; ``clock`` paces reconnections and replays, and forgets silent peers.
+
+    Raises EndpointError for a text that names none, LinkError (LogError for a log) if it cannot be opened.
+    """
+    match parse_endpoint(endpoint) if isinstance(endpoint, str) else endpoint:
+        case UdpIn() as place:
+            return UdpListener(place, clock)
+        case UdpOut() as place:
+            return UdpCaller(place)
+        case Multicast() as place:
+            return MulticastLink(place)
+        case TcpOut() as place:
+            return TcpCaller(place, clock)
+        case TcpIn() as place:
+            return TcpListener(place, clock)
+        case Serial() as place:
+            return SerialPort(place, clock)
+        case Replay() as place:
+            return ReplayLink(place, clock)

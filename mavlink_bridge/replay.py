@@ -1,0 +1,66 @@
+"""A tlog as a link: its frames arrive at the times at which they were recorded, from the first receive on."""
+
+from __future__ import annotations
+
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.endpoints import Replay
+from mavlink_bridge.errors import LogError
+from mavlink_bridge.link import BURST, LinkCounters
+from mavlink_bridge.tlog import Record, read_tlog
+
+
+class ReplayLink:
+    """Every record of the log is one datagram, both directions and all links of it: whoever listens leaves
+    out his own voice. A record whose time steps back arrives with the one before it.
+
+    What is sent goes nowhere and counts as dropped. Raises LogError if the log cannot be read.
+    """
+
+    def __init__(self, endpoint: Replay, clock: Clock) -> None:
+        self._clock = clock
+        self._records = iter(read_tlog(endpoint.path))
+        self._next: Record | None = next(self._records, None)
+        self._lag: int | None = None
+        self._received = self._dropped = 0
+
+    @property
+    def counters(self) -> LinkCounters:
+        """Nothing is ever sent."""
+        return LinkCounters(self._received, 0, self._dropped)
+
+    @property
+    def over(self) -> bool:
+        """Whether the end of the log has been reached."""
+        return self._next is None
+
+    def fileno(self) -> None:
+        """Time alone makes something arrive."""
+
+    def receive(self) -> list[bytes]:
+        """What was recorded by now."""
+        found: list[bytes] = []
+        if self._next is None:
+            return found
+        now = self._clock.now()
+        if self._lag is None:
+            self._lag = now - self._next.time
+        while self._next is not None and self._next.time + self._lag <= now and len(found) < BURST:
+            found.append(self._next.frame)
+            self._next = self._following()
+        self._received += len(found)
+        return found
+
+    def send(self, data: bytes) -> None:
+        """Not here."""
+        self._dropped += 1
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._records.close()
+        self._next = None
+
+    def _following(self) -> Record | None:
+        try:
+            return next(self._records, None)
+        except LogError:
+            return None  # a disk that breaks off ends the log

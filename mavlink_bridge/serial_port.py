@@ -1,0 +1,86 @@
+"""A link over a serial port, with nothing but POSIX: raw bytes, 8N1, no flow control."""
+
+from __future__ import annotations
+
+import os
+import sys
+from array import array
+from typing import Final
+
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.endpoints import Serial
+from mavlink_bridge.errors import LinkError
+from mavlink_bridge.hosts import because
+from mavlink_bridge.streams import StreamLink
+
+if sys.platform != "win32":
+    import fcntl
+    import termios
+
+QUEUE: Final = 0.25
+"""s of the line's capacity that may wait to be sent; what is more is refused. The system alone would queue
+4 KiB, 0.7 s of 57 600 baud: too old for set-points."""
+_BITS: Final = 10  # a byte on the line, with start and stop bit
+
+
+class SerialPort(StreamLink):
+    """``/dev/…,BAUD``. A port that vanishes (a cable pulled out) is opened anew when it is back.
+
+    Raises LinkError if it is not there at first, is in use by another, or is no serial port.
+    """
+
+    def __init__(self, endpoint: Serial, clock: Clock) -> None:
+        if sys.platform == "win32":
+            raise LinkError(f"{endpoint}: serial ports need a POSIX system; use udpin: or tcp: here")
+        self._endpoint = endpoint
+        self._most = max(int(QUEUE * endpoint.baud / _BITS), 1)
+        self._speed = getattr(termios, f"B{endpoint.baud}", None)
+        if self._speed is None:
+            raise LinkError(f"{endpoint}: this system knows no {endpoint.baud} baud")
+        first = self._raw()
+        super().__init__(clock, self._most)
+        self._adopt(first)
+
+    def send(self, data: bytes) -> None:
+        """Write ``data`` if the line will get to it soon."""
+        if self._queued() > self._most:
+            with self._lock:
+                self._dropped += 1
+            return
+        super().send(data)
+
+    def _reopen(self, now: int) -> None:
+        try:
+            self._adopt(self._raw())
+        except LinkError:
+            return
+
+    def _raw(self) -> int:
+        """The port, opened, for us alone, and set up."""
+        try:
+            port = os.open(self._endpoint.device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError as error:
+            raise LinkError(f"{self._endpoint}: cannot open the port: {because(error)}") from None
+        try:
+            fcntl.ioctl(port, termios.TIOCEXCL)
+            _, _, control, _, _, _, characters = termios.tcgetattr(port)
+            control &= ~(termios.CSIZE | termios.PARENB | termios.CSTOPB | getattr(termios, "CRTSCTS", 0))
+            control |= termios.CS8 | termios.CREAD | termios.CLOCAL
+            speed = self._speed
+            termios.tcsetattr(port, termios.TCSANOW, [0, 0, control, 0, speed, speed, characters])
+        except (OSError, termios.error) as error:
+            os.close(port)
+            raise LinkError(f"{self._endpoint}: not a serial port: {error.args[-1]}") from None
+        return port
+
+    def _queued(self) -> int:
+        """Bytes that the system still has to send."""
+        with self._lock:
+            if not self._streams:
+                return 0
+            count = array("i", [0])
+            try:
+                fcntl.ioctl(self._streams[0].fileno(), termios.TIOCOUTQ, count)
+            except OSError:
+                return 0
+            return count[0]

@@ -1,0 +1,61 @@
+"""When one node is due in lock-step, and what time it is told."""
+
+from __future__ import annotations
+
+from mavlink_bridge.errors import ScheduleError
+from mavlink_bridge.node import Node
+from mavlink_bridge.node_clock import QUANTUM, NodeClock
+
+
+class Slot:
+    """A node's deadlines: ``phase`` + k ``period`` (µs) on its own ``clock`` (None: true time), each met at
+    the first multiple of ``tick`` (µs, true time) at which the clock shows it or more.
+
+    Raises ScheduleError for a clock that shows a negative time at ``phase``.
+    """
+
+    __slots__ = ("_clock", "_latest", "_period", "_phase", "_tick", "name", "step")
+
+    def __init__(self, node: Node, period: int, phase: int, clock: NodeClock | None, tick: int) -> None:
+        self.name, self.step = node.name, node.step
+        self._period, self._phase, self._tick = period, phase, tick
+        self._clock = None if clock is None else self._checked(clock, phase)
+        self._latest: int | None = None
+
+    def first(self) -> int:
+        """The first tick (µs, true time) at which the node is due: none before ``phase``."""
+        return self._phase if self._clock is None else self.after(self._phase - 1)
+
+    def set_clock(self, now: int, offset: int, drift_ppm: float) -> int:
+        """From ``now`` (µs, true time) on another clock; the tick (µs) at which the node is due next."""
+        now = max(now, self._phase)
+        self._clock = self._checked(NodeClock(offset, drift_ppm, now), now)
+        return self.after(now - 1)
+
+    def after(self, true: int) -> int:
+        """The tick of the first deadline that the clock does not show yet at ``true`` (µs), where without a
+        clock the node is due; no deadline is met twice."""
+        if self._clock is None:
+            return true + self._period
+        shown = self._clock.reading(true)
+        instant = self._clock.instant(shown + self._period - (shown - self._phase) % self._period)
+        return instant + -instant % self._tick
+
+    def told(self, true: int) -> int:
+        """The time (µs) to tell the node when it is called at ``true``: more than the last time."""
+        if self._clock is None:
+            self._latest = true
+            return true
+        shown = self._clock.local(true)
+        if self._latest is not None:
+            shown = max(shown, self._latest + QUANTUM)
+        self._latest = shown
+        return shown
+
+    def _checked(self, clock: NodeClock, true: int) -> NodeClock:
+        shown = clock.local(true)
+        if shown < 0:
+            raise ScheduleError(
+                f"{self.name}: its clock shows {shown} µs at {true} µs; a node is told 0 µs or more"
+            )
+        return clock

@@ -1,0 +1,116 @@
+"""Links over TCP: calling, again whenever the connection breaks, and being called by several."""
+
+from __future__ import annotations
+
+import selectors
+import socket
+from contextlib import suppress
+from typing import Any, Final
+
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.endpoints import TcpIn, TcpOut
+from mavlink_bridge.errors import LinkError
+from mavlink_bridge.hosts import because, resolved
+from mavlink_bridge.streams import StreamLink
+
+MOST_CALLERS: Final = 32
+BACKLOG: Final = 65536
+"""Bytes; some seconds of a vehicle's telemetry."""
+PATIENCE: Final = 5_000_000
+"""µs for which one call is left ringing: a lost packet is repeated after one second and after three."""
+
+
+def _quick(connection: socket.socket) -> None:
+    """Small packets at once, and a notice within some time that the other machine is gone."""
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+
+
+class TcpCaller(StreamLink):
+    """``tcp``: calls once a second until someone answers. That nobody does at first is no error: the other
+    side may be started later."""
+
+    def __init__(self, endpoint: TcpOut, clock: Clock) -> None:
+        super().__init__(clock, BACKLOG)
+        self._family, self._address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
+        self._calling: socket.socket | None = None
+        self._called_at = 0
+        self.receive()
+
+    def _reopen(self, now: int) -> None:
+        if self._calling is not None and now - self._called_at < PATIENCE:
+            return
+        self._hang_up()
+        call = socket.socket(self._family, socket.SOCK_STREAM)
+        call.setblocking(False)
+        try:
+            call.connect(self._address)
+        except BlockingIOError:
+            pass  # the usual case: it becomes writable when it is decided
+        except OSError:
+            call.close()
+            return
+        self._calling, self._called_at = call, now
+        self._selector.register(call, selectors.EVENT_WRITE)
+
+    def _attend(self, ready: Any) -> None:
+        call = self._calling
+        if call is None or ready is not call:
+            return
+        # A call to a free port of this machine may by chance reach itself.
+        if call.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) or call.getsockname() == self._address:
+            self._hang_up()
+            return
+        self._selector.unregister(call)
+        self._calling = None
+        _quick(call)
+        self._adopt(call.detach())
+
+    def _hang_up(self) -> None:
+        if self._calling is not None:
+            self._selector.unregister(self._calling)
+            self._calling.close()
+            self._calling = None
+
+    def _release(self) -> None:
+        self._hang_up()
+
+
+class TcpListener(StreamLink):
+    """``tcpin``: what is sent goes to everyone who has called."""
+
+    def __init__(self, endpoint: TcpIn, clock: Clock) -> None:
+        super().__init__(clock, BACKLOG)
+        family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
+        self._door = door = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            # Or a restart would have to wait a minute for the port.
+            door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            door.bind(address)
+            door.listen()
+        except OSError as error:
+            door.close()
+            self.close()
+            raise LinkError(f"{endpoint}: cannot listen there: {because(error)}") from None
+        door.setblocking(False)
+        self._selector.register(door, selectors.EVENT_READ)
+
+    @property
+    def address(self) -> tuple[Any, ...]:
+        """Where this end listens: host, port, …"""
+        address: tuple[Any, ...] = self._door.getsockname()
+        return address
+
+    def _attend(self, ready: Any) -> None:
+        if ready is not self._door:
+            return
+        with suppress(OSError):  # it may have hung up before we looked
+            caller, _ = self._door.accept()
+            if self.peers >= MOST_CALLERS:
+                caller.close()
+                return
+            _quick(caller)
+            self._adopt(caller.detach())
+
+    def _release(self) -> None:
+        self._door.close()

@@ -1,0 +1,195 @@
+"""Links over UDP: listening, speaking first, and multicast. One datagram is one UDP packet."""
+
+from __future__ import annotations
+
+import socket
+from ipaddress import IPv4Address
+from typing import Any, Final
+
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.endpoints import Multicast, UdpIn, UdpOut
+from mavlink_bridge.errors import LinkError
+from mavlink_bridge.hosts import because, resolved
+from mavlink_bridge.link import BURST, LinkCounters
+
+Address = tuple[Any, ...]
+"""As the socket module writes it: (host, port, …)."""
+
+REMEMBERED: Final = 10_000_000
+"""µs for which a peer of a listening link is answered after it was last heard; the last one for ever."""
+MOST_PEERS: Final = 32
+_LONGEST: Final = 65536
+# The default holds some 250 packets: less than a swarm sends while one plan is being solved on a busy host.
+_BUFFER: Final = 1 << 20
+
+
+class _Udp:
+    """What the three have in common. ``receiver`` and ``sender`` may be one socket."""
+
+    def __init__(self, receiver: socket.socket, sender: socket.socket) -> None:
+        self._receiver, self._sender = receiver, sender
+        self._received = self._sent = self._dropped = 0
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        receiver.setblocking(False)
+        sender.setblocking(False)
+        self._fileno = receiver.fileno()
+
+    @property
+    def counters(self) -> LinkCounters:
+        """A packet to several peers is sent once."""
+        return LinkCounters(self._received, self._sent, self._dropped)
+
+    @property
+    def address(self) -> Address:
+        """Where this end listens: host, port, …"""
+        address: Address = self._receiver.getsockname()
+        return address
+
+    def fileno(self) -> int:
+        """The receiving socket."""
+        return self._fileno
+
+    def receive(self) -> list[bytes]:
+        """The packets that have arrived."""
+        found: list[bytes] = []
+        for _ in range(BURST):
+            try:
+                data, source = self._receiver.recvfrom(_LONGEST)
+            except ConnectionError:
+                continue  # an earlier packet of ours found nobody: that says nothing about what has arrived
+            except OSError:
+                break
+            if self._heard(source) and data:
+                found.append(data)
+        self._received += len(found)
+        return found
+
+    def send(self, data: bytes) -> None:
+        """One packet to everyone who is to have it."""
+        if self._send(data):
+            self._sent += 1
+        else:
+            self._dropped += 1
+
+    def close(self) -> None:
+        """Close both sockets."""
+        self._receiver.close()
+        self._sender.close()
+
+    def _heard(self, source: Address) -> bool:
+        """Whether what ``source`` sends counts."""
+        return True
+
+    def _send(self, data: bytes) -> bool:
+        """To the connected peer. Once more if it was refused: the refusal was that of an earlier packet."""
+        for _ in range(2):
+            try:
+                self._sender.send(data)
+            except ConnectionError:
+                continue
+            except OSError:
+                return False
+            return True
+        return False
+
+
+class UdpListener(_Udp):
+    """``udpin``: binds, and sends everything to all peers heard in the last 10 s, or else to the last one.
+
+    As pymavlink and unlike mavlink-router's server mode, which answers the last one only: with two peers
+    (an autopilot's two ports, a ground station beside a script) each would then see half of the stream.
+    """
+
+    def __init__(self, endpoint: UdpIn, clock: Clock) -> None:
+        family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_DGRAM)
+        one = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            one.bind(address)
+        except OSError as error:
+            one.close()
+            raise LinkError(f"{endpoint}: cannot listen there: {because(error)}") from None
+        super().__init__(one, one)
+        self._clock = clock
+        self._peers: dict[Address, int] = {}
+
+    def _heard(self, source: Address) -> bool:
+        # Another dictionary each time: the sending thread may be going through this one. Last heard is last.
+        now = self._clock.now()
+        peers = {
+            peer: time for peer, time in self._peers.items() if peer != source and now - time <= REMEMBERED
+        }
+        if len(peers) >= MOST_PEERS:
+            del peers[next(iter(peers))]
+        peers[source] = now
+        self._peers = peers
+        return True
+
+    def _send(self, data: bytes) -> bool:
+        peers, now = self._peers, self._clock.now()
+        recent = [peer for peer, time in peers.items() if now - time <= REMEMBERED] or list(peers)[-1:]
+        reached = 0
+        for peer in recent:
+            try:
+                self._sender.sendto(data, peer)
+            except OSError:
+                continue
+            reached += 1
+        return reached > 0
+
+
+class UdpCaller(_Udp):
+    """``udpout``: a connected socket, so that nobody but the peer is heard."""
+
+    def __init__(self, endpoint: UdpOut) -> None:
+        family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_DGRAM)
+        one = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            one.connect(address)
+        except OSError as error:
+            one.close()
+            hint = "; use mcast: to reach several" if isinstance(error, PermissionError) else ""
+            raise LinkError(f"{endpoint}: cannot send there: {because(error)}{hint}") from None
+        super().__init__(one, one)
+
+
+class MulticastLink(_Udp):
+    """``mcast``: every other member of the group hears it, on this machine too; the own echo is left out.
+
+    Two sockets, as every member needs the group's port to hear but an address of its own to be told from its
+    echo. On a loopback interface the time to live is 0: nothing leaves the machine; elsewhere 1.
+    """
+
+    def __init__(self, endpoint: Multicast) -> None:
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._join(endpoint, receiver, sender)
+        except OSError as error:
+            receiver.close()
+            sender.close()
+            hint = "" if endpoint.interface else f"; within this machine use {endpoint},127.0.0.1"
+            raise LinkError(f"{endpoint}: cannot join: {because(error)}{hint}") from None
+        super().__init__(receiver, sender)
+        self._own: Address = sender.getsockname()
+
+    def _join(self, endpoint: Multicast, receiver: socket.socket, sender: socket.socket) -> None:
+        group = socket.inet_aton(endpoint.group)
+        interface = socket.inet_aton(endpoint.interface or "0.0.0.0")
+        local = endpoint.interface is not None and IPv4Address(endpoint.interface).is_loopback
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if hasattr(socket, "SO_REUSEPORT"):
+            # Elsewhere than on Linux it takes this for several members on one machine.
+            receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        # Bound to the group: what else comes to this port is not for us.
+        receiver.bind((endpoint.group, endpoint.port))
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group + interface)
+        if endpoint.interface is not None:
+            sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
+            sender.bind((endpoint.interface, 0))
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0 if local else 1)
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+        # Connected, it has one source address, by which the echo is known.
+        sender.connect((endpoint.group, endpoint.port))
+
+    def _heard(self, source: Address) -> bool:
+        return source != self._own

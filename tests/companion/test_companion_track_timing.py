@@ -1,0 +1,293 @@
+"""Clocks of senders: jitter does not date a measurement; drift, steps and reboots are followed, and stamps of
+no use are seen through."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from companion_rig import LAWS, QUICK, numbers
+from hypothesis import given
+from hypothesis import strategies as st
+
+import outrider
+from companion.config import TrackConfig
+from companion.timing import SenderClock
+from companion.tracks import Track
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import FleetFrame, ned_to_enu
+from mavlink_bridge.messages import GlobalPosition
+from mavlink_bridge.tlog import read_tlog
+
+DELAY, LATEST = 20_000, 2_000_000
+NOW = 1_767_225_600_000_000
+SECOND = 1_000_000
+LOG = Path(outrider.__file__).parents[2] / "config" / "logs" / "escort-target.tlog"
+
+
+def dated(clock, sent, lateness, offset=NOW, rate=1.0):
+    """When the clock says that messages sent at ``sent`` (µs of ours) were true, on our time; None where it
+    does not say. Their stamps are whole milliseconds of a clock that runs at ``rate``."""
+    said = [None] * len(sent)
+    for k in sorted(range(len(sent)), key=lambda k: (sent[k] + lateness[k], k)):
+        stamp = SECOND + int(sent[k] * rate) // 1000 * 1000
+        date = clock.date(offset + sent[k] + DELAY + lateness[k], stamp)
+        said[k] = None if date is None else date.time + clock.skew - offset
+    return said
+
+
+@LAWS
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    jitter=st.integers(0, 300_000),
+    period=st.integers(20, 500),
+    boot=st.integers(1, 10**12),
+)
+def test_jitter_does_not_date_a_measurement(seed, jitter, period, boot):
+    """Once one of them was quick: the distances in time are exact, and the offset is the least lag."""
+    random = np.random.default_rng(seed)
+    clock = SenderClock(DELAY, LATEST)
+    lags, times = [], []
+    for k in range(50):
+        true = k * period * 1000
+        late = 0 if k == 0 else int(random.integers(0, jitter + 1))
+        lags.append(late)
+        date = clock.date(NOW + true + DELAY + late, boot + true)
+        assert date.stamped
+        times.append(date.time)
+        # The line has not been tilted yet.
+        if k < 10 and period * k < 1000:
+            assert date.time + clock.skew == NOW + true
+    assert np.diff(times).tolist() == [period * 1000] * 49
+
+
+@QUICK
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    ppm=numbers(-200.0, 200.0),
+    jitter=st.sampled_from([0, 10_000, 100_000]),
+    rate=st.sampled_from([5, 10, 50]),
+)
+def test_drift_is_followed_to_the_end_of_the_jitter(seed, ppm, jitter, rate):
+    """What is left is the grain of a millisecond, and what the messages of five seconds leave of their
+    jitter."""
+    random = np.random.default_rng(seed)
+    clock = SenderClock(DELAY, LATEST)
+    hour = 3600 * SECOND
+    sent = hour + np.arange(400) * (SECOND // rate)
+    dated(clock, [0, SECOND // rate], [0, 0], rate=1.0 + 1e-6 * ppm)
+    lateness = random.integers(0, jitter + 1, len(sent))
+    said = dated(clock, sent.tolist(), lateness.tolist(), rate=1.0 + 1e-6 * ppm)
+    off = np.abs(np.array(said[len(said) // 2 :]) - sent[len(said) // 2 :])
+    assert off.max() <= 1500 + 0.5 * jitter
+    assert off.mean() <= 1500 + 0.1 * jitter
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.8, 0.99, 1.01, 2.0, 5.0])
+def test_a_simulator_that_is_slower_or_faster_than_time_is_followed(rate):
+    """10 Hz of ours. A clock that creeps is late at first, until its rate is known; a fast one never is."""
+    clock = SenderClock(DELAY, LATEST)
+    sent = np.arange(0, 120 * SECOND, 100_000)
+    said = dated(clock, sent.tolist(), [0] * len(sent), rate=rate)
+    off = np.array([0 if s is None else s - true for s, true in zip(said, sent, strict=True)])
+    assert sum(s is None for s in said) < 12
+    assert np.abs(off[400:]).max() <= 30_000
+    assert off.max() <= 2000
+
+
+def test_a_clock_that_stands_still_for_a_moment_is_trusted_again_within_fifty_messages():
+    """PX4's simulator does so: from then on its offset is another, by less than is called a step."""
+    clock = SenderClock(DELAY, LATEST)
+    before = np.arange(0, 5 * SECOND, 20_000)
+    dated(clock, before.tolist(), [0] * len(before))
+    said = []
+    for k in range(60):
+        true = 5 * SECOND + k * 20_000
+        date = clock.date(NOW + true + DELAY, SECOND + true - 80_000)
+        said.append(date.time + clock.skew - NOW - true)
+    assert said[0] == pytest.approx(-80_000, abs=2000)
+    assert max(map(abs, said[55:])) <= 3000
+
+
+@LAWS
+@given(step=st.one_of(st.integers(3 * SECOND, 10**13), st.integers(-(10**10), -3 * SECOND)))
+def test_a_clock_that_was_set_or_began_anew_is_followed_after_three_witnesses(step):
+    """Reboot, or the wrap of the 32-bit milliseconds after 49.7 days: our time goes on."""
+    clock = SenderClock(DELAY, LATEST)
+    uptime = 2 * 10**10
+    last = None
+    for k in range(40):
+        true = k * 100_000
+        stamp = uptime + true + (step if k >= 20 else 0)
+        # The first is slow: what it says of the offset is made good before the step, and not undone by it.
+        date = clock.date(NOW + true + DELAY + (50_000 if k == 0 else 0), stamp)
+        if k in (20, 21):
+            assert date is None
+            continue
+        if k == 0:
+            continue
+        assert date.time + clock.skew == NOW + true
+        assert last is None or date.time > last
+        last = date.time
+
+
+@QUICK
+@given(wild=st.integers(1, 2**32 * 1000), when=st.integers(5, 30))
+def test_one_wild_stamp_moves_nothing_for_long(wild, when):
+    """One that is out by more than any delay is not believed; by less, it is forgotten with its fifty."""
+    clock = SenderClock(DELAY, LATEST)
+    for k in range(200):
+        true = k * 100_000
+        if k == when:
+            clock.date(NOW + true + DELAY, wild)
+            continue
+        date = clock.date(NOW + true + DELAY, 10**8 + true)
+        assert date is not None
+        assert abs(date.time + clock.skew - NOW - true) <= LATEST
+        if k > when + 60:
+            assert date.time + clock.skew == pytest.approx(NOW + true, abs=1)
+
+
+@pytest.mark.parametrize("stamp", [0, -1, 777_000])
+def test_stamps_that_do_not_advance_are_of_no_use_and_the_arrival_counts(stamp):
+    clock = SenderClock(DELAY, LATEST)
+    for k in range(60):
+        received = NOW + k * 100_000
+        date = clock.date(received, stamp)
+        if k > 5 or stamp <= 0:
+            assert not date.stamped
+            assert date.time + clock.skew == received - DELAY
+
+
+@QUICK
+@given(stamps=st.lists(st.integers(1, 2**32 * 1000), min_size=60, max_size=60))
+def test_stamps_all_over_the_place_are_of_no_use_either(stamps):
+    clock = SenderClock(DELAY, LATEST)
+    for k, stamp in enumerate(stamps):
+        received = NOW + k * 100_000
+        date = clock.date(received, stamp)
+        if date is not None and not date.stamped:
+            assert date.time + clock.skew == received - DELAY
+    # Not one clock of three in a row agrees: the last ones are dated by their arrival.
+    lags = [NOW + k * 100_000 - stamp for k, stamp in enumerate(stamps)]
+    if all(max(lags[k : k + 3]) - min(lags[k : k + 3]) > LATEST for k in range(58)):
+        assert date is not None
+        assert not date.stamped
+
+
+def test_stamps_that_come_to_their_senses_are_used_again():
+    clock = SenderClock(DELAY, LATEST)
+    for k in range(20):
+        clock.date(NOW + k * 100_000, 777_000)
+    dates = [clock.date(NOW + k * 100_000, 888_000 + k * 100_000) for k in range(20, 30)]
+    assert [date.stamped for date in dates] == [False, False, *[True] * 8]
+    assert np.diff([date.time for date in dates]).tolist() == [100_000] * 9
+
+
+def test_two_clocks_under_one_name_do_not_take_turns():
+    """An autopilot and its companion both tell of the vehicle: the first is believed, the other is not, and
+    takes over when the first falls silent."""
+    clock = SenderClock(DELAY, LATEST)
+    for k in range(50):
+        first = clock.date(NOW + k * 100_000, 10**9 + k * 100_000)
+        other = clock.date(NOW + k * 100_000 + 3000, 10**7 + k * 100_000)
+        assert first.time + clock.skew == NOW + k * 100_000 - DELAY
+        assert other is None
+    dates = [clock.date(NOW + k * 100_000, 10**7 + k * 100_000) for k in range(50, 60)]
+    assert [date is None for date in dates] == [True, *[False] * 9]
+
+
+def test_a_burst_at_one_time_is_no_rate():
+    """After a stall all that waited arrives at once: many lags, one time."""
+    clock = SenderClock(DELAY, LATEST)
+    for burst in range(20):
+        received = NOW + burst * 2 * SECOND
+        for k in range(40):
+            date = clock.date(received, 10**9 + burst * 2 * SECOND + k * 25_000)
+            assert date.stamped
+        assert date.time + clock.skew == received - DELAY
+
+
+@LAWS
+@given(
+    messages=st.lists(
+        st.tuples(
+            st.sampled_from([0, 0, 100_000, 10**8]) | st.integers(-(10**7), 10**8),
+            st.integers(-(2**40), 2**43),
+        ),
+        min_size=1,
+        max_size=80,
+    ),
+    latest=st.integers(0, 10**7),
+)
+def test_no_times_whatever_raise(messages, latest):
+    clock = SenderClock(DELAY, latest)
+    now = NOW
+    for step, stamp in messages:
+        now += step
+        date = clock.date(now, stamp)
+        if date is not None and not date.stamped:
+            assert date.time + clock.skew == now - DELAY
+
+
+def flown():
+    """The shipped log: arrivals, stamps, positions and velocities of a quadrotor that really flew, over a
+    radio."""
+    codec, rows = Codec(), []
+    fleet = FleetFrame(-35.3622913, 149.1656747, 590.74)
+    for record in read_tlog(LOG):
+        for message in codec.feed(record.frame):
+            if isinstance(message, GlobalPosition):
+                x = fleet.to_enu(message.latitude, message.longitude, message.altitude)
+                rows.append((record.time, message.time_boot, x, ned_to_enu(message.velocity_ned)))
+    return rows
+
+
+def test_a_real_radio_holds_messages_back_and_they_are_dated_nevertheless():
+    """Stamps advance by 200 or 400 ms, arrivals by 250 to 670: the lags spread over almost a second, yet
+    nothing is refused, no time is out of order, and what is left of the lag is never negative."""
+    rows = flown()
+    lags = np.array([arrival - stamp for arrival, stamp, _, _ in rows])
+    assert np.ptp(lags) > 900_000
+    clock = SenderClock(DELAY, LATEST)
+    times = []
+    for arrival, stamp, _, _ in rows:
+        date = clock.date(arrival, stamp)
+        assert date.stamped
+        assert date.time + clock.skew <= arrival - DELAY + 1
+        times.append(date.time)
+    assert np.diff(times).tolist() == np.diff([stamp for _, stamp, _, _ in rows]).tolist()
+
+
+@pytest.mark.parametrize("mangled", ["back", "zero", "standing", "twice", "shuffled"])
+def test_a_real_flight_with_spoilt_stamps_is_still_tracked(mangled):
+    """What other real logs show: a clock that steps back by minutes, none at all, one that stands; and what
+    links do: duplicates, and messages that overtake each other."""
+    rows = [[*row] for row in flown()]
+    for k, row in enumerate(rows):
+        if mangled == "back" and k >= 100:
+            row[1] -= 260 * SECOND
+        elif mangled == "zero":
+            row[1] = 0
+        elif mangled == "standing" and k >= 100:
+            row[1] = rows[99][1]
+    if mangled == "twice":
+        rows = [row for row in rows for _ in (0, 1)]
+    elif mangled == "shuffled":
+        arrivals = [row[0] for row in rows]
+        rows[0:200:2], rows[1:200:2] = rows[1:200:2], rows[0:200:2]
+        rows = [[arrival, *row[1:]] for arrival, row in zip(arrivals, rows, strict=True)]
+    config = TrackConfig(
+        sigma_position=0.1, sigma_velocity=0.2, sigma_acceleration=5.0, jump=8.0, velocity_up=True
+    )
+    track = Track(config)
+    worst = 0
+    for arrival, stamp, x, v in rows:
+        track.measure(arrival, x, v, stamp)
+        state = track.at(arrival)
+        worst = max(worst, state.age)
+        assert np.linalg.norm(state.position - x) < 8.0
+    # Two or three messages are not believed when the clock steps, and the radio holds some for a second.
+    assert worst < 3 * SECOND
+    assert track.rejected <= 6

@@ -1,0 +1,232 @@
+"""Laws of nodes with clocks of their own: one deadline one call, no drift on the own clock, time never
+decreases, and a clock that is right changes nothing."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+from chatter import TICK, Chatter
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mavlink_bridge.errors import ScheduleError
+from mavlink_bridge.ether import Channel, Ether, Faults
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.node_clock import NodeClock
+from mavlink_bridge.runtime import LockStep, Scheduled
+
+EPOCH = 1_767_225_600_000_000
+SECOND = 1_000_000
+PERIOD = 4 * TICK
+
+offsets = st.integers(-10 * SECOND, 10 * SECOND)
+drifts = st.floats(-100_000, 100_000) | st.floats(-50, 50)
+clocks = st.builds(NodeClock, offsets, drifts, st.just(EPOCH))
+
+
+def loop_of(*scheduled: Scheduled, tick: int = TICK) -> LockStep:
+    names = {entry.node.name: "swarm" for entry in scheduled}
+    faults = Faults(3000, 9000, 0.1, 0.1, 0.1)
+    return LockStep(scheduled, Ether([Channel("air", names, faults)], 3, tick), tick)
+
+
+# The clock
+
+
+@given(clocks, st.integers(-(10**9), 10**12), st.integers(0, 10**9))
+def test_a_clock_and_its_inverse(clock: NodeClock, since: int, later: int) -> None:
+    true = EPOCH + since
+    shown = clock.reading(true)
+    assert clock.instant(shown) <= true < clock.instant(shown + 1)
+    assert clock.reading(clock.instant(shown - 1) - 1) < shown - 1 <= clock.reading(clock.instant(shown - 1))
+    assert clock.reading(true + later) >= shown
+    local = clock.local(true)
+    assert local % 4 == 0
+    assert local <= shown < local + 4
+
+
+@given(clocks, st.integers(0, 10**12))
+def test_offset_and_drift_are_what_they_are_called(clock: NodeClock, since: int) -> None:
+    off = clock.reading(EPOCH + since) - EPOCH - since
+    assert abs(off - clock.offset - clock.drift_ppm * 1e-6 * since) <= 1 + 0.0005e-6 * since
+    assert clock.reading(EPOCH) == EPOCH + clock.offset
+
+
+@given(st.integers(0, 2**52), st.integers(0, 2**52))
+def test_a_right_clock_shows_true_time(true: int, since: int) -> None:
+    assert NodeClock(since=since).reading(true) == true == NodeClock(since=since).instant(true)
+
+
+@pytest.mark.parametrize("drift", [100_001.0, -100_001.0, float("nan"), float("inf")])
+def test_drifts_that_no_clock_has_are_refused(drift: float) -> None:
+    with pytest.raises(ScheduleError, match="ppm"):
+        NodeClock(0, drift)
+
+
+# Calls by a clock
+
+
+@given(clocks, st.integers(1, 6), st.integers(0, 5), st.sampled_from([4, 500, 2500]))
+@settings(max_examples=60)
+def test_one_call_for_each_deadline_on_the_own_clock(
+    clock: NodeClock, ticks: int, phase: int, tick: int
+) -> None:
+    """Told at the first tick at which the clock shows it; none is left out unless the clock gains a whole
+    period within a tick."""
+    period, start, duration = ticks * tick, EPOCH + phase * tick, 200 * ticks * tick
+    node = Chatter("a")
+    calls: list[int] = []
+    loop_of(Scheduled(node, period, start, clock), tick=tick).run(start + duration, calls.append)
+    assert node.steps == [clock.local(call) for call in calls]
+    assert calls[0] >= start
+    assert calls[0] - start < clock.instant(clock.reading(start) + period) - start + tick
+    assert all(call % tick == 0 for call in calls)
+    for call in calls:
+        past = (clock.reading(call) - start) % period
+        assert past < clock.reading(call) - clock.reading(call - tick)
+    deadlines = [(told - start) // period for told in node.steps]
+    for before, after in pairwise(deadlines):
+        assert after == before + 1 or (ticks == 1 and clock.drift_ppm > 0 and after == before + 2)
+    expected = (clock.reading(start + duration) - clock.reading(start)) / period
+    if ticks > 1:
+        assert abs(len(calls) - expected) < 2
+
+
+def test_phases_of_two_clocks_wander() -> None:
+    """40 ppm against each other are two ticks of 2500 µs in 125 s."""
+    fast, slow = Chatter("fast"), Chatter("slow")
+    seen: dict[str, list[int]] = {"fast": [], "slow": []}
+    loop = LockStep(
+        [
+            Scheduled(fast, PERIOD, EPOCH, NodeClock(0, 20.0, EPOCH)),
+            Scheduled(slow, PERIOD, EPOCH, NodeClock(0, -20.0, EPOCH)),
+        ],
+        Ether([], 1, TICK),
+        TICK,
+        [lambda _now, name, _way, _datagram: seen[name].append(loop.now)],
+    )
+    loop.run(EPOCH + 126 * SECOND)
+    apart = [b - a for a, b in zip(seen["fast"], seen["slow"], strict=False)]
+    assert apart == sorted(apart)
+    # Both are due at the epoch; from then on the slow one comes too late for its tick.
+    assert (apart[0], apart[1], apart[-1]) == (0, TICK, 3 * TICK)
+    assert fast.steps[0] == slow.steps[0] == EPOCH
+
+
+Event = tuple[int, str, str, Datagram]
+
+
+def story(clock: NodeClock | None, reverse: bool = False) -> list[Event]:
+    names = "abcd"
+    scheduled = [
+        Scheduled(Chatter(name), PERIOD, EPOCH + index * TICK, clock if name in "bc" else None)
+        for index, name in enumerate(names)
+    ]
+    seen: list[Event] = []
+    ether = Ether([Channel("air", dict.fromkeys(names, "swarm"), Faults(3000, 9000, 0.1, 0.1, 0.1))], 3, TICK)
+    loop = LockStep(
+        scheduled[::-1] if reverse else scheduled, ether, TICK, [lambda *event: seen.append(event)]
+    )
+    loop.run(EPOCH + 2 * SECOND)
+    return seen
+
+
+def test_a_right_clock_changes_no_byte() -> None:
+    assert story(NodeClock(0, 0.0, EPOCH)) == story(NodeClock()) == story(None)
+
+
+@given(clocks)
+@settings(max_examples=10)
+def test_with_clocks_too_the_order_of_nodes_changes_nothing(clock: NodeClock) -> None:
+    assert story(clock) == story(clock, reverse=True)
+
+
+@given(clocks)
+@settings(max_examples=10)
+def test_the_clock_of_one_does_not_move_the_others(clock: NodeClock) -> None:
+    for name in "ad":
+        out = [now for now, node, way, _ in story(clock) if (node, way) == (name, "out")]
+        assert out == [now for now, node, way, _ in story(None) if (node, way) == (name, "out")]
+
+
+def test_a_negative_time_is_told_to_nobody() -> None:
+    with pytest.raises(ScheduleError, match="a: its clock shows -7500 µs at 2500 µs"):
+        loop_of(Scheduled(Chatter("a"), PERIOD, TICK, NodeClock(-10_000)))
+    loop = loop_of(Scheduled(Chatter("a"), PERIOD, TICK))
+    with pytest.raises(ScheduleError, match="-7500"):
+        loop.set_clock("a", -10_000)
+    loop.run(10 * PERIOD)
+
+
+# Clocks that are set while running
+
+
+@given(st.lists(st.integers(0, 100), max_size=5))
+def test_setting_a_right_clock_right_changes_nothing(ticks: list[int]) -> None:
+    """Before the start, within a run and between two runs."""
+    runs = []
+    for moments in ([], [tick * TICK for tick in ticks]):
+        node = Chatter("a")
+        loop = loop_of(Scheduled(node, PERIOD, 7 * TICK))
+
+        def on_tick(now: int, loop: LockStep = loop, moments: list[int] = moments) -> None:
+            if now in moments:
+                loop.set_clock("a", 0)
+
+        for moment in sorted(moments):
+            loop.run(moment, on_tick)
+            loop.set_clock("a", 0)
+        loop.run(120 * TICK, on_tick)
+        runs.append(node.steps)
+    assert runs[0] == runs[1]
+
+
+@given(st.lists(st.tuples(st.integers(0, SECOND), offsets, drifts), max_size=6))
+@settings(max_examples=60)
+def test_node_time_grows_whatever_is_done_to_the_clock(faults: list[tuple[int, int, float]]) -> None:
+    """And nobody waits longer than a period on its clock and a tick, from its last call or from the setting
+    of the clock."""
+    node = Chatter("a")
+    loop = loop_of(Scheduled(node, PERIOD, EPOCH))
+    calls: list[int] = []
+    for after, offset, drift in sorted(faults):
+        loop.run(EPOCH + after, calls.append)
+        loop.set_clock("a", offset, drift)
+    loop.run(EPOCH + SECOND, calls.append)
+    assert all(after > before for before, after in pairwise(node.steps))
+    assert all(time % 4 == 0 for time in node.steps)
+    # The slowest clock takes 1 / 0.9 of a period.
+    moments = sorted([*calls, *(EPOCH + after for after, *_ in faults)])
+    assert max(after - before for before, after in pairwise(moments)) <= PERIOD / 0.9 + TICK + 1
+    assert len(calls) == len(node.steps)
+
+
+def test_after_a_step_back_time_stands_until_the_clock_has_caught_up() -> None:
+    node = Chatter("a")
+    loop = loop_of(Scheduled(node, PERIOD, 0))
+    loop.run(100 * PERIOD)
+    loop.set_clock("a", -10 * PERIOD)
+    loop.run(150 * PERIOD)
+    before, rest = node.steps[:100], node.steps[100:]
+    last = 99 * PERIOD
+    assert before[-1] == last
+    # Called on at its period: at 100, 101, … its clock shows 90, 91, …; at 110 it has caught up.
+    assert rest[:10] == [last + 4 * (k + 1) for k in range(10)]
+    assert rest[10:] == [(k - 10) * PERIOD for k in range(110, 150)]
+
+
+def test_after_a_step_ahead_the_grid_goes_on_from_there() -> None:
+    node = Chatter("a")
+    loop = loop_of(Scheduled(node, PERIOD, 0))
+    calls: list[int] = []
+    loop.run(100 * PERIOD, calls.append)
+    loop.set_clock("a", 5 * PERIOD + TICK)
+    loop.run(110 * PERIOD, calls.append)
+    assert calls[100:] == [100 * PERIOD + 3 * TICK + k * PERIOD for k in range(10)]
+    assert node.steps[100:] == [(106 + k) * PERIOD for k in range(10)]
+
+
+def test_only_nodes_of_the_run_have_clocks() -> None:
+    with pytest.raises(ScheduleError, match="'b'; there are a"):
+        loop_of(Scheduled(Chatter("a"), PERIOD)).set_clock("b", 4)

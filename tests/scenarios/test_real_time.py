@@ -1,0 +1,89 @@
+"""Flights under the wall clock, one process per node over UDP: these tests really wait. They assert no
+timing, as a busy machine is late."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lockstep_flights import FIREFLY, scenario, setpoints
+
+from mavlink_bridge.tlog import read_tlog
+from outrider.conductor import Stage
+from outrider.realtime.flight import RealTimeFlight
+from outrider.resources import config_root
+from outrider.summary import Cost, exit_status, summarise
+
+LOGS = config_root() / "logs"
+SMALL: dict[str, Any] = {
+    "vehicles": 2,
+    "airborne": True,
+    "cap_s": 4.0,
+    "starts": {
+        "kind": "points",
+        "at": [[-2.0, 0.0, 5.0], [2.0, 0.0, 5.0]],
+        "goals": [[-2.0, 3.0, 5.0], [2.0, 3.0, 5.0]],
+    },
+    "task": "goto",
+}
+HANGS = {"faults": [{"kind": "freeze", "vehicle": 12, "at_s": 0.5, "for_s": 1.0}]}
+CUT = {"partitions": [{"at_s": 0.2, "for_s": 1.0, "members": [11]}]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("changes", [{}, {**HANGS, **CUT}], ids=["calm", "frozen and cut off"])
+def test_a_flight_in_real_time(changes: dict[str, Any], tmp_path: Path) -> None:
+    of = scenario("antipodal-8", SMALL, changes)
+    flight = RealTimeFlight(of, FIREFLY, 1, LOGS, tmp_path)
+    flight.run()
+    outcome = flight.outcome
+    assert outcome.failure is None
+    assert outcome.clock_start is not None
+    samples = outcome.truth.samples(outcome.clock_start, outcome.clock_end)
+    assert np.isfinite(samples.position).all()
+    assert (np.diff(samples.time) == 20_000).all()
+    assert outcome.truth.vehicles.minimum > 2.0
+    # On their way, or there: nobody was left hanging.
+    assert (samples.position[-1, :, 1] > 1.0).all()
+    summary = summarise(outcome, Cost(1.0, 1.0), tmp_path)
+    assert summary["d_min_violations"] == 0
+    assert summary["messages"]["bad"] == 0  # type: ignore[index,call-overload]
+    assert summary["deadline_misses"] is not None
+    assert outcome.messages.dropped > 0 or "partitions" not in changes
+    for system in outcome.systems:
+        log = tmp_path / f"vehicle-{system}.tlog"
+        assert read_tlog(log).report.skipped_bytes == 0
+        assert len(setpoints(log)) > 20
+
+
+@pytest.mark.slow
+def test_an_interrupt_lands_and_leaves_whole_logs(tmp_path: Path) -> None:
+    of = scenario(
+        "antipodal-8",
+        SMALL,
+        {"cap_s": 600.0, "starts": {"kind": "points", "goals": [[-2.0, 9.0, 5.0], [2.0, 9.0, 5.0]]}},
+    )
+    sent = threading.Event()
+
+    def watch(stage: Stage, seconds: float) -> None:
+        if stage is Stage.CLOCK and seconds > 1.0 and not sent.is_set():
+            sent.set()
+            os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    flight = RealTimeFlight(of, FIREFLY, 1, LOGS, tmp_path, watch)
+    flight.run()
+    assert sent.is_set()
+    assert signal.getsignal(signal.SIGINT) is before
+    outcome = flight.outcome
+    assert outcome.failure == "interrupted: all vehicles were told to land"
+    heights = outcome.truth.samples().position[-1, :, 2]
+    assert np.abs(heights).max() < 0.2
+    assert exit_status(summarise(outcome, Cost(1.0, 1.0), tmp_path)) == 1
+    for system in outcome.systems:
+        assert read_tlog(tmp_path / f"vehicle-{system}.tlog").report.skipped_bytes == 0

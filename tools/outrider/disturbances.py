@@ -1,0 +1,99 @@
+"""The faults and partitions of a scenario as events in time, relative to the goal event."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+from outrider.scenario import Scenario
+from outrider.scenario_faults import (
+    ClockFault,
+    Freeze,
+    GpsJump,
+    GpsLoss,
+    MotorFailure,
+    Sudden,
+    Vanish,
+)
+from outrider.scenario_links import PartitionPart
+from sitl.node import Autopilot
+
+
+class Event(NamedTuple):
+    """``what`` begins, or ends if ``over``, ``after`` µs after the goal event."""
+
+    after: int
+    what: Sudden | PartitionPart
+    over: bool
+
+
+class Computers(Protocol):
+    """Whoever runs the companions: what can happen to a computer and its radio."""
+
+    def freeze(self, system: int) -> None:
+        """It hangs."""
+        ...
+
+    def thaw(self, system: int) -> None:
+        """It goes on."""
+        ...
+
+    def vanish(self, system: int) -> None:
+        """It is gone."""
+        ...
+
+    def cut(self, systems: tuple[int, ...]) -> None:
+        """Nothing passes between these and the others on the swarm link."""
+        ...
+
+    def heal(self, systems: tuple[int, ...]) -> None:
+        """It passes again."""
+        ...
+
+
+def events(scenario: Scenario) -> list[Event]:
+    """All of a scenario, in the order of time."""
+    found = []
+    # A clock that is off is off from the start: it is no event.
+    sudden = [fault for fault in scenario.faults if not isinstance(fault, ClockFault)]
+    for what in (*sudden, *scenario.partitions):
+        begin = round(1e6 * what.at_s)
+        found.append(Event(begin, what, False))
+        lasts = getattr(what, "for_s", None)
+        if lasts is not None:
+            found.append(Event(begin + round(1e6 * lasts), what, True))
+    return sorted(found, key=lambda event: event.after)
+
+
+def strike_autopilot(event: Event, autopilot: Autopilot) -> None:
+    """Let an event happen to its vehicle's autopilot; one that concerns the companion does nothing here."""
+    match event.what:
+        case GpsLoss():
+            if event.over:
+                autopilot.regain_gps()
+            else:
+                autopilot.lose_gps()
+        case GpsJump(offset=offset):
+            autopilot.shift_gps((0.0, 0.0, 0.0) if event.over else offset)
+        case MotorFailure(rotor=rotor, left=left):
+            autopilot.fail_rotor(rotor, left)
+        case _:
+            pass
+
+
+def strike_computer(event: Event, computers: Computers) -> None:
+    """Let an event happen to a companion's computer or radio; one of an autopilot does nothing here."""
+    match event.what:
+        case Freeze(vehicle=system):
+            if event.over:
+                computers.thaw(system)
+            else:
+                computers.freeze(system)
+        case Vanish(vehicle=system):
+            computers.vanish(system)
+        case PartitionPart(members=systems):
+            if event.over:
+                computers.heal(systems)
+            else:
+                computers.cut(systems)
+        case _:
+            pass

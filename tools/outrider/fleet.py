@@ -1,0 +1,140 @@
+"""The nodes of a scenario for one seed, and how they are linked. The only place where companion and sitl
+stand side by side; they still meet only in MAVLink bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.config import CompanionConfig
+from companion.node import Companion
+from companion.surface import bearing
+from mavlink_bridge.ether import Channel, Faults
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.node_clock import NodeClock
+from outrider.operator import Operator
+from outrider.scenario import FixedTarget, Scenario
+from outrider.scenario_faults import ClockFault
+from outrider.scenario_links import Links
+from outrider.starts import starts
+from outrider.targets import Recorded, Standing, Target
+from sitl.autopilot_config import AutopilotConfig
+from sitl.config import VehicleConfig
+from sitl.node import Autopilot
+
+
+class End(NamedTuple):
+    """A node on a link: its name, the link's name there, and the words that a scenario calls it by."""
+
+    node: str
+    link: str
+    words: tuple[str | int, ...]
+
+
+class Fleet:
+    """Makes each node of ``scenario``; the same seed makes the same ones, in whatever process.
+
+    ``logs`` is where recorded targets lie.
+    """
+
+    def __init__(self, scenario: Scenario, vehicle: VehicleConfig, seed: int, logs: Path) -> None:
+        self.scenario, self.vehicle, self.seed = scenario, vehicle, seed
+        origin = scenario.origin
+        self.frame = FleetFrame(origin.latitude, origin.longitude, origin.altitude)
+        self.starts = starts(scenario, seed, scenario.companion.planar)
+        self.systems = list(scenario.systems)
+        self._logs = logs
+        # One target is enough to know where it is: those of the other processes are the same.
+        self.target_system = self.target().system
+        self._facing = self.target().position(0)
+
+    @property
+    def companion_config(self) -> CompanionConfig:
+        """The companions' settings with the obstacles of the scenario in them."""
+        companion = self.scenario.companion
+        known = (*companion.obstacles, *self.scenario.obstacles)
+        return companion.model_copy(update={"obstacles": known}) if known else companion
+
+    def target(self) -> Target:
+        """The target's node."""
+        config = self.scenario.target
+        if isinstance(config, FixedTarget):
+            return Standing(config, self.frame)
+        return Recorded(config, self._logs / config.log, self.frame)
+
+    def operator(self) -> Operator:
+        """The operator's node."""
+        return Operator(self.frame)
+
+    def companion(self, k: int, stopwatch: Callable[[], int]) -> Companion:
+        """The companion of vehicle ``k``; ``stopwatch`` (ns) measures its planning."""
+        return Companion(self.companion_config, self.systems[k], self.target_system, self.frame, stopwatch)
+
+    def autopilot(self, k: int) -> Autopilot:
+        """The autopilot and vehicle ``k``: on the ground below its start, or hovering there."""
+        start = self.starts.positions[k]
+        place = start * (1.0, 1.0, 0.0)
+        latitude, longitude, altitude = self.frame.to_geodetic(place)
+        facing = 0.0 if self._facing is None else bearing(place, self._facing)
+        config = AutopilotConfig(
+            system_id=self.systems[k],
+            flavour=self.scenario.flavour,
+            latitude=latitude,
+            longitude=longitude,
+            altitude=altitude,
+            yaw=float(np.pi / 2 - facing),
+            sensors=self.scenario.sensors,
+            start_height=float(start[2]) if self.scenario.airborne else 0.0,
+        )
+        return Autopilot(config, self.vehicle, self.frame, self.seed, weather=self.scenario.weather)
+
+    def clock(self, k: int, since: int) -> NodeClock:
+        """How the clock of companion ``k`` differs from true time from ``since`` (µs) on."""
+        for fault in self.scenario.faults:
+            if isinstance(fault, ClockFault) and fault.vehicle == self.systems[k]:
+                return NodeClock(-round(1000.0 * fault.late_ms), fault.drift_ppm, since)
+        bounds = self.scenario.clocks
+        offset, drift = np.random.default_rng([self.seed, 2, k]).uniform(-1.0, 1.0, 2)
+        return NodeClock(round(1000.0 * bounds.offset_ms * offset), float(bounds.drift_ppm * drift), since)
+
+    def phases(self) -> list[int]:
+        """When in its period (µs) each companion is due: seeded, so that they never replan all on one
+        tick."""
+        timing = self.scenario.timing
+        random = np.random.default_rng([self.seed, 1])
+        ticks = random.integers(timing.companion_us // timing.base_tick_us, size=len(self.systems))
+        return [int(tick) * timing.base_tick_us for tick in ticks]
+
+    def channels(self) -> list[Channel]:
+        """All links of the fleet with their faults, for the ether."""
+        links = self.scenario.links
+        companions = [(f"companion-{system}", ("companion", system)) for system in self.systems]
+        channels = []
+        for system, (name, words) in zip(self.systems, companions, strict=True):
+            ends = {
+                "autopilot": End(f"sitl-{system}", "autopilot", ("autopilot", system)),
+                "target": End("target", "target", ("target",)),
+                "ground": End("operator", "ground", ("operator",)),
+            }
+            for link, other in ends.items():
+                pair = [End(name, link, words), other]
+                channels.append(_channel(f"{link}-{name}", pair, getattr(links, link)))
+        channels.append(
+            _channel("swarm", [End(name, "swarm", words) for name, words in companions], links.swarm)
+        )
+        return channels
+
+
+def _channel(name: str, ends: Sequence[End], links: Links) -> Channel:
+    """A channel between ``ends`` whose paths have the faults that ``links`` says for them."""
+    overrides: dict[tuple[str | None, str | None], Faults] = {}
+    if links.directions:
+        for sender in ends:
+            for receiver in ends:
+                faults = links.between(sender.words, receiver.words)
+                if sender is not receiver and faults != links.faults:
+                    overrides[sender.node, receiver.node] = faults
+    return Channel(name, {end.node: end.link for end in ends}, links.faults, overrides=overrides)

@@ -1,0 +1,57 @@
+"""What is left of a finished flight: all that its summary and its picture are made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from companion.node import Tally
+from outrider.scenario import Scenario
+from outrider.starts import Starts
+from outrider.truth import Truth
+
+
+class Messages(NamedTuple):
+    """Datagrams between nodes, counted per receiver, and frames that made no sense."""
+
+    sent: int
+    dropped: int
+    bad: int
+
+
+class Punctuality(NamedTuple):
+    """How well a real-time run kept its deadlines: misses of all nodes, and lateness (ms) of the companions'
+    control."""
+
+    misses: int
+    p50_ms: float
+    p99_ms: float
+    max_ms: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished flight. Times in µs on the clock of the run; None where it did not come to that.
+
+    ``tallies``: per companion at the start of the clock and at its end. ``punctuality`` is that of a
+    real-time run; lock-step has none.
+    """
+
+    scenario: Scenario
+    seed: int
+    span: float
+    starts: Starts
+    target_system: int
+    truth: Truth
+    clock_start: int | None
+    clock_end: int | None
+    converged_at: int | None
+    failure: str | None
+    tallies: list[tuple[Tally, Tally]]
+    messages: Messages
+    punctuality: Punctuality | None = None
+
+    @property
+    def systems(self) -> list[int]:
+        """System ids of the vehicles."""
+        return list(self.scenario.systems)

@@ -1,0 +1,233 @@
+"""One real-time flight of a scenario: one process per node over UDP; this process is the operator's, which
+leads the flight by what the board shows."""
+
+from __future__ import annotations
+
+import signal
+from collections import deque
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import FrameType
+
+import numpy as np
+
+from companion.node import Tally
+from companion.obstacles import FixedObstacles
+from mavlink_bridge.clock import WallClock
+from mavlink_bridge.histogram import Histogram
+from mavlink_bridge.node_clock import QUANTUM
+from mavlink_bridge.realtime import RealTime
+from mavlink_bridge.runtime import Scheduled
+from outrider.conductor import Conductor, Sight, Stage
+from outrider.disturbances import Event, events, strike_computer
+from outrider.errors import OutriderError
+from outrider.fleet import Fleet
+from outrider.flight import Progress, limits
+from outrider.outcome import Messages, Outcome, Punctuality
+from outrider.realtime.board import Board
+from outrider.realtime.crew import Crew
+from outrider.realtime.muster import muster, rough
+from outrider.realtime.traces import Trace, put_together
+from outrider.realtime.wiring import wire
+from outrider.realtime.workers import Remains
+from outrider.scenario import Scenario
+from outrider.truth import SAMPLE, Truth
+from sitl.config import VehicleConfig
+from sitl.vehicle import Vehicle
+
+_START, _START_WITH_PRIORITY = 1_000_000, 3_000_000
+"""µs between forking and the first step: who becomes real-time while others still start makes them late."""
+_NOTHING = Tally(0, 0, 0, 0, 0, ())
+
+
+class RealTimeFlight:
+    """Forks the nodes of ``scenario`` and flies them. ``directory`` gets the tlogs. With ``priority`` every
+    node asks for real-time priority; ``priority_told`` then says what it got.
+
+    ``run`` may be called once, from the main thread: it takes over SIGINT and SIGTERM meanwhile, of which the
+    first lands the fleet and the second ends at once.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        vehicle: VehicleConfig,
+        seed: int,
+        logs: Path,
+        directory: Path,
+        progress: Progress = lambda _stage, _seconds: None,
+        *,
+        priority: bool = False,
+    ) -> None:
+        self.scenario, self.seed = scenario, seed
+        self.fleet = Fleet(scenario, vehicle, seed, logs)
+        self.priority_told = ""
+        self.outcome: Outcome
+        self._directory = directory
+        self._progress = progress
+        self._priority = priority
+        self._clock = WallClock()
+        self._interrupts = 0
+
+    def run(self) -> None:
+        """Fly to the end; ``outcome`` then says how it was. OutriderError if a process ended by a fault."""
+        # Compiled before forking, so that not every process has to.
+        Vehicle(self.fleet.vehicle, np.zeros(3)).advance(1, None)
+        board = Board(self.scenario.vehicles)
+        wiring = wire(self.scenario.vehicles, self._clock)
+        with TemporaryDirectory() as folder, self._interruptible():
+            scratch = Path(folder)
+            start = self._clock.now() + (_START_WITH_PRIORITY if self._priority else _START)
+            workers = muster(self.fleet, wiring, self._clock, board, start, self._directory, scratch)
+            crew = Crew(workers, wiring, board, scratch)
+            crew.start(priority=self._priority)
+            try:
+                wiring.close_others(wiring.operator)
+                operator = self.fleet.operator()
+                behind = rough(self.fleet, operator, {"ground": None})
+                conductor = Conductor(self.scenario, self.fleet.starts, operator, start)
+                leader = _Leader(self.fleet, conductor, crew, board, self._progress)
+                every = Scheduled(behind, self.scenario.timing.companion_us, start // QUANTUM * QUANTUM)
+                loop = RealTime(every, wiring.operator, self._clock)
+                loop.run(lambda: self._interrupts > 1, lambda now: leader.look(now, self._interrupts > 0))
+            finally:
+                remains = crew.join()
+            counters = behind.ether.counters
+            self.outcome = self._gather(
+                scratch, conductor, remains, Messages(counters.sent, counters.dropped, 0)
+            )
+
+    @contextmanager
+    def _interruptible(self) -> Iterator[None]:
+        """Count SIGINT and SIGTERM instead of dying of them."""
+
+        def count(_signal: int, _frame: FrameType | None) -> None:
+            self._interrupts += 1
+
+        before = {which: signal.signal(which, count) for which in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for which, handler in before.items():
+                signal.signal(which, handler)
+
+    def _gather(
+        self, scratch: Path, conductor: Conductor, remains: Mapping[str, Remains], operators: Messages
+    ) -> Outcome:
+        scenario, systems = self.scenario, self.fleet.systems
+        faults = [f"{name}: {found.error}" for name, found in remains.items() if found.error]
+        if faults:
+            raise OutriderError("; ".join(faults))
+        traces = [path for path in (scratch / f"trace-{system}" for system in systems) if path.exists()]
+        if len(traces) < scenario.vehicles:
+            raise OutriderError("an autopilot's process was killed: there is no truth about its vehicle")
+        truth = Truth(scenario.vehicles, limits(scenario), FixedObstacles(scenario.obstacles))
+        period, target = self.fleet.vehicle.physics_period, self.fleet.target()
+        put_together([Trace.load(path) for path in traces], period, target, conductor.clock_start, truth)
+        self.priority_told = next((found.priority for found in remains.values() if found.priority), "")
+        companions = [remains[f"companion-{system}"] for system in systems]
+        return Outcome(
+            scenario,
+            self.seed,
+            self.fleet.vehicle.span,
+            self.fleet.starts,
+            self.fleet.target_system,
+            truth,
+            conductor.clock_start,
+            conductor.clock_end,
+            conductor.converged_at,
+            conductor.failure,
+            [found.tallies or (_NOTHING, _NOTHING) for found in companions],
+            Messages(
+                operators.sent + sum(found.sent for found in remains.values()),
+                operators.dropped + sum(found.dropped for found in remains.values()),
+                sum(found.bad for found in companions),
+            ),
+            _punctuality(remains.values(), companions),
+        )
+
+
+class _Leader:
+    """Shows the conductor what the board shows, and lets happen to processes what the scenario says."""
+
+    def __init__(
+        self, fleet: Fleet, conductor: Conductor, crew: Crew, board: Board, progress: Progress
+    ) -> None:
+        self._fleet, self._conductor, self._crew, self._board = fleet, conductor, crew, board
+        self._progress = progress
+        self._events: deque[Event] = deque(events(fleet.scenario))
+        self._target = fleet.target()
+        self._began: int | None = None
+        self._looked = 0
+
+    def look(self, now: int, interrupted: bool) -> bool:
+        """After every step of the operator; True ends the run."""
+        if now - self._looked < SAMPLE:
+            return False
+        self._looked = now
+        self._began = now if self._began is None else self._began
+        conductor, board = self._conductor, self._board
+        start = conductor.clock_start
+        while start is not None and self._events and self._events[0].after <= now - start:
+            strike_computer(self._events.popleft(), self)
+        self._check(now, interrupted)
+        positions, velocities = board.positions, board.velocities
+        if np.isnan(positions).any():
+            return False
+        self._progress(conductor.stage, 1e-6 * (now - (self._began if start is None else start)))
+        waiting = tuple(
+            f"companion-{system} waits for {board.waiting(k)}"
+            for k, system in enumerate(self._fleet.systems)
+            if not board.ready[k] and not board.gone[k]
+        )
+        armed = bool((board.armed & (board.gone == 0)).any())
+        place = self._target.position(now)
+        over = conductor.see(Sight(now, positions, velocities, place, not waiting, waiting, armed))
+        if start is None and conductor.clock_start is not None:
+            board.goal = now
+            self._target.begin(now)
+        if conductor.clock_end is not None and not board.end:
+            board.end = conductor.clock_end
+        return over
+
+    def _check(self, now: int, interrupted: bool) -> None:
+        """Land everybody if somebody asked for it, or if a process is gone that should be there."""
+        conductor, board = self._conductor, self._board
+        if interrupted and conductor.stage in (Stage.PREPARE, Stage.CLOCK):
+            conductor.abort(now, "interrupted: all vehicles were told to land")
+        for name, status in self._crew.ended().items():
+            kind, _, system = name.rpartition("-")
+            if kind == "companion":
+                k = self._fleet.systems.index(int(system))
+                if board.gone[k]:
+                    continue
+                # Nobody can tell its vehicle to land any more.
+                board.gone[k] = 1
+            conductor.abort(now, f"the process of {name} ended with status {status}")
+
+    # What happens to companions' computers; partitions are each companion's own.
+
+    def freeze(self, system: int) -> None:
+        self._crew.freeze(f"companion-{system}")
+
+    def thaw(self, system: int) -> None:
+        self._crew.thaw(f"companion-{system}")
+
+    def vanish(self, system: int) -> None:
+        self._board.gone[self._fleet.systems.index(system)] = 1
+
+    def cut(self, systems: tuple[int, ...]) -> None:
+        pass
+
+    def heal(self, systems: tuple[int, ...]) -> None:
+        pass
+
+
+def _punctuality(everybody: Collection[Remains], companions: Collection[Remains]) -> Punctuality:
+    lateness = Histogram()
+    for found in companions:
+        lateness.include(found.lateness)
+    p50, p99, largest = (1e-3 * value for value in lateness.spread)
+    return Punctuality(sum(found.misses for found in everybody), p50, p99, largest)

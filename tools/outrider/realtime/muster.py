@@ -1,0 +1,82 @@
+"""The workers of a fleet: each node with its rough links, its schedule, and the events that concern it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from mavlink_bridge.channel import Channel
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.node import Node
+from mavlink_bridge.node_clock import QUANTUM
+from mavlink_bridge.runtime import Scheduled
+from outrider.disturbances import events
+from outrider.fleet import Fleet
+from outrider.realtime.board import Board
+from outrider.realtime.rough import Rough
+from outrider.realtime.wiring import Wiring
+from outrider.realtime.workers import AutopilotWorker, CompanionWorker, TargetWorker, Worker
+from outrider.scenario_links import PartitionPart
+
+
+def muster(
+    fleet: Fleet, wiring: Wiring, clock: Clock, board: Board, start: int, logs: Path, scratch: Path
+) -> list[Worker]:
+    """One worker for each node but the operator, due from ``start`` (µs) on. ``logs`` gets the tlogs,
+    ``scratch`` the true traces.
+
+    No two are due at one instant if it can be helped: on few cores the last of them would be late.
+    """
+    start -= start % QUANTUM
+    timing, happening = fleet.scenario.timing, events(fleet.scenario)
+    cuts = [event for event in happening if isinstance(event.what, PartitionPart)]
+    workers: list[Worker] = []
+    count = len(fleet.systems)
+    for k, system in enumerate(fleet.systems):
+        autopilot, companion = fleet.autopilot(k), fleet.companion(k, time.thread_time_ns)
+        own = [event for event in happening if getattr(event.what, "vehicle", None) == system]
+        behind = rough(fleet, autopilot, {"autopilot": companion.name})
+        every = Scheduled(behind, timing.autopilot_us, start + staggered(k, count, timing.autopilot_us))
+        trace = scratch / f"trace-{system}"
+        workers.append(
+            AutopilotWorker(k, autopilot, own, trace, behind, every, wiring.autopilots[k], clock, board)
+        )
+        senders = {"autopilot": autopilot.name, "swarm": None, "target": "target", "ground": "operator"}
+        behind = rough(fleet, companion, senders)
+        phase = start + staggered(k, count, timing.companion_us)
+        every = Scheduled(behind, timing.companion_us, phase, fleet.clock(k, start))
+        log = logs / f"vehicle-{system}.tlog"
+        workers.append(
+            CompanionWorker(k, companion, cuts, log, behind, every, wiring.companions[k], clock, board)
+        )
+    target = fleet.target()
+    behind = rough(fleet, target, {})
+    every = Scheduled(
+        behind, timing.companion_us, start + staggered(2 * count - 1, 2 * count, timing.companion_us)
+    )
+    workers.append(TargetWorker(target, behind, every, wiring.target, clock, board))
+    return workers
+
+
+def staggered(k: int, count: int, period: int) -> int:
+    """When in its ``period`` (µs) the node ``k`` of ``count`` is due: evenly spread, a multiple of 4."""
+    return k * period // count // QUANTUM * QUANTUM
+
+
+def rough(fleet: Fleet, node: Node, senders: dict[str, str | None]) -> Rough:
+    """``node`` behind the links that the scenario gives it; ``senders`` as for ``Rough``."""
+    return Rough(node, senders, _channels(fleet, node.name), fleet.seed, fleet.scenario.timing.base_tick_us)
+
+
+def _channels(fleet: Fleet, receiver: str) -> list[Channel]:
+    """From every node that ``receiver`` can hear, a channel to it with the faults of that way."""
+    found = []
+    for channel in fleet.channels():
+        link = channel.members.get(receiver)
+        if link is None:
+            continue
+        for sender, name in channel.members.items():
+            if sender != receiver:
+                faults = channel.overrides.get((sender, receiver), channel.faults)
+                found.append(Channel(f"{channel.name}-{sender}", {sender: name, receiver: link}, faults))
+    return found

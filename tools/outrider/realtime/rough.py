@@ -1,0 +1,54 @@
+"""A node behind rough links: what arrives over a perfect loopback is delayed, lost and reordered as the
+scenario says, by the same ether as in lock-step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from mavlink_bridge.ether import Channel, Ether
+from mavlink_bridge.header import sending_system
+from mavlink_bridge.node import Datagram, Node
+
+
+class Rough:
+    """``node`` behind ``ether``, in which every channel leads from one sender to it.
+
+    ``senders``: for each link the node at its other end; None where there are many, who are told by the
+    system id in the header. What no channel is for is dropped.
+    """
+
+    def __init__(
+        self, node: Node, senders: Mapping[str, str | None], channels: Sequence[Channel], seed: int, tick: int
+    ) -> None:
+        self.node = node
+        self._senders = senders
+        self._channels = [channel.name for channel in channels]
+        self.ether = Ether(channels, seed, tick)
+
+    @property
+    def name(self) -> str:
+        """That of the node."""
+        return self.node.name
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """As the node, with what has come through the ether by ``now``."""
+        for datagram in inbox:
+            sender = self._senders[datagram.link] or f"companion-{sending_system(datagram.data)}"
+            self.ether.send(now, sender, [datagram])
+        return self.node.step(now, self.ether.receive(now, self.node.name))
+
+    def cut(self, members: Iterable[str]) -> None:
+        """Nothing passes on the swarm's channels between ``members`` and others."""
+        names = list(members)
+        for channel in self._swarm:
+            self.ether.cut(channel, names)
+
+    def heal(self, members: Iterable[str]) -> None:
+        """It passes again."""
+        names = list(members)
+        for channel in self._swarm:
+            self.ether.heal(channel, names)
+
+    @property
+    def _swarm(self) -> list[str]:
+        return [name for name in self._channels if name.startswith("swarm")]

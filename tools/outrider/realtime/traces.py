@@ -1,0 +1,104 @@
+"""The true motion of one vehicle, kept by the process that simulates it, and put together by the parent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mavlink_bridge.frames import ned_to_enu
+from outrider.targets import Target
+from outrider.truth import ROW, SAMPLE, Array, Truth
+from outrider.witness import rows
+from sitl.node import Autopilot
+
+
+class Trace(NamedTuple):
+    """``times`` (n,) µs of all physics steps, ``positions`` (n, 3) ENU, NaN on the ground; ``sampled`` (m,)
+    µs and ``rows`` (m, ROW)."""
+
+    times: NDArray[np.int64]
+    positions: Array
+    sampled: NDArray[np.int64]
+    rows: Array
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """What ``TraceWriter.save`` wrote."""
+        with np.load(path) as file:
+            return cls(*(file[name] for name in cls._fields))
+
+
+class TraceWriter:
+    """Collects the trace of ``autopilot`` step by step."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+        self._times: list[NDArray[np.int64]] = [np.empty(0, dtype=np.int64)]
+        self._positions: list[Array] = [np.empty((0, 3))]
+        self._sampled: list[int] = []
+        self._rows: list[Array] = []
+
+    def see(self, now: int) -> Array | None:
+        """After a step at ``now``: take its trace; the sample (ROW,), if one is due."""
+        autopilot = self._autopilot
+        track = ned_to_enu(autopilot.trace)
+        if not autopilot.airborne:
+            track[:] = np.nan
+        self._times.append(autopilot.trace_times)
+        self._positions.append(track)
+        if self._sampled and now // SAMPLE == self._sampled[-1] // SAMPLE:
+            return None
+        sample: Array = rows([autopilot])[0]
+        self._sampled.append(now)
+        self._rows.append(sample)
+        return sample
+
+    def save(self, path: Path) -> None:
+        """Write it as NumPy arrays."""
+        trace = Trace(
+            np.concatenate(self._times),
+            np.concatenate(self._positions),
+            np.array(self._sampled, dtype=np.int64),
+            np.array(self._rows).reshape(-1, ROW),
+        )
+        with path.open("wb") as file:
+            np.savez(file, **trace._asdict())
+
+
+def put_together(traces: list[Trace], period: int, target: Target, goal: int | None, truth: Truth) -> None:
+    """Show ``truth`` the flight of all vehicles on one grid of physics steps (``period`` µs), from when the
+    last began to when the first ended. The ``target``'s clone begins at ``goal`` (µs)."""
+    begin = max(int(trace.times[0]) for trace in traces)
+    end = min(int(trace.times[-1]) for trace in traces)
+    begin += -begin % SAMPLE
+    begun = False
+    for now in range(begin + SAMPLE, end + 1, SAMPLE):
+        if goal is not None and not begun and now >= goal:
+            target.begin(goal)
+            begun = True
+        place = target.position(now)
+        steps = np.arange(now - SAMPLE + period, now + 1, period)
+        truth.steps(np.stack([_at(trace, steps) for trace in traces], axis=1), place)
+        truth.sample(now, np.array([_sample(trace, now) for trace in traces]), place)
+
+
+def _at(trace: Trace, steps: NDArray[np.int64]) -> Array:
+    """Positions (n, 3) at ``steps``: those of the trace, or between its neighbours if its grid lies
+    beside."""
+    after = np.clip(np.searchsorted(trace.times, steps), 1, len(trace.times) - 1)
+    left, right = trace.times[after - 1], trace.times[after]
+    share = ((steps - left) / (right - left))[:, None]
+    between: Array = (1.0 - share) * trace.positions[after - 1] + share * trace.positions[after]
+    exact = right == steps
+    between[exact] = trace.positions[after[exact]]
+    return between
+
+
+def _sample(trace: Trace, now: int) -> Array:
+    """The last sample up to ``now``."""
+    index = max(int(np.searchsorted(trace.sampled, now, side="right")) - 1, 0)
+    result: Array = trace.rows[index]
+    return result

@@ -1,0 +1,79 @@
+"""The links of a real-time run, all on this machine's loopback: vehicles and operator over unicast UDP, the
+swarm and the target over multicast groups of their own."""
+
+from __future__ import annotations
+
+import socket
+from contextlib import ExitStack
+from typing import NamedTuple
+
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.link import Link
+from mavlink_bridge.opening import open_link
+from mavlink_bridge.udp import UdpListener
+
+_HOST = "127.0.0.1"
+_GROUP = "239.255.145.50"
+
+
+class Wiring(NamedTuple):
+    """Open links by node: of each autopilot and companion by link name; of target and operator."""
+
+    autopilots: list[dict[str, list[Link]]]
+    companions: list[dict[str, list[Link]]]
+    target: dict[str, list[Link]]
+    operator: dict[str, list[Link]]
+
+    def close_others(self, own: dict[str, list[Link]]) -> None:
+        """Close every link but ``own``: a process keeps its node's alone."""
+        for node in (*self.autopilots, *self.companions, self.target, self.operator):
+            if node is not own:
+                for links in node.values():
+                    for link in links:
+                        link.close()
+
+
+def wire(vehicles: int, clock: Clock) -> Wiring:
+    """Open all links, on ports that are free now. LinkError if one cannot be opened; then none stays open."""
+    swarm, target = (f"mcast:{_GROUP}:{port},{_HOST}" for port in _free_ports(2))
+    with ExitStack() as opened:
+
+        def opening(endpoint: str) -> Link:
+            link = open_link(endpoint, clock)
+            opened.callback(link.close)
+            return link
+
+        autopilots: list[dict[str, list[Link]]] = []
+        companions: list[dict[str, list[Link]]] = []
+        operator: list[Link] = []
+        for _ in range(vehicles):
+            # As real ones do, the autopilot speaks first.
+            vehicle, ground = opening(f"udpin:{_HOST}:0"), opening(f"udpin:{_HOST}:0")
+            autopilots.append({"autopilot": [opening(f"udpout:{_HOST}:{_port(vehicle)}")]})
+            companions.append(
+                {
+                    "autopilot": [vehicle],
+                    "swarm": [opening(swarm)],
+                    "target": [opening(target)],
+                    "ground": [ground],
+                }
+            )
+            operator.append(opening(f"udpout:{_HOST}:{_port(ground)}"))
+        wiring = Wiring(autopilots, companions, {"target": [opening(target)]}, {"ground": operator})
+        opened.pop_all()
+    return wiring
+
+
+def _port(link: Link) -> int:
+    if not isinstance(link, UdpListener):
+        raise TypeError(f"{link!r} has no port of its own")
+    return int(link.address[1])
+
+
+def _free_ports(count: int) -> list[int]:
+    """Ports that nobody has; all are taken at once, so that none is given twice."""
+    with ExitStack() as held:
+        sockets = [held.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)]
+        for one in sockets:
+            one.bind((_HOST, 0))
+        return [one.getsockname()[1] for one in sockets]

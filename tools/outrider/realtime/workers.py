@@ -1,0 +1,253 @@
+"""What the process of a node does: run it under the wall clock over its links until the run ends, show it on
+the board, and leave behind what the summary needs."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import sys
+from collections import deque
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from companion.node import Companion, Tally
+from companion.pilot import Phase
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.garbage import IdleCollector
+from mavlink_bridge.histogram import Histogram
+from mavlink_bridge.link import Link
+from mavlink_bridge.priority import LEVEL, ask_for_priority, sharpen_timers
+from mavlink_bridge.realtime import RealTime
+from mavlink_bridge.runtime import Scheduled, Tap
+from mavlink_bridge.tlog import TlogWriter
+from outrider.disturbances import Event, strike_autopilot, strike_computer
+from outrider.flight import LINK_NUMBERS
+from outrider.realtime.board import Board
+from outrider.realtime.rough import Rough
+from outrider.realtime.traces import TraceWriter
+from outrider.targets import Target
+from sitl.node import Autopilot
+
+
+@dataclass
+class Remains:
+    """What a process leaves behind."""
+
+    misses: int = 0
+    lateness: Histogram = field(default_factory=Histogram)
+    sent: int = 0
+    dropped: int = 0
+    bad: int = 0
+    tallies: tuple[Tally, Tally] | None = None
+    priority: str = ""
+    error: str = ""
+
+
+class Worker:
+    """One node in its own process."""
+
+    above = 0
+    """Levels of real-time priority above the others'."""
+
+    def __init__(
+        self, rough: Rough, scheduled: Scheduled, links: dict[str, list[Link]], clock: Clock, board: Board
+    ) -> None:
+        self.rough = rough
+        self.remains = Remains()
+        self.board = board
+        self._scheduled = scheduled._replace(node=rough)
+        self.links = links
+        self._clock = clock
+        self._parent = os.getpid()
+        self._goal_seen = False
+
+    def over(self) -> bool:
+        """Whether to end: it was said, or the parent is gone."""
+        return self.board.stop or os.getppid() != self._parent
+
+    def begin(self, now: int) -> None:
+        """The goal event, at ``now`` µs."""
+
+    def show(self, now: int) -> None:
+        """After every step."""
+
+    def leave(self, path: Path) -> None:
+        """Write what is left; called at the end, whatever it was."""
+        path.write_bytes(pickle.dumps(self.remains))
+
+    def main(self, directory: Path, priority: bool) -> None:
+        """The process, from fork to exit."""
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        if priority:
+            self.remains.priority = ask_for_priority(LEVEL + self.above).told
+        else:
+            sharpen_timers()
+        status = 0
+        try:
+            self._run()
+        except Exception as error:
+            # The parent tells it in a sentence: this process has no console of its own.
+            self.remains.error = f"{type(error).__name__}: {error}"
+            status = 3
+        self.leave(directory / self.rough.name)
+        sys.exit(status)
+
+    def taps(self, files: ExitStack) -> list[Tap]:
+        """What looks on at the datagrams; closed with ``files``."""
+        return []
+
+    def _run(self) -> None:
+        with IdleCollector() as garbage, ExitStack() as files:
+            loop = RealTime(self._scheduled, self.links, self._clock, self.taps(files), on_idle=garbage.idle)
+            try:
+                statistics = loop.run(self.over, self._stepped)
+            finally:
+                self.remains.lateness = loop.deadlines.lateness
+                self.remains.misses = loop.deadlines.misses
+        counters = self.rough.ether.counters
+        self.remains.sent = counters.sent
+        self.remains.dropped = counters.dropped + statistics.overruns
+
+    def _stepped(self, now: int) -> None:
+        if not self._goal_seen and self.board.goal:
+            self._goal_seen = True
+            self.begin(self.board.goal)
+        self.show(now)
+
+
+class AutopilotWorker(Worker):
+    """An autopilot with its vehicle; being due more often than the others it goes first."""
+
+    above = 1
+
+    def __init__(
+        self,
+        k: int,
+        node: Autopilot,
+        events: list[Event],
+        trace: Path,
+        rough: Rough,
+        scheduled: Scheduled,
+        links: dict[str, list[Link]],
+        clock: Clock,
+        board: Board,
+    ) -> None:
+        super().__init__(rough, scheduled, links, clock, board)
+        self._k, self._node = k, node
+        self._events = deque(events)
+        self._trace = TraceWriter(node)
+        self._trace_path = trace
+
+    def begin(self, now: int) -> None:
+        self._node.begin(now)
+
+    def show(self, now: int) -> None:
+        goal = self.board.goal
+        while goal and self._events and self._events[0].after <= now - goal:
+            strike_autopilot(self._events.popleft(), self._node)
+        sample = self._trace.see(now)
+        if sample is not None:
+            self.board.show_vehicle(self._k, sample[0:3], sample[3:6], self._node.armed)
+
+    def leave(self, path: Path) -> None:
+        self._trace.save(self._trace_path)
+        super().leave(path)
+
+
+class CompanionWorker(Worker):
+    """A companion; it writes its vehicle's tlog."""
+
+    def __init__(
+        self,
+        k: int,
+        node: Companion,
+        events: list[Event],
+        log: Path,
+        rough: Rough,
+        scheduled: Scheduled,
+        links: dict[str, list[Link]],
+        clock: Clock,
+        board: Board,
+    ) -> None:
+        super().__init__(rough, scheduled, links, clock, board)
+        self._k, self._node = k, node
+        self._events = deque(events)
+        self._log = log
+        self._shown: tuple[bool, str] | None = None
+        self._first: Tally | None = None
+        self._last: Tally | None = None
+
+    def over(self) -> bool:
+        return bool(self.board.gone[self._k]) or super().over()
+
+    def begin(self, now: int) -> None:
+        self._first = self._node.tally
+
+    def show(self, now: int) -> None:
+        goal = self.board.goal
+        while goal and self._events and self._events[0].after <= now - goal:
+            strike_computer(self._events.popleft(), _Radio(self.rough))
+        if self.board.end and self._last is None:
+            self._last = self._node.tally
+        pilot = self._node.pilot
+        shown = pilot.phase is Phase.ESCORT, pilot.waiting_for + (f" ({pilot.said})" if pilot.said else "")
+        if shown != self._shown:
+            self._shown = shown
+            self.board.show_companion(self._k, *shown)
+
+    def leave(self, path: Path) -> None:
+        now = self._node.tally
+        self.remains.tallies = (self._first or now, self._last or now)
+        self.remains.bad = self._node.bad_frames
+        super().leave(path)
+
+    def taps(self, files: ExitStack) -> list[Tap]:
+        writer = files.enter_context(TlogWriter(self._log))
+        return [
+            lambda now, _node, _way, datagram: writer.write(now, LINK_NUMBERS[datagram.link], datagram.data)
+        ]
+
+
+class TargetWorker(Worker):
+    """The target."""
+
+    def __init__(
+        self,
+        node: Target,
+        rough: Rough,
+        scheduled: Scheduled,
+        links: dict[str, list[Link]],
+        clock: Clock,
+        board: Board,
+    ) -> None:
+        super().__init__(rough, scheduled, links, clock, board)
+        self._node = node
+
+    def begin(self, now: int) -> None:
+        self._node.begin(now)
+
+
+class _Radio:
+    """Partitions of the swarm, as one companion feels them; what happens to whole processes is the
+    parent's."""
+
+    def __init__(self, rough: Rough) -> None:
+        self._rough = rough
+
+    def freeze(self, system: int) -> None:
+        """The parent stops the process."""
+
+    def thaw(self, system: int) -> None:
+        """The parent lets it go on."""
+
+    def vanish(self, system: int) -> None:
+        """The parent ends it."""
+
+    def cut(self, systems: tuple[int, ...]) -> None:
+        self._rough.cut(f"companion-{system}" for system in systems)
+
+    def heal(self, systems: tuple[int, ...]) -> None:
+        self._rough.heal(f"companion-{system}" for system in systems)

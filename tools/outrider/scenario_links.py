@@ -1,0 +1,86 @@
+"""What the links of a scenario do to messages: per kind of link, per direction, and partitions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated
+
+from pydantic import Field
+
+from mavlink_bridge.ether import Faults
+from outrider.scenario_part import Duration, Milliseconds, Part, Seconds, Share, System
+
+_WORDS = ("delay_ms", "jitter_ms", "loss", "duplication", "reordering", "burst")
+Burst = Annotated[float, Field(ge=0.0, le=10_000.0)]
+ROLES = ("companion", "autopilot", "target", "operator")
+
+
+class Direction(Part):
+    """Faults of one direction in place of the link's own; what is null stays the link's.
+
+    ``sender`` and ``receiver`` are a role (companion, autopilot, target, operator), the system id of a
+    companion, or null for all.
+    """
+
+    sender: str | System | None = None
+    receiver: str | System | None = None
+    delay_ms: Milliseconds | None = None
+    jitter_ms: Milliseconds | None = None
+    loss: Share | None = None
+    duplication: Share | None = None
+    reordering: Share | None = None
+    burst: Burst | None = None
+
+
+class Links(Part):
+    """Faults of one kind of link."""
+
+    delay_ms: Milliseconds = 20.0
+    jitter_ms: Milliseconds = 0.0
+    loss: Share = 0.0
+    duplication: Share = 0.0
+    reordering: Share = 0.0
+    burst: Burst = Field(0.0, description="mean number of messages lost in a row; 0: each on its own")
+    directions: tuple[Direction, ...] = Field((), description="where it differs; the last that fits counts")
+
+    @property
+    def faults(self) -> Faults:
+        """As the ether takes them."""
+        return _faults({word: getattr(self, word) for word in _WORDS})
+
+    def between(self, sender: Iterable[str | int], receiver: Iterable[str | int]) -> Faults:
+        """Faults from one node to another, each given by all the names that it goes by."""
+        result: dict[str, float] = {word: getattr(self, word) for word in _WORDS}
+        senders, receivers = set(sender), set(receiver)
+        for direction in self.directions:
+            if direction.sender is not None and direction.sender not in senders:
+                continue
+            if direction.receiver is not None and direction.receiver not in receivers:
+                continue
+            for word in _WORDS:
+                value = getattr(direction, word)
+                if value is not None:
+                    result[word] = value
+        return _faults(result)
+
+
+class AllLinks(Part):
+    """The four links of a companion."""
+
+    autopilot: Links = Links(delay_ms=5.0)
+    swarm: Links = Links()
+    target: Links = Links()
+    ground: Links = Links()
+
+
+class PartitionPart(Part):
+    """For a while nothing passes on the swarm link between ``members`` and the other companions."""
+
+    at_s: Seconds = Field(description="after the goal event")
+    for_s: Duration
+    members: tuple[System, ...] = Field(min_length=1, description="system ids")
+
+
+def _faults(said: dict[str, float]) -> Faults:
+    delay, jitter, loss, duplication, reordering, burst = (said[word] for word in _WORDS)
+    return Faults(round(1000 * delay), round(1000 * jitter), loss, duplication, reordering, burst)

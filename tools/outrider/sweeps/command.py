@@ -1,0 +1,160 @@
+"""``outrider sweep``: from a sweep file to its table, resumable at any moment."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from outrider.resources import find
+from outrider.sweeps import directory as places
+from outrider.sweeps import picture
+from outrider.sweeps.cells import Cell, cells, task
+from outrider.sweeps.flying import RUN
+from outrider.sweeps.grid import Sweep
+from outrider.sweeps.journal import Header, Journal, opened
+from outrider.sweeps.pool import Pool
+from outrider.sweeps.progress import Watch, duration, watching
+from outrider.sweeps.report import CellReport, cell_report, document, exit_status
+from outrider.sweeps.runs import Run, run_of
+from outrider.sweeps.table import show
+from outrider.sweeps.tasks import Entry, Task
+from outrider.yaml_file import load
+
+WALL_LIMIT_S = 1800.0
+INTERRUPTED = 3
+_PACKAGES = ("outrider", "numpy", "scipy", "numba", "piqp", "filterpy", "pymavlink", "pymap3d")
+
+
+def sweep(
+    name: str,
+    runs: int | None = None,
+    jobs: int | None = None,
+    out: Path | None = None,
+    as_json: bool = False,
+    wall_limit_s: float = WALL_LIMIT_S,
+    run: str = RUN,
+) -> int:
+    """Fly the sweep ``name``, a file or a shipped one, and show its summary; the exit status.
+
+    0 all runs ended well; 1 a violation of d_min or a goal not reached; 3 a run raised or is lost for good,
+    or the sweep was interrupted. InputError for what cannot be flown, before anything is. ``runs`` in place
+    of the file's number of seeds; ``jobs`` workers, one for each core by default; ``run`` is what a worker
+    calls, ``module:function``.
+    """
+    path = find("sweeps", name)
+    spec = load(path, Sweep)
+    if runs is not None:
+        spec = spec.model_copy(update={"runs": runs})
+    found = cells(spec, str(path))
+    folder = places.prepare(out, spec.name)
+    began = time.perf_counter()
+    with opened(folder / places.JOURNAL, _header(spec, found)) as journal:
+        tasks = [task(cell, seed) for seed in spec.seeds for cell in found]
+        waiting = [one for one in tasks if not _ended(journal, one)]
+        with watching(len(tasks), len(tasks) - len(waiting)) as watch:
+            stopped = _work(journal, waiting, watch, run, jobs or _cores(), wall_limit_s)
+        if stopped:
+            left = sum(not _ended(journal, one) for one in tasks)
+            words = ["outrider", "sweep", name, *([] if runs is None else ["--runs", str(runs)]), "--out"]
+            sys.stderr.write(
+                f"stopped after {len(tasks) - left} of {len(tasks)} runs, which are kept; this goes on with "
+                f"the rest: {shlex.join([*words, str(folder)])}\n"
+            )
+            return INTERRUPTED
+        wall = time.perf_counter() - began
+        return _conclude(spec, found, journal, folder, as_json, _Effort(waiting, watch, wall))
+
+
+class _Effort:
+    """What this attempt took: no part of the result."""
+
+    def __init__(self, flown: Sequence[Task], watch: Watch, wall_s: float) -> None:
+        self.flown, self.lost, self.wall_s = len(flown), watch.lost, wall_s
+
+    def document(self, labels: dict[str, str]) -> dict[str, Any]:
+        """Values of JSON; every run that a worker was lost at is named, retried or not."""
+        lost = [{"cell": labels[one.key], "seed": one.seed, "what": one.what} for one in self.lost]
+        return {"flown_now": self.flown, "wall_s": round(self.wall_s, 3), "lost_on_the_way": lost}
+
+
+def _work(
+    journal: Journal, waiting: Sequence[Task], watch: Watch, run: str, jobs: int, wall_limit_s: float
+) -> bool:
+    """Run what is waiting; True if somebody pressed Ctrl-C."""
+
+    def ended(entry: Entry) -> None:
+        journal.append(entry)
+        watch.ended(entry)
+
+    def tick() -> None:
+        journal.settle()
+        watch.tick()
+
+    try:
+        with Pool(run, jobs, wall_limit_s) as pool:
+            pool.work(waiting, ended, tick)
+    except KeyboardInterrupt:
+        return True
+    return False
+
+
+def _conclude(
+    spec: Sweep, found: Sequence[Cell], journal: Journal, folder: Path, as_json: bool, effort: _Effort
+) -> int:
+    runs = {cell.key: _runs(journal, cell, spec) for cell in found}
+    reports = [_report(folder, cell, runs[cell.key]) for cell in found]
+    summary = document(spec.name, spec.first_seed, reports)
+    (folder / places.SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    picture.draw(spec.name, reports, runs, folder / places.PICTURE)
+    labels = {cell.key: cell.label for cell in found}
+    if as_json:
+        whole = {**summary, "sweep_dir": str(folder), "wall": effort.document(labels)}
+        sys.stdout.write(json.dumps(whole) + "\n")
+    else:
+        show(spec.name, reports)
+    for entry in effort.lost:
+        sys.stderr.write(f"lost: {labels[entry.key]}, seed {entry.seed}: {entry.what}\n")
+    if effort.flown:
+        pace = 60.0 * effort.flown / effort.wall_s
+        sys.stderr.write(f"{effort.flown} runs in {duration(effort.wall_s)}, {pace:.0f} a minute; {folder}\n")
+    return exit_status(reports)
+
+
+def _report(folder: Path, cell: Cell, runs: Sequence[Run]) -> CellReport:
+    return cell_report(cell.label, cell.key, runs, lambda seed: places.command(folder, cell, seed))
+
+
+def _runs(journal: Journal, cell: Cell, spec: Sweep) -> list[Run]:
+    return [run_of(journal.entries[cell.key, seed]) for seed in spec.seeds]
+
+
+def _ended(journal: Journal, one: Task) -> bool:
+    """A lost run has not ended: it is tried again on resume."""
+    entry = journal.entries.get(one.run)
+    return entry is not None and entry.status != "lost"
+
+
+def _header(spec: Sweep, found: Sequence[Cell]) -> Header:
+    """The sweep is its cells: more runs of the same go on in the same journal."""
+    digest = hashlib.sha256(" ".join(sorted(cell.key for cell in found)).encode()).hexdigest()
+    versions = {"python": platform.python_version(), "machine": platform.machine()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "none"
+    return Header(spec.name, digest, versions)
+
+
+def _cores() -> int:
+    """Those that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

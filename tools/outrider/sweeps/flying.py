@@ -1,0 +1,36 @@
+"""What a worker does with a task: the flight, and its summary without what depends on the machine."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from outrider.scenario import Scenario
+from outrider.summary import WALL_FIELDS, Value
+from outrider.swarm import Prepared, measure
+from outrider.sweeps.cells import scenario_of
+from outrider.sweeps.tasks import Task
+from sitl.config import VehicleConfig
+
+RUN = f"{__name__}:fly"
+"""How a worker finds `fly`."""
+
+
+def fly(task: Task) -> dict[str, Value]:
+    """Fly it without files. The same task gives the same summary."""
+    summary = measure(Prepared(_scenario(task), _vehicle(task.vehicle)), task.seed)
+    return {key: value for key, value in summary.items() if key not in WALL_FIELDS}
+
+
+def _scenario(task: Task) -> Scenario:
+    # A scenario is the same for all seeds of its cell; a scene draws another for each.
+    return scenario_of(task) if task.is_scene else _fixed(task._replace(seed=0))
+
+
+@lru_cache(maxsize=64)
+def _fixed(task: Task) -> Scenario:
+    return scenario_of(task)
+
+
+@lru_cache(maxsize=64)
+def _vehicle(document: str) -> VehicleConfig:
+    return VehicleConfig.model_validate_json(document, strict=True)

@@ -1,0 +1,64 @@
+"""Sees the true state of emulated autopilots and hands it to the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mavlink_bridge.frames import ned_to_enu, yaw_to_enu
+from outrider.targets import Target
+from outrider.truth import NOWHERE, ROW, SAMPLE, Array, Truth
+from sitl.node import Autopilot
+
+
+class Witness:
+    """Watches the autopilots of a lock-step run; ``see`` is called after every tick."""
+
+    def __init__(self, autopilots: list[Autopilot], target: Target, truth: Truth) -> None:
+        self._autopilots = autopilots
+        self._target = target
+        self._truth = truth
+        self._last = -1
+        self._next = 0
+        self._pending: list[Array] = []
+
+    def see(self, now: int) -> bool:
+        """Take in the physics steps since the last call; whether a sample was taken at ``now``."""
+        times = self._autopilots[0].trace_times
+        if not len(times) or times[-1] == self._last:
+            return False
+        self._last = int(times[-1])
+        track = np.stack([autopilot.trace for autopilot in self._autopilots], axis=1)
+        for k, autopilot in enumerate(self._autopilots):
+            if not autopilot.airborne:
+                track[:, k] = np.nan
+        self._pending.append(track)
+        if now < self._next:
+            return False
+        self._next = now + SAMPLE
+        place = self._target.position(now)
+        self._truth.steps(ned_to_enu(np.concatenate(self._pending)), place)
+        self._pending.clear()
+        self._truth.sample(now, rows(self._autopilots), place)
+        return True
+
+
+def rows(autopilots: Sequence[Autopilot]) -> Array:
+    """The samples (K, ROW) of vehicles, ENU: see ``truth.ROW``."""
+    ned = np.empty((len(autopilots), 5, 3))
+    attitude = np.empty((len(autopilots), 4))
+    for k, autopilot in enumerate(autopilots):
+        state, reference = autopilot.state, autopilot.reference
+        ned[k, 0], ned[k, 1], ned[k, 2] = state.position, state.velocity, state.acceleration
+        ned[k, 3] = NOWHERE if reference is None else reference.position
+        ned[k, 4] = autopilot.estimate_error
+        attitude[k] = state.attitude
+    result = np.empty((len(autopilots), ROW))
+    result[:, :15] = ned_to_enu(ned).reshape(-1, 15)
+    w, x, y, z = attitude.T
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    result[:, 15] = [yaw_to_enu(angle) for angle in yaw.tolist()]
+    # The angle between the body's and the world's vertical.
+    result[:, 16] = 2.0 * np.arcsin(np.minimum(1.0, np.hypot(x, y)))
+    return result
