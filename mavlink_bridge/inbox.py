@@ -10,7 +10,7 @@ from threading import Lock, Thread
 from typing import Final
 
 from mavlink_bridge.errors import BridgeError
-from mavlink_bridge.link import Link
+from mavlink_bridge.links.link import Link
 from mavlink_bridge.node import Datagram
 
 CAPACITY: Final = 4096

@@ -11,7 +11,7 @@ from mavlink_bridge.deadlines import Deadlines
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.histogram import Histogram, Spread
 from mavlink_bridge.inbox import CAPACITY, Inbox
-from mavlink_bridge.link import Link
+from mavlink_bridge.links.link import Link
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.node_clock import NodeClock
 from mavlink_bridge.runtime import Direction, Scheduled, Tap

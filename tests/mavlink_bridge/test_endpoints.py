@@ -8,7 +8,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mavlink_bridge.endpoints import (
+from mavlink_bridge.errors import EndpointError
+from mavlink_bridge.links.endpoints import (
     BAUD_RATES,
     Endpoint,
     Multicast,
@@ -20,7 +21,6 @@ from mavlink_bridge.endpoints import (
     UdpOut,
     parse_endpoint,
 )
-from mavlink_bridge.errors import EndpointError
 
 KINDS = (UdpIn, UdpOut, Multicast, TcpOut, TcpIn, Serial, Replay)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from link_pairs import PAIRS, STREAMS, Pair, frame, frames, gather, number_of
 
-from mavlink_bridge.link import BURST, Link
+from mavlink_bridge.links.link import BURST, Link
 
 
 def open_files() -> set[int]:

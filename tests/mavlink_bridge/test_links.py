@@ -25,16 +25,16 @@ from link_pairs import (
 
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
-from mavlink_bridge.endpoints import BAUD_RATES, Multicast, Serial, TcpIn, TcpOut, UdpIn, UdpOut
 from mavlink_bridge.errors import BridgeError, LinkError
+from mavlink_bridge.links.endpoints import BAUD_RATES, Multicast, Serial, TcpIn, TcpOut, UdpIn, UdpOut
+from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.links.serial_port import SerialPort
+from mavlink_bridge.links.stream import Assembler
+from mavlink_bridge.links.streams import RETRY
+from mavlink_bridge.links.tcp import TcpCaller, TcpListener
+from mavlink_bridge.links.udp import MOST_PEERS, REMEMBERED, MulticastLink, UdpCaller, UdpListener
 from mavlink_bridge.messages import Message
-from mavlink_bridge.opening import open_link
-from mavlink_bridge.serial_port import SerialPort
-from mavlink_bridge.stream import Assembler
-from mavlink_bridge.streams import RETRY
-from mavlink_bridge.tcp import TcpCaller, TcpListener
 from mavlink_bridge.tlog import TlogWriter
-from mavlink_bridge.udp import MOST_PEERS, REMEMBERED, MulticastLink, UdpCaller, UdpListener
 
 # UDP
 

@@ -8,9 +8,9 @@ from contextlib import ExitStack
 from typing import NamedTuple
 
 from mavlink_bridge.clock import Clock
-from mavlink_bridge.link import Link
-from mavlink_bridge.opening import open_link
-from mavlink_bridge.udp import UdpListener
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.links.udp import UdpListener
 
 _HOST = "127.0.0.1"
 _GROUP = "239.255.145.50"

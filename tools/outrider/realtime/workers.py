@@ -17,7 +17,7 @@ from companion.pilot import Phase
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.garbage import IdleCollector
 from mavlink_bridge.histogram import Histogram
-from mavlink_bridge.link import Link
+from mavlink_bridge.links.link import Link
 from mavlink_bridge.priority import LEVEL, ask_for_priority, sharpen_timers
 from mavlink_bridge.realtime import RealTime
 from mavlink_bridge.runtime import Scheduled, Tap

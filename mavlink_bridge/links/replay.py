@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from mavlink_bridge.clock import Clock
-from mavlink_bridge.endpoints import Replay
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.link import BURST, LinkCounters
+from mavlink_bridge.links.endpoints import Replay
+from mavlink_bridge.links.link import BURST, LinkCounters
 from mavlink_bridge.tlog import Record, read_tlog
 
 

@@ -6,8 +6,8 @@ import os
 import socket
 from typing import Any
 
-from mavlink_bridge.endpoints import Endpoint
 from mavlink_bridge.errors import LinkError
+from mavlink_bridge.links.endpoints import Endpoint
 
 
 def resolved(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mavlink_bridge.clock import Clock
-from mavlink_bridge.endpoints import (
+from mavlink_bridge.links.endpoints import (
     Endpoint,
     Multicast,
     Replay,
@@ -14,11 +14,11 @@ from mavlink_bridge.endpoints import (
     UdpOut,
     parse_endpoint,
 )
-from mavlink_bridge.link import Link
-from mavlink_bridge.replay import ReplayLink
-from mavlink_bridge.serial_port import SerialPort
-from mavlink_bridge.tcp import TcpCaller, TcpListener
-from mavlink_bridge.udp import MulticastLink, UdpCaller, UdpListener
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.replay import ReplayLink
+from mavlink_bridge.links.serial_port import SerialPort
+from mavlink_bridge.links.tcp import TcpCaller, TcpListener
+from mavlink_bridge.links.udp import MulticastLink, UdpCaller, UdpListener
 
 
 def open_link(endpoint: Endpoint | str, clock: Clock) -> Link:

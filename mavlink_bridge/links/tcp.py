@@ -8,10 +8,10 @@ from contextlib import suppress
 from typing import Any, Final
 
 from mavlink_bridge.clock import Clock
-from mavlink_bridge.endpoints import TcpIn, TcpOut
 from mavlink_bridge.errors import LinkError
-from mavlink_bridge.hosts import because, resolved
-from mavlink_bridge.streams import StreamLink
+from mavlink_bridge.links.endpoints import TcpIn, TcpOut
+from mavlink_bridge.links.hosts import because, resolved
+from mavlink_bridge.links.streams import StreamLink
 
 MOST_CALLERS: Final = 32
 BACKLOG: Final = 65536
