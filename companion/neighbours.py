@@ -36,6 +36,17 @@ def _read(payload: bytes) -> tuple[int, Horizon]:
     return plan.origin, horizon
 
 
+@lru_cache(maxsize=256)
+def _placed(fleet: FleetFrame, message: GlobalPosition) -> tuple[Array, Array]:
+    """Position and velocity (3,) of a message, fleet-local ENU; each worked out once in a process."""
+    position, velocity = (
+        fleet.to_enu(message.latitude, message.longitude, message.altitude),
+        ned_to_enu(message.velocity_ned),
+    )
+    position.flags.writeable = velocity.flags.writeable = False
+    return position, velocity
+
+
 class Neighbours:
     """Everything heard on the swarm link, by system id."""
 
@@ -59,9 +70,9 @@ class Neighbours:
         system = message.source.system
         if system == self._system:
             return
-        position = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
+        position, velocity = _placed(self._fleet, message)
         track = self._tracks.get(system) or Track(self._config.neighbour)
-        track.measure(now, position, ned_to_enu(message.velocity_ned), message.time_boot)
+        track.measure(now, position, velocity, message.time_boot)
         time = track.time
         if time is None:
             return

@@ -25,11 +25,14 @@ class PlanClock:
     def begins(self, now: int, epoch: int, dt: int) -> int | None:
         """When a plan that arrives at ``now`` with ``epoch`` begins: as it says, unless that is more than a
         step ``dt`` ahead or longer ago than plans live. None while it is not clear what to make of that."""
-        dated = self._clock.date(now, epoch)
         if now - self._stale <= epoch <= now + dt:
             self._told = 0
             return epoch
-        self._told = 0 if dated is None else self._told + 1
-        if dated is None or self._told < _EVIDENCE:
+        dated = self._clock.date(now, epoch)
+        if dated is None or not dated.stamped:
+            self._told = 0
+            return None
+        self._told += 1
+        if self._told < _EVIDENCE:
             return None
         return dated.time + self._clock.skew
