@@ -18,6 +18,8 @@ ROW = 17
 estimate (each 3), yaw, tilt."""
 NOWHERE = np.full(3, np.nan)
 NOWHERE.flags.writeable = False
+_TOGETHER = 10_000
+"""Distances that are worked out at once, or few more."""
 
 
 class Samples(NamedTuple):
@@ -58,58 +60,96 @@ class Encounters:
         self.count = 0
         self.minimum = float("inf")
 
-    def see(self, distances: Array) -> float:
-        """Distances (n, pairs) at consecutive times; NaN where a pair is not in the air. The least of
-        them."""
+    def see(self, distances: Array) -> None:
+        """Distances (n, pairs) at consecutive times; NaN where a pair is not in the air."""
         least = float(np.fmin.reduce(distances, axis=None, initial=np.inf))
         self.minimum = min(self.minimum, least)
         if least < self._least or self._below.any():
             below = np.vstack([self._below, distances < self._least])
             self.count += int((below[1:] & ~below[:-1]).sum())
             self._below = below[-1]
-        return least
 
 
 class Truth:
-    """Collects the flight of ``vehicles``: every physics step and a sample now and then."""
+    """Collects the flight of ``vehicles``: every physics step and a sample now and then. Distances are worked
+    out for many samples at once, when there are enough of them or when they are asked for."""
 
     def __init__(self, vehicles: int, limits: Limits, obstacles: FixedObstacles | None = None) -> None:
         self._count = vehicles
         self._pairs = np.triu_indices(vehicles, 1)
         self._fixed = obstacles if obstacles is not None and len(obstacles) else None
-        self.vehicles = Encounters(len(self._pairs[0]), limits.vehicles)
-        self.target = Encounters(vehicles, 0.0 if limits.target is None else limits.target)
-        self.obstacles = Encounters(
+        self._vehicles = Encounters(len(self._pairs[0]), limits.vehicles)
+        self._target = Encounters(vehicles, 0.0 if limits.target is None else limits.target)
+        self._obstacles = Encounters(
             vehicles * (0 if self._fixed is None else len(self._fixed)), limits.obstacles
         )
         self._target_counts = limits.target is not None
-        self._least = float("inf")
-        self._rows: list[tuple[int, Array, Array, float]] = []
+        # What no distance has been worked out of yet: the track before each sample, and the target's place.
+        self._tracks: list[Array] = []
+        self._places: list[Array] = []
+        self._rows: list[tuple[int, Array, Array]] = []
+        self._least: list[float] = []
 
-    def steps(self, track: Array, target: Array | None) -> None:
-        """Positions (n, K, 3) at consecutive physics steps, ENU, NaN on the ground; the target's (3,) or (n,
-        3) meanwhile, None where it is not there."""
+    @property
+    def vehicles(self) -> Encounters:
+        """Of vehicles with each other."""
+        self._work_out()
+        return self._vehicles
+
+    @property
+    def target(self) -> Encounters:
+        """Of vehicles with the target, where that is an obstacle."""
+        self._work_out()
+        return self._target
+
+    @property
+    def obstacles(self) -> Encounters:
+        """Of vehicles' centres with the surfaces of fixed obstacles."""
+        self._work_out()
+        return self._obstacles
+
+    def take(self, now: int, track: Array, rows: Array, target: Array | None) -> None:
+        """A sample at ``now`` (µs): the positions ``track`` (n, K, 3) at all physics steps since the one
+        before, ENU, NaN on the ground; the ``rows`` (K, ROW); the target's place (3,), None where it is not
+        there."""
+        place = NOWHERE if target is None else target
+        self._rows.append((now, rows, place))
+        self._tracks.append(track)
+        self._places.append(place)
+        if len(self._tracks) * len(track) * (1 + len(self._pairs[0])) > _TOGETHER:
+            self._work_out()
+
+    def _work_out(self) -> None:
+        if not self._tracks:
+            return
+        lengths = [len(track) for track in self._tracks]
+        track = np.concatenate(self._tracks)
         apart = track[:, self._pairs[0]] - track[:, self._pairs[1]]
-        self._least = min(self._least, self.vehicles.see(np.sqrt(np.einsum("tpi,tpi->tp", apart, apart))))
-        if target is not None and self._target_counts:
-            off = track - (target if target.ndim == 1 else target[:, None])
-            self.target.see(np.sqrt(np.einsum("tki,tki->tk", off, off)))
+        distance = np.sqrt(np.einsum("tpi,tpi->tp", apart, apart))
+        self._vehicles.see(distance)
+        least = np.fmin.reduce(distance, axis=1, initial=np.inf)
+        self._least += [float(part.min(initial=np.inf)) for part in np.split(least, np.cumsum(lengths)[:-1])]
+        if self._target_counts:
+            off = track - np.repeat(self._places, lengths, axis=0)[:, None]
+            self._target.see(np.sqrt(np.einsum("tki,tki->tk", off, off)))
         if self._fixed is not None:
-            self.obstacles.see(self._fixed.distance(track).reshape(len(track), -1))
-
-    def sample(self, now: int, rows: Array, target: Array | None) -> None:
-        """Rows (K, ROW) of all vehicles at ``now`` (µs)."""
-        self._rows.append((now, rows, NOWHERE if target is None else target, self._least))
-        self._least = float("inf")
+            self._obstacles.see(self._fixed.distance(track).reshape(len(track), -1))
+        self._tracks.clear()
+        self._places.clear()
 
     def latest(self) -> tuple[Array, Array, Array | None]:
         """Positions (K, 3), velocities (K, 3) of the last sample, and the target's place."""
-        _, rows, place, _ = self._rows[-1]
+        _, rows, place = self._rows[-1]
         return rows[:, 0:3], rows[:, 3:6], None if np.isnan(place).any() else place
 
     def samples(self, since: int = 0, until: int | None = None) -> Samples:
         """All samples with ``since`` ≤ time < ``until``."""
-        chosen = [row for row in self._rows if row[0] >= since and (until is None or row[0] < until)]
+        self._work_out()
+        chosen = [
+            (*row, least)
+            for row, least in zip(self._rows, self._least, strict=True)
+            if row[0] >= since and (until is None or row[0] < until)
+        ]
         rows = np.array([row[1] for row in chosen]) if chosen else np.empty((0, self._count, ROW))
         return Samples(
             np.array([row[0] for row in chosen], dtype=np.int64),

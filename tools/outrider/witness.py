@@ -38,9 +38,9 @@ class Witness:
             return False
         self._next = now + SAMPLE
         place = self._target.position(now)
-        self._truth.steps(ned_to_enu(np.concatenate(self._pending)), place)
+        track = ned_to_enu(np.concatenate(self._pending))
         self._pending.clear()
-        self._truth.sample(now, rows(self._autopilots), place)
+        self._truth.take(now, track, rows(self._autopilots), place)
         return True
 
 

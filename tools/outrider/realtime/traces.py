@@ -81,8 +81,8 @@ def put_together(traces: list[Trace], period: int, target: Target, goal: int | N
             begun = True
         place = target.position(now)
         steps = np.arange(now - SAMPLE + period, now + 1, period)
-        truth.steps(np.stack([_at(trace, steps) for trace in traces], axis=1), place)
-        truth.sample(now, np.array([_sample(trace, now) for trace in traces]), place)
+        track = np.stack([_at(trace, steps) for trace in traces], axis=1)
+        truth.take(now, track, np.array([_sample(trace, now) for trace in traces]), place)
 
 
 def _at(trace: Trace, steps: NDArray[np.int64]) -> Array:
