@@ -5,7 +5,7 @@ JOBS ?= 2
 BIN = .venv/bin
 SCRIPTS = tools/bootstrap.py tools/extract_log.py
 
-.PHONY: fly test lint bench schemas requirements clean
+.PHONY: fly test soak lint bench schemas requirements clean
 .DEFAULT_GOAL := fly
 
 fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--method tangential …"
@@ -13,6 +13,9 @@ fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--met
 
 test: .venv/.made  ## everything; one test with ARGS="-k name"
 	@$(BIN)/pytest -n $(JOBS) --dist loadfile $(ARGS) </dev/null
+
+soak: .venv/.made  ## what is too long for CI, about half an hour; part of it with ARGS="-k yaml"
+	@$(BIN)/pytest --soak -vv -n $(JOBS) --dist worksteal $(ARGS) </dev/null
 
 lint: .venv/.made  ## style, types, and who may import whom
 	@$(BIN)/ruff check .

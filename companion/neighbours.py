@@ -130,8 +130,10 @@ class Neighbours:
             lost = ~trusted
             positions[lost] = here[lost][:, None]
             if config.neighbour_prediction == "velocity":
+                # One that has been silent for longer than it is carried on rests where that ended.
+                moving = lost & (age <= config.neighbour.extrapolate_us)
                 ahead = 1e-6 * config.horizon.dt_us * np.arange(steps)
-                positions[lost] += ahead[:, None] * states[lost, None, 3:6]
+                positions[moving] += ahead[:, None] * states[moving, None, 3:6]
         count = len(ids)
         return Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count])
 

@@ -174,11 +174,11 @@ class Companion:
             self.guard.horizon = None
             return
         stale = view.own.age > self.config.guard.own_stale_us
-        if self.guard.horizon is None and stale:
-            return
         measured = Motion(view.own.position, view.own.velocity, _ZERO)
         if self.guard.horizon is None:
-            self._heading.reset(0.0 if view.yaw is None else view.yaw)
+            if stale or view.yaw is None:
+                return
+            self._heading.reset(view.yaw)
             self._goal = view.own.position if self._goal is None else self._goal
             self.guard.start(now, measured)
         if now < self._next_plan:

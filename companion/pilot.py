@@ -12,11 +12,12 @@ from enum import Enum
 from companion.autopilots import Profile, Step, is_guided
 from companion.autopilots.ardupilot import ARDUPILOT
 from companion.autopilots.px4 import PX4
+from companion.calls import Calls
 from companion.config import CompanionConfig
+from companion.tracks import State
 from companion.world import View
 from mavlink_bridge.messages import (
     CommandAck,
-    CommandLong,
     ExtendedSysState,
     Heartbeat,
     Message,
@@ -27,15 +28,13 @@ from mavlink_bridge.messages import (
 
 DO_SET_MODE, ARM_DISARM, NAV_TAKEOFF, NAV_LAND = 176, 400, 22, 21
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
-ACCEPTED, IN_PROGRESS = 0, 5
 WARNING = 4
 """MAV_SEVERITY."""
 ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
-IN_AIR = 2
-"""MAV_LANDED_STATE."""
-_RETRY = 500_000
-_EXPIRY = 15_000_000
-"""µs after which an acknowledged command without effect is sent again; longer than a take-off."""
+UNDEFINED, ON_GROUND, IN_AIR = 0, 1, 2
+"""MAV_LANDED_STATE; others are on the way up or down."""
+_STILL, _CALM = 0.3, 2_000_000
+"""m/s and µs: slower than this for so long in the air, a take-off is over."""
 HEARTBEAT_LOST = 3_000_000
 """µs without a heartbeat after which the autopilot's mode is not known."""
 _NAN = float("nan")
@@ -45,8 +44,6 @@ _NEEDED = tuple(
 )
 """Message id and interval (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
 EXTENDED_SYS_STATE."""
-
-_Call = tuple[int, tuple[float, ...]]
 
 
 class Phase(Enum):
@@ -68,12 +65,10 @@ class Pilot:
 
     def __init__(self, config: CompanionConfig, own: Source, origin_altitude: float) -> None:
         self._config = config
-        self._own = own
         self._origin_altitude = origin_altitude
         self.phase = Phase.CONNECT
         self.profile: Profile | None = None
         self.waiting_for = "a heartbeat of the autopilot"
-        self.refusals: list[str] = []
         self.said = ""
         """The last warning of the autopilot: usually why it refuses."""
         self._heartbeat: Heartbeat | None = None
@@ -81,14 +76,20 @@ class Pilot:
         self._now = self._beat_at = 0
         self._settling_since: int | None = None
         self._status: SysStatus | None = None
-        self._landed_state: int | None = None
+        self._extended: ExtendedSysState | None = None
+        self._extended_seen: ExtendedSysState | None = None
+        self._extended_at = 0
         self._flying_already = False
+        self._calm_since: int | None = None
         self._height: float | None = None
         self._ground = 0.0
         self._step = 0
-        self._acknowledged: set[_Call] = set()
-        self._sent: dict[_Call, int] = {}
-        self._asked: dict[int, _Call] = {}
+        self._calls = Calls(own)
+
+    @property
+    def refusals(self) -> list[str]:
+        """Commands that the autopilot refused, in words."""
+        return self._calls.refusals
 
     @property
     def guided(self) -> bool:
@@ -122,18 +123,12 @@ class Pilot:
         elif isinstance(message, SysStatus):
             self._status = message
         elif isinstance(message, ExtendedSysState):
-            self._landed_state = message.landed_state
+            self._extended = message
         elif isinstance(message, StatusText):
             if message.severity <= WARNING:
                 self.said = message.text
         elif isinstance(message, CommandAck):
-            call = self._asked.pop(message.command, None)
-            if call is None:
-                return
-            if message.result in (ACCEPTED, IN_PROGRESS):
-                self._acknowledged.add(call)
-            else:
-                self.refusals.append(f"command {message.command}: result {message.result}")
+            self._calls.hear(message)
 
     def go(self, height: float) -> bool:
         """The operator's go: climb to ``height`` metres above the start, or take over where it flies already.
@@ -165,6 +160,8 @@ class Pilot:
         self._now = now
         if self._heartbeat is not self._beaten:
             self._beaten, self._beat_at = self._heartbeat, now
+        if self._extended is not self._extended_seen:
+            self._extended_seen, self._extended_at = self._extended, now
         if self.phase is Phase.SETTLE:
             self._settle(now, view)
         if self.phase is Phase.CONNECT:
@@ -175,7 +172,7 @@ class Pilot:
             if self._heartbeat is not None and not self._heartbeat.base_mode & ARMED:
                 self.phase = Phase.DONE
                 return []
-            return self._call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
+            return self._calls.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
         return []
 
     def _settle(self, now: int, view: View) -> None:
@@ -191,19 +188,29 @@ class Pilot:
         calls: list[Message] = []
         self.waiting_for = self._missing(view)
         if self._heartbeat is not None:
-            for command, params in sorted(_NEEDED, key=lambda call: self._sent.get(call, 0)):
-                calls += self._call(now, command, params)
+            for command, params in sorted(_NEEDED, key=lambda call: self._calls.sent_at(*call)):
+                calls += self._calls.call(now, command, params)
             if view.local is None:
-                calls += self._call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+                calls += self._calls.call(
+                    now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+                )
         if not self.waiting_for and view.own is not None and view.local is not None:
             self._ground = float(view.own.position[2])
-            self._flying_already = self._armed and self._landed_state == IN_AIR
+            self._flying_already = self._armed and self._landed_state != ON_GROUND
+            self._calm_since = None
             self.phase = Phase.PREPARE
         return calls
 
     @property
     def _armed(self) -> bool:
         return self._heartbeat is not None and bool(self._heartbeat.base_mode & ARMED)
+
+    @property
+    def _landed_state(self) -> int:
+        """As last heard, UNDEFINED if that is too long ago."""
+        if self._extended is None or self._now - self._extended_at > HEARTBEAT_LOST:
+            return UNDEFINED
+        return self._extended.landed_state
 
     def _missing(self, view: View) -> str:
         if self._heartbeat is None:
@@ -216,9 +223,9 @@ class Pilot:
             return "LOCAL_POSITION_NED"
         if view.yaw is None:
             return "ATTITUDE"
-        if self._armed and self._landed_state is None:
-            # Armed: a vehicle that may be flying must not be told to take off.
-            return "EXTENDED_SYS_STATE"
+        if self._armed and self._landed_state == UNDEFINED:
+            # A vehicle that may be flying must not be told to take off.
+            return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
         if self._status is None or not self._status.health & PREARM_OK:
             return "the autopilot's pre-arm checks"
         if self._height is None:
@@ -232,48 +239,40 @@ class Pilot:
         if Step.ARM in profile.steps[: self._step] and not beat.base_mode & ARMED:
             # Disarmed again, by itself or by somebody, who will not expect it to arm: a new go is needed.
             self._step, self._height, self.phase = 0, None, Phase.CONNECT
-            self._forget()
+            self._calls.forget()
             return []
         step = profile.steps[self._step]
         if step is Step.MODE:
             done = is_guided(profile, beat)
-            call = self._call(now, DO_SET_MODE, (*profile.mode_params, 0.0, 0.0, 0.0, 0.0))
+            call = self._calls.call(now, DO_SET_MODE, (*profile.mode_params, 0.0, 0.0, 0.0, 0.0))
         elif step is Step.ARM:
             done = bool(beat.base_mode & ARMED)
-            call = self._call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            call = self._calls.call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
         else:
             climbed = float(view.own.position[2]) - self._ground
-            still = float(abs(view.own.velocity).max()) < 0.3
-            done = self._flying_already or (still and abs(climbed - height) < 0.3)
+            done = self._flying_already or self._is_up(now, view.own, climbed, height)
             above_sea = self._origin_altitude + self._ground + height
             altitude = above_sea if profile.takeoff_absolute else height
-            call = self._call(now, NAV_TAKEOFF, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude))
+            up = self._flying_already or self._landed_state not in (UNDEFINED, ON_GROUND)
+            call = (
+                [] if up else self._calls.call(now, NAV_TAKEOFF, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude))
+            )
         if done:
             self._step += 1
-            self._forget()
+            self._calls.forget()
             if self._step == len(profile.steps):
                 self.phase = Phase.ESCORT
             return []
         self.waiting_for = step.value
         return call
 
-    def _recent(self, now: int, call: _Call | None) -> bool:
-        return call is not None and now - self._sent.get(call, -_RETRY) < _RETRY
-
-    def _forget(self) -> None:
-        self._sent.clear()
-        self._asked.clear()
-        self._acknowledged.clear()
-
-    def _call(self, now: int, command: int, params: tuple[float, ...]) -> list[Message]:
-        """The command, unless it was acknowledged, sent less than half a second ago, or must wait for its
-        turn: COMMAND_ACK names the command alone, so that one of a kind may be open at a time."""
-        key = (command, tuple(p for p in params if p == p))
-        if key in self._acknowledged and now - self._sent.get(key, now) > _EXPIRY:
-            # Acknowledged and yet without effect: ask again.
-            self._acknowledged.discard(key)
-        if key in self._acknowledged or self._recent(now, key) or self._recent(now, self._asked.get(command)):
-            return []
-        self._sent[key], self._asked[command] = now, key
-        p1, p2, p3, p4, p5, p6, p7 = params
-        return [CommandLong(self._own, self._own.system, 1, command, 0, (p1, p2, p3, p4, p5, p6, p7))]
+    def _is_up(self, now: int, own: State, climbed: float, height: float) -> bool:
+        """Still at the height asked for; or still for a while in the air, for an estimate of height that
+        drifts by more than one may ask: the autopilot measures its height from its own origin."""
+        still = float(abs(own.velocity).max()) < _STILL
+        if not still or self._landed_state != IN_AIR or climbed < 0.5 * height:
+            self._calm_since = None
+        elif self._calm_since is None:
+            self._calm_since = now
+        waited = self._calm_since is not None and now - self._calm_since >= _CALM
+        return waited or (still and abs(climbed - height) < 0.3)

@@ -1,16 +1,25 @@
-"""When a shared plan begins, by our clock, if its sender's clock cannot be right.
+"""When a shared plan begins, by our clock.
 
 A plan carries its epoch in Unix time: both clocks are set by GPS or over the network, and a millisecond
-counts for little. One that is off by more than a plan's life makes every plan look outdated, or not yet true,
-and its sender a thing that stands still. That clock is estimated instead, as those of the tracks are.
+counts for little. One that is wrong lays every plan where its sender is not, and is not to be told from a
+right one by a single plan. So the clock is estimated from all of them, as those of the tracks are: the
+estimate is off by what the quickest plan took longer than the least delay that is set, which is little after
+some plans, and the positions of the same sender are dated alike. An epoch near the estimate is its sender's
+own word, and better; another is replaced by the estimate.
 """
 
 from __future__ import annotations
 
 from companion.timing import SenderClock
 
-_EVIDENCE = 3
-"""Plans in a row that tell of the same wrong clock before it is believed."""
+_NEAR = 50_000
+"""µs between epoch and estimate: two clocks that are off by some milliseconds, and a link that is slower than
+it is said to be by a few periods. At 5 m/s it is a quarter of a metre, half of d_min."""
+_ENOUGH = 3
+"""Plans that tell of the same wrong clock before an epoch that cannot be true is replaced."""
+_MANY = 10
+"""Plans before one that may be true is: of so many, with a jitter of 100 ms, one in a thousand times none is
+quicker than ``_NEAR``."""
 
 
 class PlanClock:
@@ -20,19 +29,22 @@ class PlanClock:
     def __init__(self, delay: int, stale: int) -> None:
         self._clock = SenderClock(delay, stale)
         self._stale = stale
-        self._told = 0
+        self._epoch: int | None = None
+        self._begins: int | None = None
 
     def begins(self, now: int, epoch: int, dt: int) -> int | None:
-        """When a plan that arrives at ``now`` with ``epoch`` begins: as it says, unless that is more than a
-        step ``dt`` ahead or longer ago than plans live. None while it is not clear what to make of that."""
-        if now - self._stale <= epoch <= now + dt:
-            self._told = 0
-            return epoch
+        """When a plan of steps ``dt`` that arrives at ``now`` with ``epoch`` begins; None while it is not
+        clear what to make of that. A plan that its sender holds, and tells of again, began when it did."""
+        if epoch != self._epoch:
+            self._epoch, self._begins = epoch, self._first(now, epoch, dt)
+        return self._begins
+
+    def _first(self, now: int, epoch: int, dt: int) -> int | None:
         dated = self._clock.date(now, epoch)
         if dated is None or not dated.stamped:
-            self._told = 0
             return None
-        self._told += 1
-        if self._told < _EVIDENCE:
-            return None
-        return dated.time + self._clock.skew
+        estimate = dated.time + self._clock.skew
+        possible = now - self._stale <= epoch <= now + dt
+        if abs(estimate - epoch) <= _NEAR or (possible and self._clock.heard < _MANY):
+            return epoch
+        return estimate if self._clock.heard >= _ENOUGH else None

@@ -76,6 +76,11 @@ class Track:
             return False
         return self._rewind.put(dated, (a, b, c, d, e, -f if self._config.velocity_up else f))
 
+    def when(self, received: int, stamp: int) -> int:
+        """When another message of the same sender was true, µs: one that arrived at ``received`` and left
+        with ``stamp``."""
+        return self._clock.reads(received, stamp if self._config.stamps else 0)
+
     def at(self, now: int) -> State | None:
         """The state carried to ``now``, at most ``extrapolate_us`` far, where it then rests; None before the
         first measurement."""

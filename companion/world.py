@@ -27,7 +27,7 @@ from mavlink_bridge.messages import (
 class View(NamedTuple):
     """The picture at one time: fleet-local ENU, SI; None where nothing has been heard yet.
 
-    ``yaw`` is ENU (counter-clockwise from east).
+    ``yaw`` is ENU (counter-clockwise from east), None also when it is older than the own state may be.
     """
 
     own: State | None
@@ -60,6 +60,7 @@ class World:
         self._local: LocalFrame | None = None
         self._origin: tuple[float, float, float] | None = None
         self._yaw: float | None = None
+        self._yaw_time = 0
 
     def hear(self, now: int, link: str, message: Message) -> None:
         """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
@@ -79,7 +80,8 @@ class World:
         target = self._target.at(now)
         if target is not None and target.age > self.config.guard.target_stale_us:
             target = None
-        return View(self._own.at(now), self._yaw, target, self._local)
+        yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
+        return View(self._own.at(now), yaw, target, self._local)
 
     def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
         """Neighbours, the target where it is one, and what stands near the own ``prediction`` (N + 1, 3),
@@ -117,6 +119,7 @@ class World:
         elif isinstance(message, Attitude):
             if self._local is not None:
                 self._yaw = self._local.yaw_to_fleet(message.yaw)
+                self._yaw_time = self._own.when(now, message.time_boot)
         elif isinstance(message, GpsGlobalOrigin):
             origin = (message.latitude, message.longitude, message.altitude)
             if origin != self._origin:

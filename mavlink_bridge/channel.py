@@ -1,4 +1,4 @@
-"""What an ether is made of: channels, what they do to datagrams in each direction, and when they are cut."""
+"""What an ether is made of: channels, and what they do to datagrams in each direction."""
 
 from __future__ import annotations
 
@@ -30,6 +30,12 @@ class Faults(NamedTuple):
     burst: float = 0.0
 
     @property
+    def least_burst(self) -> float:
+        """The shortest mean burst (datagrams) with which so large a share can be lost."""
+        # 0.8 / (1 − 0.8) is a little more than 4.
+        return max(1.0, round(self.loss / (1.0 - self.loss), 9)) if self.loss < 1 else 1.0
+
+    @property
     def loss_after_loss(self) -> float:
         """Probability that a datagram is lost if the one before on its path was."""
         return 1.0 - 1.0 / self.burst if self.burst and self.loss < 1 else self.loss
@@ -39,15 +45,6 @@ class Faults(NamedTuple):
         """Probability that a datagram is lost if the one before on its path was not: the share of losses is
         then ``loss``."""
         return self.loss / (self.burst * (1.0 - self.loss)) if self.burst and self.loss < 1 else self.loss
-
-
-class Partition(NamedTuple):
-    """From ``start`` until before ``end`` (µs, time of sending) nothing passes between ``members`` (node
-    names) and the others."""
-
-    start: int
-    end: int
-    members: frozenset[str]
 
 
 Direction = tuple[str | None, str | None]
@@ -64,7 +61,6 @@ class Channel(NamedTuple):
     name: str
     members: Mapping[str, str]
     faults: Faults = Faults()
-    partitions: tuple[Partition, ...] = ()
     overrides: Mapping[Direction, Faults] = MappingProxyType({})
 
     def between(self, sender: str, receiver: str) -> Faults:
@@ -93,6 +89,7 @@ def _check(where: str, faults: Faults) -> None:
     for name in ("loss", "duplication", "reordering"):
         if not 0 <= getattr(faults, name) <= 1:
             raise BridgeError(f"{where}: {name} = {getattr(faults, name)} is not in 0…1")
-    least = max(1.0, faults.loss / (1.0 - faults.loss)) if faults.loss < 1 else 1.0
-    if faults.burst != 0 and not faults.burst >= least:
-        raise BridgeError(f"{where}: burst = {faults.burst} is neither 0 nor at least {least:.3g} datagrams")
+    if faults.burst != 0 and not faults.burst >= faults.least_burst:
+        raise BridgeError(
+            f"{where}: burst = {faults.burst} is neither 0 nor at least {faults.least_burst:.3g} datagrams"
+        )

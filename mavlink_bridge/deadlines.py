@@ -32,13 +32,15 @@ class Deadlines:
         """The earliest deadline from ``now`` (µs) on."""
         return now + (self.phase - now) % self.period
 
-    def begin(self, deadline: int, now: int) -> int:
-        """``now`` (µs) a step begins that waited for ``deadline``; the deadline that it is the step of."""
+    def begin(self, deadline: int, now: int, *, excused: bool = False) -> int:
+        """``now`` (µs) a step begins that waited for ``deadline``; the deadline that it is the step of. One
+        that is ``excused`` (it was held up on purpose) counts nowhere."""
         late = now - deadline
-        self.lateness.add(late)
-        self.misses += late > self.tolerance
         passed = max(late // self.period, 0)
-        self.skipped += passed
+        if not excused:
+            self.lateness.add(late)
+            self.misses += late > self.tolerance
+            self.skipped += passed
         return deadline + passed * self.period
 
     def after(self, deadline: int) -> int:

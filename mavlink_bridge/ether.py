@@ -13,11 +13,11 @@ from random import Random
 from typing import NamedTuple
 from zlib import crc32
 
-from mavlink_bridge.channel import Channel, Faults, Partition
+from mavlink_bridge.channel import Channel, Faults
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.node import Datagram
 
-__all__ = ["Channel", "Ether", "EtherCounters", "Faults", "Partition"]
+__all__ = ["Channel", "Ether", "EtherCounters", "Faults"]
 
 
 class EtherCounters(NamedTuple):
@@ -39,12 +39,10 @@ _FOREVER = 1 << 63
 
 
 class _Path:
-    """From one sender over one channel to one receiver. Nothing passes while ``cuts`` (µs, start and end) say
-    so and before ``shut`` (µs)."""
+    """From one sender over one channel to one receiver. Nothing passes before ``shut`` (µs)."""
 
     __slots__ = (
         "channel",
-        "cuts",
         "faults",
         "held",
         "link",
@@ -65,20 +63,13 @@ class _Path:
         self.faults = faults = channel.between(sender, receiver)
         self.link = channel.members[receiver]
         self.queue = queue
-        self.cuts = [
-            (cut.start, cut.end)
-            for cut in channel.partitions
-            if (sender in cut.members) != (receiver in cut.members)
-        ]
         self.shut = 0
         self.random = Random(crc32(f"{seed}\0{channel.name}\0{sender}\0{receiver}".encode())).random
         self.held: tuple[str, int, int, Datagram] | None = None
         self.lost: bool | None = None
         self.way = max(faults.delay, tick)
-        # Neither chance nor calendar: what most datagrams of most runs go through.
-        self.plain = not self.cuts and not any(
-            (faults.jitter, faults.loss, faults.duplication, faults.reordering)
-        )
+        # No chance: what most datagrams of most runs go through.
+        self.plain = not any((faults.jitter, faults.loss, faults.duplication, faults.reordering))
 
     def loses(self) -> bool:
         """Whether the next datagram is lost. One draw, or none if nothing ever is."""
@@ -210,8 +201,7 @@ class Ether:
         self._shut()
 
     def heal(self, channel: str | None = None, members: Iterable[str] | None = None) -> None:
-        """End the cuts that were made for ``channel`` and ``members``; None fits every cut. The partitions of
-        a channel's own calendar stay."""
+        """End the cuts that were made for ``channel`` and ``members``; None fits every cut."""
         inside = None if members is None else frozenset(members)
         self._cuts = [
             cut
@@ -239,8 +229,7 @@ class Ether:
         _, jitter, _, duplication, reordering, _ = path.faults
         random = path.random
         # A fault of zero draws nothing: a clean link costs no random numbers.
-        cut = now < path.shut or any(start <= now < end for start, end in path.cuts)
-        if cut or path.loses():
+        if now < path.shut or path.loses():
             self._dropped += 1
             return
         datagram = Datagram(path.link, data)

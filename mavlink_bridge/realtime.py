@@ -21,10 +21,10 @@ _NAP: Final = 100_000
 
 
 class Statistics(NamedTuple):
-    """How a run went. ``misses``: steps that began too late; ``skipped``: deadlines without a step;
-    ``lateness``: from the deadline to the beginning of a step; ``busy``: from there to its end, with
-    receiving, sending and taps; ``overruns``: datagrams dropped because too many waited; ``unrouted``:
-    datagrams on a link that leads nowhere."""
+    """How a run went. ``steps``: all that were not excused; ``misses``: those that began too late;
+    ``skipped``: deadlines without a step; ``lateness``: from the deadline to the beginning of a step;
+    ``busy``: from there to its end, with receiving, sending and taps; ``overruns``: datagrams dropped because
+    too many waited; ``unrouted``: datagrams on a link that leads nowhere."""
 
     steps: int
     misses: int
@@ -43,7 +43,8 @@ class RealTime:
 
     ``links``: by the node's name for a link, the link or several; what the node sends goes to all of them.
     The links belong to the loop, which closes them in the end. ``on_idle(µs)`` is told after each step how
-    long nothing will happen. See ``Deadlines`` for ``tolerance``, ``Inbox`` for ``capacity``.
+    long nothing will happen. ``excused()`` is asked before each step whether something held it up on purpose:
+    then its lateness counts nowhere. See ``Deadlines`` for ``tolerance``, ``Inbox`` for ``capacity``.
 
     Raises ScheduleError for periods and phases off the grid.
     """
@@ -58,6 +59,7 @@ class RealTime:
         tolerance: int | None = None,
         capacity: int = CAPACITY,
         on_idle: Callable[[int], None] | None = None,
+        excused: Callable[[], bool] = lambda: False,
     ) -> None:
         self._node = scheduled.node
         try:
@@ -72,6 +74,7 @@ class RealTime:
         self._taps = tuple(taps)
         self._capacity = capacity
         self._on_idle = on_idle
+        self._excused = excused
         self.busy = Histogram()
         self._overruns = self._unrouted = 0
 
@@ -107,7 +110,7 @@ class RealTime:
             deadline = due.first(max(clock.now(), self._skew.reading(due.phase)))
             while self._wait(deadline, stop):
                 began = clock.now()
-                deadline = due.begin(deadline, began)
+                deadline = due.begin(deadline, began, excused=self._excused())
                 self._step(deadline, inbox)
                 over = on_step is not None and on_step(self._skew.instant(deadline))
                 ended = clock.now()

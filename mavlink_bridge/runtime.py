@@ -116,33 +116,16 @@ class LockStep:
 
     def thaw(self, name: str) -> None:
         """Node ``name`` goes on at its next deadline with all that waited; those that passed are not made up
-        for. Raises ScheduleError if it has vanished."""
+        for. Nothing happens to one that has vanished."""
         self._index_of(name)
-        if name in self._vanished:
-            raise ScheduleError(f"{name}: has vanished and cannot be thawed")
-        self._hanging.pop(name, None)
+        if name not in self._vanished:
+            self._hanging.pop(name, None)
 
     def vanish(self, name: str) -> None:
         """Node ``name`` is never stepped again; what waits or arrives for it is dropped."""
         self._index_of(name)
         self._hanging[name] = 0
         self._vanished.add(name)
-
-    def set_clock(self, name: str, offset: int, drift_ppm: float = 0.0) -> None:
-        """From now on the clock of node ``name`` is ``offset`` µs off true time (negative: late) and runs
-        ``drift_ppm`` fast.
-
-        The node is due again at the first phase + k period (k an integer) that the clock then comes to, so
-        within a period. Node time never decreases: after a step back the node is called on, but told a time
-        that stands almost still, 4 µs more each call, until its clock has caught up.
-
-        Raises ScheduleError for a drift that no clock has and for a clock that shows a negative time.
-        """
-        index = self._index_of(name)
-        due = self._slots[index].set_clock(self._now, offset, drift_ppm)
-        # In place: a run that is under way goes on with it.
-        self._due[:] = [(due if of == index else instant, of) for instant, of in self._due]
-        heapify(self._due)
 
     def _index_of(self, name: str) -> int:
         names = [slot.name for slot in self._slots]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.node import Node
-from mavlink_bridge.node_clock import QUANTUM, NodeClock
+from mavlink_bridge.node_clock import NodeClock
 
 
 class Slot:
@@ -14,23 +14,16 @@ class Slot:
     Raises ScheduleError for a clock that shows a negative time at ``phase``.
     """
 
-    __slots__ = ("_clock", "_latest", "_period", "_phase", "_tick", "name", "step")
+    __slots__ = ("_clock", "_period", "_phase", "_tick", "name", "step")
 
     def __init__(self, node: Node, period: int, phase: int, clock: NodeClock | None, tick: int) -> None:
         self.name, self.step = node.name, node.step
         self._period, self._phase, self._tick = period, phase, tick
         self._clock = None if clock is None else self._checked(clock, phase)
-        self._latest: int | None = None
 
     def first(self) -> int:
         """The first tick (µs, true time) at which the node is due: none before ``phase``."""
         return self._phase if self._clock is None else self.after(self._phase - 1)
-
-    def set_clock(self, now: int, offset: int, drift_ppm: float) -> int:
-        """From ``now`` (µs, true time) on another clock; the tick (µs) at which the node is due next."""
-        now = max(now, self._phase)
-        self._clock = self._checked(NodeClock(offset, drift_ppm, now), now)
-        return self.after(now - 1)
 
     def after(self, true: int) -> int:
         """The tick of the first deadline that the clock does not show yet at ``true`` (µs), where without a
@@ -42,15 +35,9 @@ class Slot:
         return instant + -instant % self._tick
 
     def told(self, true: int) -> int:
-        """The time (µs) to tell the node when it is called at ``true``: more than the last time."""
-        if self._clock is None:
-            self._latest = true
-            return true
-        shown = self._clock.local(true)
-        if self._latest is not None:
-            shown = max(shown, self._latest + QUANTUM)
-        self._latest = shown
-        return shown
+        """The time (µs) to tell the node when it is called at ``true``: more than the last time, as
+        there is a deadline between the two."""
+        return true if self._clock is None else self._clock.local(true)
 
     def _checked(self, clock: NodeClock, true: int) -> NodeClock:
         shown = clock.local(true)

@@ -71,6 +71,12 @@ class SensorProfile(BaseModel):
         )
         return not any(errors)
 
+    @property
+    def deviation(self) -> float:
+        """σ of the error of a position as a distance (m): of all three axes together."""
+        white = 3.0 * self.position_white**2
+        return math.sqrt(2.0 * self.horizontal_drift**2 + self.vertical_drift**2 + white)
+
 
 PROFILES: Final[dict[ProfileName, SensorProfile]] = {
     "truth": SensorProfile(),

@@ -16,10 +16,6 @@ from sitl.pipeline import COMMAND_SIZE, FLYING, IDLE, LANDED, STATE_SIZE, STOPPE
 
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
-_JERK_TIME = 0.1
-"""Time constant of the jerk that is read from a stream of references (s)."""
-_TURN_TIME = 0.03
-"""Time constant of the yaw acceleration that is read from a stream of references (s)."""
 
 
 class Reference(NamedTuple):
@@ -50,26 +46,6 @@ class Reference(NamedTuple):
             jerk=j + t * s,
             yaw=yaw + t * (yaw_rate + t / 2.0 * yaw_acceleration),
             yaw_rate=yaw_rate + t * yaw_acceleration,
-        )
-
-    def following(self, previous: Self, elapsed: int) -> Self:
-        """This reference with the jerk and yaw acceleration that follow from ``previous``, ``elapsed`` µs
-        ago.
-
-        For a stream of set-points that carry neither: without jerk the controller sees no turning of the
-        thrust axis ahead and lags in curves, and without yaw acceleration a weak yaw control lags behind
-        every turn. Low-pass filtered, so that a jump of what is given does not become a jolt.
-        """
-        if elapsed <= 0:
-            return self._replace(jerk=previous.jerk, yaw_acceleration=previous.yaw_acceleration)
-        t = elapsed * 1e-6
-        share, turning_share = -math.expm1(-t / _JERK_TIME), -math.expm1(-t / _TURN_TIME)
-        change = (self.acceleration - previous.acceleration) / t
-        turning = (self.yaw_rate - previous.yaw_rate) / t
-        return self._replace(
-            jerk=previous.jerk + share * (change - previous.jerk),
-            yaw_acceleration=previous.yaw_acceleration
-            + turning_share * (turning - previous.yaw_acceleration),
         )
 
 

@@ -218,6 +218,37 @@ def test_who_falls_silent_stays_an_obstacle_where_it_was_last():
 
 
 @LAWS
+@given(v=vectors(5.0), silence=st.integers(1, 10**9), more=st.integers(1, 10**9))
+def test_who_is_silent_for_too_long_rests_over_the_whole_horizon(v, silence, more):
+    """Also where neighbours are carried on: what is known of a velocity does not last for ever."""
+    config = CompanionConfig(neighbour_prediction="velocity")
+    neighbours = hearing(position(X, v), config=config)
+    bound = config.neighbour.extrapolate_us
+    silent = neighbours.obstacles(NOW + bound + silence).positions[0]
+    np.testing.assert_allclose(silent, np.broadcast_to(X + 1e-6 * bound * v, (N, 3)), atol=0.03)
+    later = neighbours.obstacles(NOW + bound + silence + more).positions[0]
+    np.testing.assert_array_equal(silent, later)
+    # One that is still heard moves on beside it.
+    neighbours.hear_position(NOW + bound + silence + DELAY, position(-X, V, 13))
+    both = neighbours.obstacles(NOW + bound + silence).positions
+    np.testing.assert_array_equal(both[0], silent)
+    np.testing.assert_allclose(both[1], -X + AHEAD * V, atol=GRAIN + 0.02)
+
+
+@pytest.mark.parametrize("off", [-0.3, -0.1, 0.08, -5.0, 5.0])
+def test_the_plans_of_a_wrong_clock_are_laid_where_their_sender_is(off):
+    """Plans at 10 Hz of one at 4 m/s; a quarter of a metre is what fifty milliseconds are worth."""
+    neighbours, v = Neighbours(CONFIG, OWN, FLEET), np.array([4.0, 0.0, 0.0])
+    for k in range(30):
+        made = NOW + k * 100_000
+        x = 1e-7 * k * 1e6 * v
+        neighbours.hear_plan(made + DELAY, plan(x, v, epoch=(made + round(off * 1e6)) // 4 * 4))
+        neighbours.hear_position(made + DELAY, position(x, v))
+    expected = x + AHEAD * v + 1e-6 * DELAY * v
+    np.testing.assert_allclose(neighbours.obstacles(made + DELAY).positions[0], expected, atol=0.05)
+
+
+@LAWS
 @given(order=st.permutations(range(6)), v=vectors(4.0))
 def test_positions_that_overtake_each_other_tell_the_same(order, v):
     """All at once, in any order: the stamps say which was when."""

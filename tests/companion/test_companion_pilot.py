@@ -28,7 +28,7 @@ from companion.config import CompanionConfig
 from companion.pilot import Phase, Pilot
 from companion.tracks import State
 from companion.world import View
-from mavlink_bridge.messages import CommandAck, Heartbeat, Message, Source, SysStatus
+from mavlink_bridge.messages import CommandAck, ExtendedSysState, Heartbeat, Message, Source, SysStatus
 
 OWN = Source(11, 195)
 HEIGHT, GROUND = 6.0, 2.5
@@ -413,3 +413,57 @@ def test_disarmed_on_the_way_up_it_does_not_arm_again_without_a_new_go(flavour):
     assert ARM not in {command for command, _ in sent}
     assert rig.pilot.phase is Phase.CONNECT
     assert rig.pilot.waiting_for == "the operator's go"
+
+
+# A vehicle that flies already
+
+
+def landed(state_of_landing):
+    return ExtendedSysState(AUTOPILOT, 0, state_of_landing)
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("airborne", [2, 3, 4], ids=["in the air", "taking off", "landing"])
+def test_who_may_be_flying_is_never_told_to_take_off(flavour, airborne):
+    rig = Rig(flavour, READY._replace(own=state(8.0)))
+    assert rig.pilot.go(HEIGHT)
+    every = beat(flavour, armed=True, guided=True), HEALTHY, landed(airborne)
+    sent = rig.run(4.0, *every, acks=True)
+    assert rig.pilot.phase is Phase.ESCORT
+    assert not {command for command, _ in sent} & {TAKEOFF, ARM}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("heard", [(), (landed(0),)], ids=["nothing said", "undefined"])
+def test_an_armed_vehicle_of_which_nobody_says_where_it_is_is_left_alone(flavour, heard):
+    rig = Rig(flavour, READY._replace(own=state(8.0)))
+    assert rig.pilot.go(HEIGHT)
+    sent = rig.run(4.0, beat(flavour, armed=True, guided=True), HEALTHY, *heard, acks=True)
+    assert rig.pilot.phase is Phase.CONNECT
+    assert "EXTENDED_SYS_STATE" in rig.pilot.waiting_for
+    assert not {command for command, _ in sent} & {TAKEOFF, ARM}
+
+
+def test_what_was_said_of_landing_long_ago_is_forgotten():
+    rig = Rig()
+    rig.run(0.2, beat("ardupilot", armed=True), HEALTHY, landed(2), acks=True)
+    rig.run(4.0, beat("ardupilot", armed=True), HEALTHY, acks=True)
+    assert rig.pilot.go(HEIGHT)
+    rig.run(1.0, beat("ardupilot", armed=True), HEALTHY, acks=True)
+    assert "EXTENDED_SYS_STATE" in rig.pilot.waiting_for
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_height_that_drifts_does_not_hold_up_the_take_off(flavour):
+    """The estimate says 0.8 m less than was asked for; the autopilot is where it wants to be."""
+    rig = Rig(flavour).prepared()
+    armed = beat(flavour, armed=True, guided=flavour == "ardupilot")
+    rig.run(1.0, armed, landed(1), acks=True)
+    rig.view = READY._replace(own=state(HEIGHT - 0.8))
+    before = len(rig.sent)
+    rig.run(1.5, armed, landed(2), acks=True)
+    assert rig.pilot.phase is Phase.PREPARE
+    rig.run(2.0, armed, landed(2), acks=True)
+    rig.run(1.0, beat(flavour, armed=True, guided=True), landed(2), acks=True)
+    assert rig.pilot.phase is Phase.ESCORT
+    assert TAKEOFF not in {command for _, command, _ in rig.sent[before:]}

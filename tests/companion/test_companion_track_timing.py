@@ -56,8 +56,8 @@ def test_jitter_does_not_date_a_measurement(seed, jitter, period, boot):
         date = clock.date(NOW + true + DELAY + late, boot + true)
         assert date.stamped
         times.append(date.time)
-        # The line has not been tilted yet.
-        if k < 10 and period * k < 1000:
+        # The line lies still for five seconds.
+        if period * k < 4000:
             assert date.time + clock.skew == NOW + true
     assert np.diff(times).tolist() == [period * 1000] * 49
 
@@ -70,8 +70,7 @@ def test_jitter_does_not_date_a_measurement(seed, jitter, period, boot):
     rate=st.sampled_from([5, 10, 50]),
 )
 def test_drift_is_followed_to_the_end_of_the_jitter(seed, ppm, jitter, rate):
-    """What is left is the grain of a millisecond, and what the messages of five seconds leave of their
-    jitter."""
+    """What is left is the grain of a millisecond, and what the quickest messages leave of their jitter."""
     random = np.random.default_rng(seed)
     clock = SenderClock(DELAY, LATEST)
     hour = 3600 * SECOND
@@ -84,9 +83,10 @@ def test_drift_is_followed_to_the_end_of_the_jitter(seed, ppm, jitter, rate):
     assert off.mean() <= 1500 + 0.1 * jitter
 
 
-@pytest.mark.parametrize("rate", [0.5, 0.8, 0.99, 1.01, 2.0, 5.0])
+@pytest.mark.parametrize("rate", [0.5, 0.8, 0.989, 1.01, 2.0, 5.0])
 def test_a_simulator_that_is_slower_or_faster_than_time_is_followed(rate):
-    """10 Hz of ours. A clock that creeps is late at first, until its rate is known; a fast one never is."""
+    """10 Hz of ours. A clock that creeps is late at first, until half a minute has told its rate; it is never
+    early, nor is a fast one."""
     clock = SenderClock(DELAY, LATEST)
     sent = np.arange(0, 120 * SECOND, 100_000)
     said = dated(clock, sent.tolist(), [0] * len(sent), rate=rate)
@@ -96,33 +96,161 @@ def test_a_simulator_that_is_slower_or_faster_than_time_is_followed(rate):
     assert off.max() <= 2000
 
 
-def test_a_clock_that_stands_still_for_a_moment_is_trusted_again_within_fifty_messages():
-    """PX4's simulator does so: from then on its offset is another, by less than is called a step."""
+def ages_after(clock, lateness, period=20_000, first=5 * SECOND):
+    """How old the clock says that messages are at their arrival, and how old they are, when the link holds
+    each back by what ``lateness`` says (µs), after ``first`` µs without."""
+    quick = first // period
+    said, true = [], []
+    for k in range(quick + len(lateness)):
+        late = DELAY + (lateness[k - quick] if k >= quick else 0)
+        sent = k * period
+        date = clock.date(NOW + sent + late, 10 * SECOND + sent)
+        if date is None:
+            continue
+        said.append(NOW + sent + late - date.time - clock.skew)
+        true.append(late)
+    return np.array(said), np.array(true)
+
+
+DRIFT = 200e-6
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.3, 0.39])
+@pytest.mark.parametrize("rate", [50, 10, 5])
+def test_a_link_that_becomes_slow_is_seen_to_be_slow_for_ever(delay, rate):
+    """Five minutes: only what two quartzes may drift apart is forgiven."""
+    period = SECOND // rate
     clock = SenderClock(DELAY, LATEST)
-    before = np.arange(0, 5 * SECOND, 20_000)
-    dated(clock, before.tolist(), [0] * len(before))
-    said = []
-    for k in range(60):
-        true = 5 * SECOND + k * 20_000
-        date = clock.date(NOW + true + DELAY, SECOND + true - 80_000)
-        said.append(date.time + clock.skew - NOW - true)
-    assert said[0] == pytest.approx(-80_000, abs=2000)
-    assert max(map(abs, said[55:])) <= 3000
+    said, true = ages_after(clock, [round(delay * 1e6)] * (300 * rate), period)
+    assert len(said) == 305 * rate
+    assert (said <= true).all()
+    assert (true - said).max() <= DRIFT * 306e6
+
+
+@QUICK
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    steps=st.lists(st.integers(0, 900_000), min_size=1, max_size=12),
+    jitter=st.sampled_from([0, 20_000, 200_000]),
+)
+def test_a_delay_whatever_it_does_within_a_minute_is_never_understated_by_more_than_drift(
+    seed, steps, jitter
+):
+    """Up and down in steps over fifty-five seconds."""
+    random = np.random.default_rng(seed)
+    lateness = np.repeat(steps, 550 // len(steps)) + random.integers(
+        0, jitter + 1, 550 // len(steps) * len(steps)
+    )
+    rises = np.diff([0, *steps])
+    clock = SenderClock(DELAY, LATEST)
+    said, true = ages_after(clock, lateness.tolist(), 100_000)
+    if np.count_nonzero(rises > 0) <= 3:
+        assert (true - said).max() <= DRIFT * 63e6
+    # Four and more at equal distances in half a minute could be a slow clock's.
+    assert (said <= true).all()
 
 
 @LAWS
-@given(step=st.one_of(st.integers(3 * SECOND, 10**13), st.integers(-(10**10), -3 * SECOND)))
-def test_a_clock_that_was_set_or_began_anew_is_followed_after_three_witnesses(step):
-    """Reboot, or the wrap of the 32-bit milliseconds after 49.7 days: our time goes on."""
+@given(first=st.integers(0, 390_000), more=st.integers(0, 5 * SECOND), rate=st.sampled_from([10, 50]))
+def test_a_delay_that_grows_never_lowers_the_age(first, more, rate):
+    """Two links, one of which becomes slower than the other: it is never believed to be fresher."""
+    period = SECOND // rate
+    one, _ = ages_after(SenderClock(DELAY, LATEST), [first] * (40 * rate), period)
+    other, true = ages_after(SenderClock(DELAY, LATEST), [first + more] * (40 * rate), period)
+    assert (other >= one - DRIFT * more - 1).all()
+    assert other[-1] >= true[-1] - DRIFT * 51e6
+    # Nor does it become younger with time.
+    assert np.diff(other[5 * rate :]).min() >= -DRIFT * period - 1
+
+
+@pytest.mark.parametrize("delay", [0.45, 0.9, 3.0])
+def test_what_would_be_of_no_use_for_ever_is_taken_for_a_clock_that_stood_after_a_minute(delay):
+    """A simulator that hung must not ground a vehicle; not before a minute of nothing better."""
+    late = round(delay * 1e6)
+    said, _ = ages_after(SenderClock(DELAY, LATEST), [late] * (100 * 50))
+    slow = said[5 * 50 :]
+    assert (slow[: 59 * 50] >= DELAY + late * 0.9).all()
+    assert (slow[71 * 50 :] <= DELAY + DRIFT * 130e6).all()
+
+
+@LAWS
+@given(
+    frozen=st.integers(2, 20),
+    rate=st.sampled_from([10, 50]),
+    at_once=st.booleans(),
+    before=st.integers(3, 20),
+)
+def test_what_waited_while_the_companion_hung_is_as_old_as_it_is(frozen, rate, at_once, before):
+    """It comes in one burst, or as fast as a link lets it through: its stamps advance, not its arrivals."""
+    period = SECOND // rate
+    clock = SenderClock(DELAY, LATEST)
+    for k in range(before * rate):
+        clock.date(NOW + k * period + DELAY, 10 * SECOND + k * period)
+    thaw = (before + frozen) * SECOND
+    for i in range(frozen * rate):
+        sent = before * SECOND + i * period
+        received = thaw if at_once else thaw + i * period // 10
+        received = max(received, sent + DELAY)
+        date = clock.date(NOW + received, 10 * SECOND + sent)
+        assert date.stamped
+        age = NOW + received - date.time - clock.skew
+        assert age == pytest.approx(received - sent, abs=DRIFT * 45e6)
+        assert age <= received - sent
+
+
+def test_an_echo_of_long_ago_is_no_clock_that_began_anew():
+    """A second way with three seconds of delay, heard in a burst when the first falls silent."""
+    clock = SenderClock(DELAY, LATEST)
+    for k in range(500):
+        clock.date(NOW + k * 20_000 + DELAY, 10 * SECOND + k * 20_000)
+    for k in range(100):
+        assert clock.date(NOW + 10 * SECOND + DELAY, 5 * SECOND + k * 20_000) is None
+
+
+@LAWS
+@given(quicker=st.integers(0, 1_900_000), rate=st.sampled_from([5, 50]))
+def test_a_smaller_delay_is_believed_at_once(quicker, rate):
+    """The first ones were slow; one that is not tells how old they were."""
+    period = SECOND // rate
+    clock = SenderClock(DELAY, LATEST)
+    for k in range(20):
+        clock.date(NOW + k * period + DELAY + quicker, SECOND + k * period)
+    sent = 20 * period
+    date = clock.date(NOW + sent + DELAY, SECOND + sent)
+    assert date.time + clock.skew == NOW + sent
+
+
+@LAWS
+@given(stamp=st.integers(-1, 10**10), late=st.integers(0, SECOND))
+def test_other_messages_are_read_by_the_same_clock_and_teach_it_nothing(stamp, late):
+    clock = SenderClock(DELAY, LATEST)
+    assert clock.reads(NOW, stamp) == NOW - DELAY
+    for k in range(20):
+        clock.date(NOW + k * 20_000 + DELAY, SECOND + k * 20_000)
+    skew = clock.skew
+    sent = 19 * 20_000
+    assert clock.reads(NOW + sent + DELAY + late, SECOND + sent) == NOW + sent
+    # None is from the future, and one without a stamp is dated by its arrival.
+    assert clock.reads(NOW + sent + late, stamp) <= NOW + sent + late - DELAY
+    assert clock.reads(NOW + sent + late, 0) == NOW + sent + late - DELAY
+    assert (clock.skew, clock.heard) == (skew, 20)
+
+
+@LAWS
+@given(step=st.one_of(st.integers(3 * SECOND, 10**13), st.integers(-(10**10), -4 * SECOND)))
+def test_a_clock_that_was_set_or_began_anew_is_soon_followed(step):
+    """Reboot, or the wrap of the 32-bit milliseconds after 49.7 days: our time goes on. Forward three
+    witnesses tell of it; back, a second of them, for old messages may have waited somewhere."""
     clock = SenderClock(DELAY, LATEST)
     uptime = 2 * 10**10
     last = None
-    for k in range(40):
+    lost = range(20, 22) if step > 0 else range(20, 30)
+    for k in range(60):
         true = k * 100_000
         stamp = uptime + true + (step if k >= 20 else 0)
         # The first is slow: what it says of the offset is made good before the step, and not undone by it.
         date = clock.date(NOW + true + DELAY + (50_000 if k == 0 else 0), stamp)
-        if k in (20, 21):
+        if k in lost:
             assert date is None
             continue
         if k == 0:
@@ -133,9 +261,9 @@ def test_a_clock_that_was_set_or_began_anew_is_followed_after_three_witnesses(st
 
 
 @QUICK
-@given(wild=st.integers(1, 2**32 * 1000), when=st.integers(5, 30))
-def test_one_wild_stamp_moves_nothing_for_long(wild, when):
-    """One that is out by more than any delay is not believed; by less, it is forgotten with its fifty."""
+@given(wild=st.integers(1, 2**32 * 1000) | st.integers(10**8, 10**8 + 30 * 10**5), when=st.integers(5, 30))
+def test_one_wild_stamp_makes_nothing_younger(wild, when):
+    """One that is out by more than any delay is not believed; one ahead by less makes the others older."""
     clock = SenderClock(DELAY, LATEST)
     for k in range(200):
         true = k * 100_000
@@ -144,9 +272,9 @@ def test_one_wild_stamp_moves_nothing_for_long(wild, when):
             continue
         date = clock.date(NOW + true + DELAY, 10**8 + true)
         assert date is not None
-        assert abs(date.time + clock.skew - NOW - true) <= LATEST
-        if k > when + 60:
-            assert date.time + clock.skew == pytest.approx(NOW + true, abs=1)
+        assert -LATEST <= date.time + clock.skew - NOW - true <= 0
+        if abs(wild - 10**8 - when * 100_000) > LATEST:
+            assert date.time + clock.skew == NOW + true
 
 
 @pytest.mark.parametrize("stamp", [0, -1, 777_000])
@@ -155,7 +283,7 @@ def test_stamps_that_do_not_advance_are_of_no_use_and_the_arrival_counts(stamp):
     for k in range(60):
         received = NOW + k * 100_000
         date = clock.date(received, stamp)
-        if k > 5 or stamp <= 0:
+        if k > 11 or stamp <= 0:
             assert not date.stamped
             assert date.time + clock.skew == received - DELAY
 
@@ -180,9 +308,9 @@ def test_stamps_that_come_to_their_senses_are_used_again():
     clock = SenderClock(DELAY, LATEST)
     for k in range(20):
         clock.date(NOW + k * 100_000, 777_000)
-    dates = [clock.date(NOW + k * 100_000, 888_000 + k * 100_000) for k in range(20, 30)]
-    assert [date.stamped for date in dates] == [False, False, *[True] * 8]
-    assert np.diff([date.time for date in dates]).tolist() == [100_000] * 9
+    dates = [clock.date(NOW + k * 100_000, 888_000 + k * 100_000) for k in range(20, 40)]
+    assert [date.stamped for date in dates] == [*[False] * 10, *[True] * 10]
+    assert np.diff([date.time for date in dates]).tolist() == [100_000] * 19
 
 
 def test_two_clocks_under_one_name_do_not_take_turns():
@@ -194,8 +322,8 @@ def test_two_clocks_under_one_name_do_not_take_turns():
         other = clock.date(NOW + k * 100_000 + 3000, 10**7 + k * 100_000)
         assert first.time + clock.skew == NOW + k * 100_000 - DELAY
         assert other is None
-    dates = [clock.date(NOW + k * 100_000, 10**7 + k * 100_000) for k in range(50, 60)]
-    assert [date is None for date in dates] == [True, *[False] * 9]
+    dates = [clock.date(NOW + k * 100_000, 10**7 + k * 100_000) for k in range(50, 70)]
+    assert [date is None for date in dates] == [*[True] * 10, *[False] * 10]
 
 
 def test_a_burst_at_one_time_is_no_rate():

@@ -149,3 +149,30 @@ def test_a_state_that_no_vehicle_can_have_is_not_taken(nonsense):
     known = world(*first, ("autopilot", local((1, 2, -3))), *[("autopilot", nonsense)] * 3).at(NOW).own
     np.testing.assert_allclose(known.position, [2.0, 1.0, 3.0], atol=1e-6)
     np.testing.assert_allclose(known.velocity, ZERO, atol=1e-6)
+
+
+STALE = CONFIG.guard.own_stale_us
+
+
+def test_a_heading_that_is_too_old_is_none():
+    """As long as the own state may be: after that nobody knows where the vehicle looks."""
+    picture = world(("autopilot", AT_FLEET_ZERO), ("autopilot", attitude(0.0)))
+    heard = NOW - CONFIG.own.delay_us
+    assert picture.at(heard + STALE).yaw == pytest.approx(math.pi / 2)
+    assert picture.at(heard + STALE + 1).yaw is None
+    picture.hear(NOW + 10 * STALE, "autopilot", attitude(math.pi / 2))
+    assert picture.at(NOW + 10 * STALE).yaw == pytest.approx(0.0, abs=1e-9)
+
+
+@LAWS
+@given(late=st.integers(0, 3 * STALE))
+def test_a_heading_that_waited_is_as_old_as_its_stamp_says(late):
+    """By the clock of the own positions."""
+    picture = world(("autopilot", AT_FLEET_ZERO))
+    for k in range(10):
+        here = local((1, 2, -3))._replace(time_boot=10**7 + k * 20_000)
+        picture.hear(NOW + k * 20_000, "autopilot", here)
+    sent = 9 * 20_000
+    picture.hear(NOW + sent + late, "autopilot", attitude(0.5)._replace(time_boot=10**7 + sent))
+    known = picture.at(NOW + sent + late).yaw is not None
+    assert known == (late + CONFIG.own.delay_us <= STALE)

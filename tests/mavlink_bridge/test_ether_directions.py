@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mavlink_bridge.channel import Direction
 from mavlink_bridge.errors import BridgeError
-from mavlink_bridge.ether import Channel, Ether, EtherCounters, Faults, Partition
+from mavlink_bridge.ether import Channel, Ether, EtherCounters, Faults
 from mavlink_bridge.node import Datagram
 
 TICK = 2500
@@ -28,10 +28,9 @@ Heard = dict[tuple[str, str], list[tuple[int, bytes]]]
 def channel(
     faults: Faults = HARSH,
     overrides: Mapping[Direction, Faults] = NOTHING,
-    partitions: tuple[Partition, ...] = (),
     order: str = NAMES,
 ) -> Channel:
-    return Channel("air", dict.fromkeys(order, "swarm"), faults, partitions, overrides)
+    return Channel("air", dict.fromkeys(order, "swarm"), faults, overrides)
 
 
 def story(
@@ -119,23 +118,23 @@ def test_overrides_that_make_no_sense_are_refused(overrides: dict[Direction, Fau
 # Cuts
 
 
-@given(st.integers(0, 60), st.integers(0, 40), st.sets(st.sampled_from(NAMES)), st.booleans())
+@given(st.integers(0, 60), st.integers(0, 40), st.sets(st.sampled_from(NAMES)))
 @settings(max_examples=30)
-def test_a_cut_made_while_running_is_a_partition(
-    begin: int, length: int, members: set[str], until: bool
-) -> None:
-    """Made after step k − 1 and healed after step k + n − 1, or given an end: the same bytes as a partition
-    of the calendar from step k to before step k + n."""
-    start, end = (begin + 1) * TICK, (begin + 1 + length) * TICK
+def test_a_cut_with_an_end_is_as_one_that_is_healed_then(begin: int, length: int, members: set[str]) -> None:
+    """Made after step k − 1, until step k + n or healed after step k + n − 1: the same bytes."""
+    end = (begin + 1 + length) * TICK
 
-    def meddle(step: int, ether: Ether) -> None:
+    def bounded(step: int, ether: Ether) -> None:
         if step == begin:
-            ether.cut("air" if until else None, members, end if until else None)
-        if not until and step == begin + length:
+            ether.cut("air", members, end)
+
+    def healed(step: int, ether: Ether) -> None:
+        if step == begin:
+            ether.cut(None, members)
+        if step == begin + length:
             ether.heal()
 
-    partition = Partition(start, end, frozenset(members))
-    assert story(channel(), meddle=meddle) == story(channel(partitions=(partition,)))
+    assert story(channel(), meddle=bounded) == story(channel(), meddle=healed)
 
 
 def test_cuts_add_up_and_each_is_healed_by_its_own_name() -> None:

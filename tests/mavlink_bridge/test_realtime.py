@@ -124,6 +124,19 @@ def test_a_long_stall_is_followed_by_one_step_and_not_by_a_burst() -> None:
     assert (statistics.misses, statistics.skipped) == (1, 8)
 
 
+def test_who_was_held_up_on_purpose_is_not_late() -> None:
+    """The stall of one step delays the next, which is excused: it counts nowhere, and all others do."""
+    clock = Sleeper(0)
+    worker = Worker(clock, [0, 95_000, 0, 2_500, 0])
+    loop = RealTime(
+        Scheduled(worker, PERIOD, PHASE), {}, clock, tolerance=500, excused=lambda: len(worker.told) == 2
+    )
+    statistics = loop.run(never, until(worker, 5))
+    assert worker.told == [2_000, 12_000, 102_000, 112_000, 122_000]
+    assert (statistics.steps, statistics.misses, statistics.skipped) == (4, 0, 0)
+    assert statistics.lateness.max == 0
+
+
 def test_the_start_may_be_far_ahead_and_given_up() -> None:
     clock = Sleeper(0)
     worker = Worker(clock)

@@ -53,7 +53,7 @@ def struck(*faults: dict[str, Any], partitions: tuple[dict[str, Any], ...] = ())
         (VANISH, [(5_000_000, ("vanish", 11))]),
         (LOSS, [(1_000_000, ("lose_gps",)), (3_000_000, ("regain_gps",))]),
         (JUMP, [(1_000_000, ("shift_gps", (1.0, 2.0, 3.0))), (3_000_000, ("shift_gps", (0.0, 0.0, 0.0)))]),
-        (MOTOR, [(500_000, ("fail_rotor", 2, 0.25))]),
+        (MOTOR, [(500_000, ("fail_rotor", 2, 0.5))]),
         (CLOCK, []),
     ],
 )
@@ -86,6 +86,44 @@ def test_a_clock_that_is_off_is_off_from_the_start_and_the_others_within_bounds(
         assert 0 < abs(clock.offset) <= 2_000
         assert 0.0 < abs(clock.drift_ppm) <= 30.0
     assert clocks == [Fleet(of, FIREFLY, 5, LOGS).clock(k, 1_000_000) for k in range(3)]
+
+
+def spell(what: dict[str, Any], begin: float, lasts: float) -> dict[str, Any]:
+    return {**what, "at_s": begin, "for_s": lasts}
+
+
+@pytest.mark.parametrize("what", [FREEZE, LOSS, JUMP, CUT])
+@given(st.tuples(st.integers(0, 8), st.integers(1, 8)), st.tuples(st.integers(0, 8), st.integers(1, 8)))
+@settings(deadline=None, max_examples=30)
+def test_of_one_kind_one_goes_after_the_other(
+    what: dict[str, Any], one: tuple[int, int], other: tuple[int, int]
+) -> None:
+    key = "partitions" if what is CUT else "faults"
+    both = [spell(what, begin / 8.0, lasts / 8.0) for begin, lasts in (one, other)]
+    apart = one[0] >= sum(other) or other[0] >= sum(one)
+    if not apart:
+        with pytest.raises(ValidationError, match=rf"{key}\[0\] and {key}\[1\]: .* twice at one time"):
+            scenario("antipodal-8", vehicles=3, **{key: both})
+        return
+    found = events(scenario("antipodal-8", vehicles=3, **{key: both}))
+    # It ends before it begins again, in whatever order the file has them.
+    assert [event.over for event in found] == [False, True, False, True]
+
+
+def test_others_may_suffer_at_the_same_time() -> None:
+    faults = [FREEZE, {**FREEZE, "vehicle": 13}, spell(LOSS, 3.0, 1.0), spell(JUMP, 3.0, 1.0), MOTOR, MOTOR]
+    cuts = (CUT, {**CUT, "members": [11]})
+    assert len(events(scenario("antipodal-8", vehicles=3, faults=faults, partitions=cuts))) == 14
+
+
+def test_a_clock_is_off_in_one_way_only() -> None:
+    with pytest.raises(ValidationError, match=r"faults\[0\] and faults\[2\]: clock of 12 .* one for each"):
+        scenario("antipodal-8", vehicles=3, faults=[CLOCK, FREEZE, {**CLOCK, "late_ms": 0.0}])
+
+
+def test_what_lasts_no_time_ends_all_the_same() -> None:
+    (begun, ended) = events(scenario("antipodal-8", vehicles=3, faults=[spell(FREEZE, 1.0, 1e-9)]))
+    assert (begun.over, ended.over) == (False, True)
 
 
 @pytest.mark.parametrize(

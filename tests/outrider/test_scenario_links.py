@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 from shipped import FIREFLY, LOGS, scenario
 
-from mavlink_bridge.ether import Faults
+from mavlink_bridge.ether import Ether, Faults
 from outrider.fleet import Fleet
 from outrider.scenario_links import Links
 
@@ -58,3 +59,22 @@ def test_a_fleet_s_channels_carry_them() -> None:
 def test_who_is_not_there_is_refused(name: str | int) -> None:
     with pytest.raises(ValueError, match="is neither a vehicle"):
         scenario("antipodal-8", vehicles=3, links={"swarm": {"directions": [{"sender": name}]}})
+
+
+@pytest.mark.parametrize(
+    ("said", "least"),
+    [
+        ({"burst": 0.5}, "1 "),
+        ({"loss": 0.8, "burst": 2.0}, "4 "),
+        ({"burst": 2.0, "directions": [{"sender": 12, "loss": 0.5}, {"receiver": 13, "loss": 0.9}]}, "9 "),
+    ],
+)
+def test_a_burst_too_short_for_its_loss_is_refused(said: dict[str, Any], least: str) -> None:
+    """As it is read: the ether would refuse it when a run directory is there already."""
+    with pytest.raises(ValidationError, match=f"allowed: 0, or {least}"):
+        Links.model_validate(said)
+
+
+def test_a_burst_just_long_enough_flies() -> None:
+    flown = scenario("antipodal-8", links={"swarm": {"loss": 0.8, "burst": 4.0}})
+    assert Ether(Fleet(flown, FIREFLY, 1, LOGS).channels(), 1, 2_500).counters.sent == 0

@@ -35,7 +35,7 @@ KEYS = {
     "converged", "convergence_time_s", "min_separation_m", "min_obstacle_distance_m", "d_min_m",
     "d_min_violations", "max_speed_m_s", "max_acceleration_m_s2", "max_tilt_deg", "yaw_error_deg",
     "standoff_error_m", "plan_ms", "plans", "solver_failures", "held_epochs", "slack_max_m",
-    "tracking_error_m", "messages", "deadline_misses", "simulated_s", "wall_s", "cpu_s",
+    "tracking_error_m", "messages", "deadline_misses", "deadline_steps", "simulated_s", "wall_s", "cpu_s",
     "real_time_factor", "run_dir",
 }  # fmt: skip
 INNER = {
@@ -85,6 +85,7 @@ class Flown:
     span: float = 0.63
     tallies: Any = TALLIES
     seed: int = 7
+    systems: tuple[int, ...] = (11, 12)
     messages: Messages = field(default_factory=lambda: Messages(100, 7, 3))
     punctuality: Punctuality | None = None
 
@@ -264,3 +265,21 @@ def test_exit_status(violations: int, converged: bool | None, failure: str | Non
 
 def test_wall_fields_are_keys() -> None:
     assert set(WALL_FIELDS) <= set(summary())
+
+
+def test_who_turns_over_or_comes_down_makes_it_a_failure() -> None:
+    """Between the goal event and the end of the clock (samples 10 to 39), and having been up before."""
+    samples = hovering(50)
+    up = samples.position + np.array([0.0, 0.0, 5.0])
+    assert summary(truth=Seen(samples._replace(position=up)))["failure"] is None
+    down = up.copy()
+    down[45:, 1, 2] = 0.1
+    assert summary(truth=Seen(samples._replace(position=down)))["failure"] is None
+    down[30:, 1, 2] = 0.1
+    found = summary(truth=Seen(samples._replace(position=down)))
+    assert "vehicle 12 came down 0.4 s" in str(found["failure"])
+    assert exit_status(found) == 1
+    tilt = samples.tilt.copy()
+    tilt[20, 0] = np.radians(168.0)
+    found = summary(truth=Seen(samples._replace(position=up, tilt=tilt)))
+    assert "vehicle 11 turned over 0.2 s after the goal event (tilt 168 deg" in str(found["failure"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -97,9 +98,13 @@ def test_options_leave_the_scenario_that_was_given_alone() -> None:
         (Options(replan_hz=-20.0), "--replan-hz"),
         (Options(replan_hz=float("nan")), "--replan-hz"),
         (Options(replan_hz=float("inf")), "--replan-hz"),
-        (Options(replan_hz=30.0), "--replan-hz (replan_us = 33333)"),
+        (Options(replan_hz=30.0), "--replan-hz 30: a plan's period"),
+        (Options(replan_hz=33.0), "nearest allowed: 33.333"),
+        (Options(wind="nan"), "--wind nan: allowed is a speed in m/s"),
+        (Options(wind="1,inf"), "--wind 1,inf: "),
+        (Options(wind="100"), "each from -50 to 50"),
         (Options(replan_hz=1e-9), "--replan-hz"),
-        (Options(replan_hz=400.0), "replan_us"),
+        (Options(replan_hz=400.0), "nearest allowed: 100"),
     ],
 )
 def test_a_bad_option_is_one_line(options: Options, said: str) -> None:
@@ -107,6 +112,50 @@ def test_a_bad_option_is_one_line(options: Options, said: str) -> None:
         apply(BASE, options)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+    assert "allowed" in str(caught.value) or "twice" in str(caught.value)
+    assert not any(word in str(caught.value) for word in ("Input should", "Value error", "options:"))
+
+
+def test_places_are_not_made_up_for_more_vehicles() -> None:
+    points = {"kind": "points", "at": [[0.0, 0.0, 5.0], [9.0, 0.0, 5.0]], "goals": None}
+    of = scenario("scenario-1", vehicles=2, starts=points)
+    assert apply(of, Options(vehicles=2)) == of
+    with pytest.raises(InputError, match=r"--vehicles 3: .* 2 places; allowed: 2"):
+        apply(of, Options(vehicles=3))
+
+
+def test_a_rule_that_options_break_names_them() -> None:
+    of = scenario("antipodal-8", faults=[{"kind": "vanish", "vehicle": 18, "at_s": 1.0}])
+    with pytest.raises(InputError, match=r"^--vehicles 3: faults\[0\].vehicle = 18 is none of the fleet"):
+        apply(of, Options(vehicles=3))
+
+
+@given(st.floats(0.1, 1000.0))
+@settings(deadline=None, max_examples=60)
+def test_the_nearest_rate_is_allowed_and_none_is_nearer(rate: float) -> None:
+    tick, least = BASE.timing.base_tick_us, BASE.timing.companion_us
+    try:
+        assert apply(BASE, Options(replan_hz=rate)).companion.rates.replan_us % tick == 0
+    except InputError as error:
+        near = float(str(error).rpartition(" ")[2])
+        period = apply(BASE, Options(replan_hz=near)).companion.rates.replan_us
+        others = range(least, 10_000_001, tick)
+        assert abs(1e6 / period - rate) == pytest.approx(min(abs(1e6 / one - rate) for one in others))
+
+
+def test_a_rotor_that_is_not_there_is_refused_before_anything_is_flown(tmp_path: Path) -> None:
+    document = scenario("antipodal-8").model_dump(mode="json")
+    document["faults"] = [
+        {"kind": "motor", "vehicle": 11, "at_s": 1.0, "rotor": rotor, "left": 0.0} for rotor in (5, 6, 12)
+    ]
+    file = tmp_path / "motors.yaml"
+    file.write_text(json.dumps(document))
+    with pytest.raises(InputError) as caught:
+        prepare(str(file), Options())
+    assert str(caught.value).split("\n") == [
+        f"{file}: faults[{index}].rotor is {rotor}; firefly has rotors 0 to 5"
+        for index, rotor in ((1, 6), (2, 12))
+    ]
 
 
 def test_several_faults_are_a_line_each() -> None:

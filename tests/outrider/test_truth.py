@@ -42,7 +42,8 @@ FLEET = FleetFrame(47.397742, 8.545594, 488.0)
         ([LEAST, LEAST], 0, LEAST),
         ([NAN, NAN], 0, float("inf")),
         ([NAN, 0.4, NAN], 1, 0.4),
-        ([0.4, NAN, 0.4], 2, 0.4),
+        ([0.4, NAN, 0.4], 1, 0.4),
+        ([0.4, NAN, 2.0, 0.4], 2, 0.4),
         ([], 0, float("inf")),
     ],
 )
@@ -73,8 +74,9 @@ def naive(distances: np.ndarray) -> int:
     for column in distances.T:
         inside = False
         for distance in column:
-            total += bool(distance < LEAST) and not inside
-            inside = bool(distance < LEAST)
+            if not np.isnan(distance):
+                total += bool(distance < LEAST) and not inside
+                inside = bool(distance < LEAST)
     return total
 
 

@@ -54,7 +54,7 @@ def test_poor_links_hold_up_nobody(row: Poor, tmp_path: Path) -> None:
 def test_without_a_link_nobody_takes_off_and_it_is_said_why(
     link: str, missing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(conductor, "_PREPARE_CAP", 4_000_000)
+    monkeypatch.setattr(conductor, "PREPARE_CAP", 4_000_000)
     of = scenario("antipodal-8", {"vehicles": 2, "links": {link: {"loss": 1.0}}})
     flown = fly(of, 1, tmp_path)
     assert flown.summary["failure"] == "; ".join(f"companion-{k} waits for {missing}" for k in (11, 12))

@@ -19,6 +19,10 @@ app = typer.Typer(
     help="A ring of MAVs escorts a moving target without colliding.",
 )
 BAD_INPUT, FAULT = 2, 3
+_INTERRUPTED = 130
+"""What typer makes of Ctrl-C."""
+_EXTRAS: Final = {"numba": "sitl", "llvmlite": "sitl", "jsbsim": "sitl"}
+"""What only an extra of the package installs."""
 # Click's UsageError: typer has no name of its own for it, and newer ones bring their own click.
 _UsageError: Final = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 
@@ -118,7 +122,8 @@ def main() -> None:
             line = f"{command}: {said.rstrip('.')}; see {command} --help"
             sys.stderr.write(f"{InputError(line)}\n")
         sys.exit(BAD_INPUT)
-    except typer.Abort:
+    except (typer.Abort, KeyboardInterrupt):
+        sys.stderr.write("outrider: stopped\n")
         sys.exit(FAULT)
     except (OutriderError, BridgeError, OSError) as error:
         sys.stderr.write(f"outrider: {error}\n")
@@ -127,10 +132,24 @@ def main() -> None:
         # A fault of ours must not look like a collision, which has status 1.
         if os.environ.get("OUTRIDER_TRACEBACK"):
             raise
-        name = type(error).__name__
-        sys.stderr.write(f"outrider: {name}: {error}; OUTRIDER_TRACEBACK=1 shows where\n")
+        sys.stderr.write(f"outrider: {_words(error)}\n")
         sys.exit(FAULT)
+    if status == _INTERRUPTED:
+        sys.stderr.write("outrider: stopped\n")
+        status = FAULT
     sys.exit(status)
+
+
+def _words(error: Exception) -> str:
+    """What went wrong, and what to do."""
+    if isinstance(error, ModuleNotFoundError):
+        package = (error.name or "").partition(".")[0]
+        if package in _EXTRAS:
+            return (
+                f"this command needs {package}, which is not installed: "
+                f"pip install 'outrider[{_EXTRAS[package]}]'"
+            )
+    return f"{type(error).__name__}: {error}; OUTRIDER_TRACEBACK=1 shows where"
 
 
 if __name__ == "__main__":

@@ -13,13 +13,21 @@ from outrider.operator import Operator
 from outrider.scenario import FixedTarget, Scenario
 from outrider.starts import Starts
 from outrider.truth import Array
+from sitl.profiles import PROFILES
 
 NEAR, SLOW, HOLD = 0.3, 0.3, 1_000_000
 """Converged: nearer than this (m), slower than this against the target (m/s), for so long (µs)."""
+_SIGMAS = 2.0
+"""Nobody can be asked to be nearer than so many σ of the sensors' error; with ``truth`` and ``rtk`` that is
+less than ``NEAR``."""
 HOVERING = 0.1
 """m/s; the clock starts when every vehicle is slower. With noisy sensors a hover is not that still."""
 _RESTLESS = {"truth": HOVERING, "rtk": 0.2, "gnss": 0.4}
-_SETTLE, _AFTER, _PREPARE_CAP, _LAND_CAP = 500_000, 5_000_000, 90_000_000, 60_000_000
+_TOSSED = 0.8
+"""The same in turbulent air."""
+PREPARE_CAP = 90_000_000
+"""µs within which all vehicles must hover, or nothing comes of the flight."""
+_SETTLE, _AFTER, _LAND_CAP = 500_000, 5_000_000, 60_000_000
 
 
 class Stage(Enum):
@@ -66,6 +74,11 @@ class Conductor:
         for k, system in enumerate(scenario.systems):
             operator.take_off(system, float(starts.positions[k, 2]))
 
+    @property
+    def near(self) -> float:
+        """m from where it should be, within which a vehicle has arrived."""
+        return max(NEAR, _SIGMAS * PROFILES[self._scenario.sensors].deviation)
+
     def see(self, sight: Sight) -> bool:
         """Go on to the next stage if it is time; True when the flight is over."""
         if self.stage is Stage.PREPARE:
@@ -102,10 +115,12 @@ class Conductor:
 
     def _prepare(self, sight: Sight) -> None:
         now, still = sight.now, _RESTLESS[self._scenario.sensors]
+        if self._scenario.weather.w20 > 0.0:
+            still = _TOSSED
         calm = sight.ready and float(np.linalg.norm(sight.velocities, axis=1).max()) < still
         if not calm:
             self._calm_since = None
-            if now - self._epoch > _PREPARE_CAP:
+            if now - self._epoch > PREPARE_CAP:
                 self.failure = "; ".join(sight.waiting) or "the vehicles do not come to a hover"
                 self._land(now)
             return
@@ -121,7 +136,7 @@ class Conductor:
         now = sight.now
         since = now - (self.clock_start or 0)
         if self._scenario.has_goal and self.converged_at is None and since >= self._last_jump:
-            near = bool((self.errors(sight) < NEAR).all())
+            near = bool((self.errors(sight) < self.near).all())
             if near and bool((np.linalg.norm(sight.velocities, axis=1) < SLOW).all()):
                 self._near_since = now if self._near_since is None else self._near_since
                 if now - self._near_since >= HOLD:

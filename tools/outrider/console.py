@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
@@ -12,6 +13,7 @@ from rich.table import Table
 from outrider.conductor import Stage
 from outrider.summary import Value
 
+_REFRESH_S = 0.1
 _WORDS = {
     "converged": "converged",
     "convergence_time_s": "convergence time, s",
@@ -35,6 +37,7 @@ _WORDS = {
     "held_epochs": "held plans",
     "messages": "messages",
     "deadline_misses": "missed deadlines",
+    "deadline_steps": "of so many deadlines",
     "lateness_ms": "lateness of the control, ms",
     "simulated_s": "simulated, s",
     "wall_s": "wall, s",
@@ -47,7 +50,7 @@ _WORDS = {
 @contextmanager
 def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
     """A bar for one flight; the callable takes stage and simulated seconds. Quiet when there is no
-    terminal."""
+    terminal. Without a thread of its own: a flight in real time forks while the bar stands."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -55,12 +58,19 @@ def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
         TimeElapsedColumn(),
     )
     console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    off = not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=off, auto_refresh=False) as bar:
         task = bar.add_task(Stage.PREPARE.value, total=duration_s, seconds=0.0)
+        shown = 0.0
 
         def watch(stage: Stage, seconds: float) -> None:
-            done = seconds if stage is not Stage.PREPARE else 0.0
-            bar.update(task, description=f"{stage.value:9}", completed=min(done, duration_s), seconds=seconds)
+            nonlocal shown
+            now = time.monotonic()
+            if off or now - shown < _REFRESH_S:
+                return
+            shown = now
+            done = min(seconds, duration_s) if stage is not Stage.PREPARE else 0.0
+            bar.update(task, description=f"{stage.value:9}", completed=done, seconds=seconds, refresh=True)
 
         yield watch
 

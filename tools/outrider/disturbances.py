@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple, Protocol
 
 from outrider.scenario import Scenario
@@ -51,7 +52,7 @@ class Computers(Protocol):
 
 
 def events(scenario: Scenario) -> list[Event]:
-    """All of a scenario, in the order of time."""
+    """All of a scenario, in the order of time; what ends at an instant goes before what begins then."""
     found = []
     # A clock that is off is off from the start: it is no event.
     sudden = [fault for fault in scenario.faults if not isinstance(fault, ClockFault)]
@@ -60,8 +61,8 @@ def events(scenario: Scenario) -> list[Event]:
         found.append(Event(begin, what, False))
         lasts = getattr(what, "for_s", None)
         if lasts is not None:
-            found.append(Event(begin + round(1e6 * lasts), what, True))
-    return sorted(found, key=lambda event: event.after)
+            found.append(Event(max(round(1e6 * (what.at_s + lasts)), begin + 1), what, True))
+    return sorted(found, key=lambda event: (event.after, not event.over))
 
 
 def strike_autopilot(event: Event, autopilot: Autopilot) -> None:
@@ -75,7 +76,8 @@ def strike_autopilot(event: Event, autopilot: Autopilot) -> None:
         case GpsJump(offset=offset):
             autopilot.shift_gps((0.0, 0.0, 0.0) if event.over else offset)
         case MotorFailure(rotor=rotor, left=left):
-            autopilot.fail_rotor(rotor, left)
+            # Thrust goes with the square of the speed, which is what fails.
+            autopilot.fail_rotor(rotor, sqrt(left))
         case _:
             pass
 

@@ -15,11 +15,13 @@ from companion.surface import bearing
 from mavlink_bridge.ether import Channel, Faults
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.node_clock import NodeClock
+from outrider import names
 from outrider.operator import Operator
 from outrider.scenario import FixedTarget, Scenario
 from outrider.scenario_faults import ClockFault
 from outrider.scenario_links import Links
 from outrider.starts import starts
+from outrider.streams import Stream, stream
 from outrider.targets import Recorded, Standing, Target
 from sitl.autopilot_config import AutopilotConfig
 from sitl.config import VehicleConfig
@@ -97,27 +99,27 @@ class Fleet:
             if isinstance(fault, ClockFault) and fault.vehicle == self.systems[k]:
                 return NodeClock(-round(1000.0 * fault.late_ms), fault.drift_ppm, since)
         bounds = self.scenario.clocks
-        offset, drift = np.random.default_rng([self.seed, 2, k]).uniform(-1.0, 1.0, 2)
+        offset, drift = stream(self.seed, Stream.CLOCKS, k).uniform(-1.0, 1.0, 2)
         return NodeClock(round(1000.0 * bounds.offset_ms * offset), float(bounds.drift_ppm * drift), since)
 
     def phases(self) -> list[int]:
         """When in its period (µs) each companion is due: seeded, so that they never replan all on one
         tick."""
         timing = self.scenario.timing
-        random = np.random.default_rng([self.seed, 1])
+        random = stream(self.seed, Stream.PHASES)
         ticks = random.integers(timing.companion_us // timing.base_tick_us, size=len(self.systems))
         return [int(tick) * timing.base_tick_us for tick in ticks]
 
     def channels(self) -> list[Channel]:
         """All links of the fleet with their faults, for the ether."""
         links = self.scenario.links
-        companions = [(f"companion-{system}", ("companion", system)) for system in self.systems]
+        companions = [(names.companion(system), ("companion", system)) for system in self.systems]
         channels = []
         for system, (name, words) in zip(self.systems, companions, strict=True):
             ends = {
-                "autopilot": End(f"sitl-{system}", "autopilot", ("autopilot", system)),
-                "target": End("target", "target", ("target",)),
-                "ground": End("operator", "ground", ("operator",)),
+                "autopilot": End(names.autopilot(system), "autopilot", ("autopilot", system)),
+                "target": End(names.TARGET, "target", ("target",)),
+                "ground": End(names.OPERATOR, "ground", ("operator",)),
             }
             for link, other in ends.items():
                 pair = [End(name, link, words), other]

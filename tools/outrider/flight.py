@@ -13,13 +13,14 @@ from companion.node import Tally
 from companion.obstacles import FixedObstacles
 from companion.pilot import Phase
 from mavlink_bridge.ether import Ether
-from mavlink_bridge.node import Datagram
-from mavlink_bridge.runtime import Direction, LockStep, Scheduled
-from mavlink_bridge.tlog import TlogWriter
+from mavlink_bridge.runtime import LockStep, Scheduled
+from outrider import names
 from outrider.conductor import Conductor, Sight, Stage
 from outrider.disturbances import Event, events, strike_autopilot, strike_computer
 from outrider.fleet import Fleet
+from outrider.names import LINK_NUMBERS
 from outrider.outcome import Messages, Outcome
+from outrider.recorder import Recorder
 from outrider.scenario import Scenario
 from outrider.scenario_faults import Vanish
 from outrider.scenario_links import PartitionPart
@@ -27,10 +28,10 @@ from outrider.truth import Limits, Truth
 from outrider.witness import Witness
 from sitl.config import VehicleConfig
 
+__all__ = ["EPOCH", "LINK_NUMBERS", "Flight", "Progress", "limits"]
+
 EPOCH = 1_767_225_600_000_000
 """Unix µs at which every simulated flight begins (2026-01-01 00:00 UTC): logs then open in any tool."""
-LINK_NUMBERS = {"autopilot": 0, "swarm": 1, "target": 2, "ground": 3}
-"""Link numbers in the low two bits of a tlog's time stamps."""
 _LONGEST = 10_000_000_000
 """µs; the conductor ends every flight long before."""
 
@@ -75,7 +76,7 @@ class Flight:
         with ExitStack() as files:
             taps = []
             if self._directory is not None:
-                taps.append(_Recorder(self._directory, self.systems, files))
+                taps.append(Recorder(self._directory, self.systems, files))
             loop = LockStep(self._schedule(), self.ether, self.scenario.timing.base_tick_us, taps)
             computers = _Computers(loop, self.ether)
             loop.run(EPOCH + _LONGEST, lambda now: self._watch(now, computers))
@@ -163,39 +164,21 @@ class _Computers:
         self._loop, self._ether = loop, ether
 
     def freeze(self, system: int) -> None:
-        self._loop.freeze(_name(system))
+        self._loop.freeze(names.companion(system))
 
     def thaw(self, system: int) -> None:
-        self._loop.thaw(_name(system))
+        self._loop.thaw(names.companion(system))
 
     def vanish(self, system: int) -> None:
-        self._loop.vanish(_name(system))
+        self._loop.vanish(names.companion(system))
 
     def cut(self, systems: tuple[int, ...]) -> None:
-        self._ether.cut("swarm", map(_name, systems))
+        self._ether.cut("swarm", map(names.companion, systems))
 
     def heal(self, systems: tuple[int, ...]) -> None:
-        self._ether.heal("swarm", map(_name, systems))
-
-
-class _Recorder:
-    """One tlog per vehicle: all that its companion received and sent, at the times at which it handled it."""
-
-    def __init__(self, directory: Path, systems: list[int], files: ExitStack) -> None:
-        self._writers = {
-            _name(s): files.enter_context(TlogWriter(directory / f"vehicle-{s}.tlog")) for s in systems
-        }
-
-    def __call__(self, now: int, node: str, _direction: Direction, datagram: Datagram, /) -> None:
-        writer = self._writers.get(node)
-        if writer is not None:
-            writer.write(now, LINK_NUMBERS[datagram.link], datagram.data)
+        self._ether.heal("swarm", map(names.companion, systems))
 
 
 def limits(scenario: Scenario) -> Limits:
     """What counts as too near."""
     return Limits(scenario.d_min, scenario.d_min_target, scenario.d_min_obstacle)
-
-
-def _name(system: int) -> str:
-    return f"companion-{system}"

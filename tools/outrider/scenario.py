@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from companion.config import CompanionConfig, Obstacle
 from outrider.scenario_faults import Clocks, FaultPart
 from outrider.scenario_links import ROLES, AllLinks, PartitionPart
+from outrider.scenario_overlaps import overlaps
 from outrider.scenario_part import FIRST_SYSTEM, TARGET_SYSTEM, Length, Part, Period
 from outrider.scenario_places import FixedTarget, Origin, Points, RecordedTarget, Ring, Starts, Target
 from sitl.weather import WeatherConfig
@@ -85,7 +86,8 @@ class Scenario(Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scenario:
-        for fault in (*self._timing_faults(), *self._place_faults(), *self._name_faults()):
+        found = (*self._timing_faults(), *self._place_faults(), *self._name_faults())
+        for fault in (*found, *overlaps(self.faults, self.partitions)):
             raise ValueError(fault)
         return self
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated
+from itertools import product
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mavlink_bridge.ether import Faults
 from outrider.scenario_part import Duration, Milliseconds, Part, Seconds, Share, System
@@ -13,6 +14,7 @@ from outrider.scenario_part import Duration, Milliseconds, Part, Seconds, Share,
 _WORDS = ("delay_ms", "jitter_ms", "loss", "duplication", "reordering", "burst")
 Burst = Annotated[float, Field(ge=0.0, le=10_000.0)]
 ROLES = ("companion", "autopilot", "target", "operator")
+_WITH_ID = ROLES[:2]
 
 
 class Direction(Part):
@@ -32,6 +34,11 @@ class Direction(Part):
     burst: Burst | None = None
 
 
+def _faults(said: dict[str, float]) -> Faults:
+    delay, jitter, loss, duplication, reordering, burst = (said[word] for word in _WORDS)
+    return Faults(round(1000 * delay), round(1000 * jitter), loss, duplication, reordering, burst)
+
+
 class Links(Part):
     """Faults of one kind of link."""
 
@@ -41,7 +48,24 @@ class Links(Part):
     duplication: Share = 0.0
     reordering: Share = 0.0
     burst: Burst = Field(0.0, description="mean number of messages lost in a row; 0: each on its own")
-    directions: tuple[Direction, ...] = Field((), description="where it differs; the last that fits counts")
+    directions: tuple[Direction, ...] = Field(
+        (), max_length=64, description="where it differs; the last that fits counts"
+    )
+
+    @model_validator(mode="after")
+    def _bursts(self) -> Self:
+        """Whoever speaks to whom: as long a burst as so much loss needs."""
+        said = {end for one in self.directions for end in (one.sender, one.receiver)}
+        ends: list[set[str | int]] = [{role} for role in ROLES]
+        ends += [{role, end} for role in _WITH_ID for end in said if isinstance(end, int)]
+        for sender, receiver in product(ends if self.directions else ends[:1], repeat=2):
+            faults = self.between(sender, receiver)
+            if 0 < faults.burst < faults.least_burst:
+                raise ValueError(
+                    f"burst = {faults.burst:g} with loss = {faults.loss:g}; "
+                    f"allowed: 0, or {faults.least_burst:.3g} and more"
+                )
+        return self
 
     @property
     def faults(self) -> Faults:
@@ -79,8 +103,3 @@ class PartitionPart(Part):
     at_s: Seconds = Field(description="after the goal event")
     for_s: Duration
     members: tuple[System, ...] = Field(min_length=1, description="system ids")
-
-
-def _faults(said: dict[str, float]) -> Faults:
-    delay, jitter, loss, duplication, reordering, burst = (said[word] for word in _WORDS)
-    return Faults(round(1000 * delay), round(1000 * jitter), loss, duplication, reordering, burst)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from outrider.scenario import Scenario
 from outrider.scenario_places import Points, Ring
+from outrider.streams import Stream, stream
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ def starts(scenario: Scenario, seed: int, planar: bool) -> Starts:
         if scenario.task == "antipodal":
             goals = slots.copy()
             goals[:, :2] = 2.0 * np.array(config.centre) - slots[:, :2]
-    random = np.random.default_rng(seed)
+    random = stream(seed, Stream.STARTS)
     direction = random.normal(size=(count, 3))
     if planar:
         direction[:, 2] = 0.0

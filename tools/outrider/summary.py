@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.surface import circle_error
+from outrider.falls import first_fall
 from outrider.outcome import Outcome
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
     everything = truth.samples()
     tallies = flight.tallies
     plan_ms = _ns_to_ms([after.plan_ns[len(before.plan_ns) :] for before, after in tallies])
-    simulated = (everything.time[-1] - everything.time[0]) * 1e-6 if len(everything.time) else 0.0
+    simulated = float(everything.time[-1] - everything.time[0]) * 1e-6 if len(everything.time) else 0.0
     converged: bool | None = None
     seconds: float | None = None
     if scenario.has_goal:
@@ -84,8 +85,11 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "estimate_error_m": _percentiles(np.linalg.norm(samples.estimate_error, axis=-1), 95, "max"),
         "messages": flight.messages._asdict(),
         "deadline_misses": None if late is None else late.misses,
-        "lateness_ms": None if late is None else {"p50": late.p50_ms, "p99": late.p99_ms, "max": late.max_ms},
-        "failure": flight.failure,
+        "deadline_steps": None if late is None else late.deadlines,
+        "lateness_ms": None
+        if late is None
+        else {"p50": round(late.p50_ms, 3), "p99": round(late.p99_ms, 3), "max": round(late.max_ms, 3)},
+        "failure": flight.failure or first_fall(flight),
         "simulated_s": round(simulated, 3),
         "wall_s": round(cost.wall, 3),
         "cpu_s": round(cost.cpu, 3),

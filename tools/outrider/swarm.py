@@ -9,36 +9,34 @@ from pathlib import Path
 from typing import NamedTuple
 
 import yaml
-from pydantic import ValidationError
-from pydantic_core import ErrorDetails
 
 from mavlink_bridge.frames import FleetFrame
 from outrider import figures
-from outrider.errors import InputError
+from outrider.errors import Fault, InputError
 from outrider.flight import Flight, Progress
+from outrider.interruption import interruptible
+from outrider.options import METHODS, Options, apply
 from outrider.outcome import Outcome
 from outrider.resources import config_root, find
 from outrider.scenario import RecordedTarget, Scenario
+from outrider.scenario_faults import MotorFailure
 from outrider.summary import Cost, Value, summarise, write
 from outrider.targets import load as load_log
 from outrider.yaml_file import load
 from sitl.config import VehicleConfig
 
-METHODS = ("baseline", "tangential")
-
-
-class Options(NamedTuple):
-    """What the command line changes in a scenario; None leaves the file's value."""
-
-    method: str | None = None
-    avoidance: str | None = None
-    planar: bool = False
-    vehicles: int | None = None
-    loss: float | None = None
-    delay_ms: float | None = None
-    sensors: str | None = None
-    replan_hz: float | None = None
-    wind: str | None = None
+__all__ = [
+    "LOCK_STEP",
+    "METHODS",
+    "Options",
+    "Pace",
+    "Prepared",
+    "apply",
+    "fly",
+    "measure",
+    "prepare",
+    "run_directory",
+]
 
 
 class Pace(NamedTuple):
@@ -60,83 +58,44 @@ class Prepared(NamedTuple):
 
 def prepare(name: str, options: Options) -> Prepared:
     """Load a scenario by name or path and apply ``options``. InputError in one line for whatever is wrong."""
-    scenario = load(find("scenarios", name), Scenario)
-    scenario = apply(scenario, options)
+    path = find("scenarios", name)
+    scenario = apply(load(path, Scenario), options)
     if isinstance(scenario.target, RecordedTarget):
         # Before a run directory is made: a log that cannot be used leaves none behind.
         origin = scenario.origin
         frame = FleetFrame(origin.latitude, origin.longitude, origin.altitude)
         load_log(scenario.target, config_root() / "logs" / scenario.target.log, frame)
-    return Prepared(scenario, load(find("vehicles", scenario.vehicle), VehicleConfig))
-
-
-def apply(scenario: Scenario, options: Options) -> Scenario:
-    """The scenario with the options' changes, checked as a whole again."""
-    changes: dict[str, object] = {}
-    companion: dict[str, object] = {}
-    if options.method is not None:
-        companion["methods"] = _methods(options.method)
-    if options.avoidance not in (None, "field"):
-        raise InputError(f"--avoidance {options.avoidance}: allowed is 'field'")
-    if options.planar:
-        companion["planar"] = True
-    if options.vehicles is not None:
-        changes["vehicles"] = options.vehicles
-    if options.sensors is not None:
-        changes["sensors"] = options.sensors
-    if options.wind is not None:
-        changes["weather"] = {**scenario.weather.model_dump(), "wind": _wind(options.wind)}
-    if options.replan_hz is not None:
-        if not 0.1 <= options.replan_hz <= 1000.0:
-            raise InputError(f"--replan-hz {options.replan_hz}: allowed are 0.1 to 1000")
-        companion["rates"] = {
-            **scenario.companion.rates.model_dump(),
-            "replan_us": round(1e6 / options.replan_hz),
-        }
-    if options.loss is not None or options.delay_ms is not None:
-        links = scenario.links.model_dump()
-        for link in ("swarm", "target"):
-            if options.loss is not None:
-                links[link]["loss"] = options.loss
-            if options.delay_ms is not None:
-                links[link]["delay_ms"] = options.delay_ms
-        changes["links"] = links
-    if companion:
-        changes["companion"] = {**scenario.companion.model_dump(), **companion}
-    if not changes:
-        return scenario
-    try:
-        return Scenario.model_validate({**scenario.model_dump(), **changes})
-    except ValidationError as error:
-        # An option may stand for several links: its fault is one.
-        raise InputError(*dict.fromkeys(map(_option_fault, error.errors()))) from None
-
-
-def _option_fault(error: ErrorDetails) -> str:
-    if not error["loc"]:
-        return f"options: {error['msg']}"
-    name = str(error["loc"][-1])
-    option = "--replan-hz" if name == "replan_us" else f"--{name.replace('_', '-')}"
-    return f"{option} ({name} = {error['input']!r}): {error['msg']}"
+    vehicle = load(find("vehicles", scenario.vehicle), VehicleConfig)
+    last = len(vehicle.rotors) - 1
+    wrong = [
+        Fault(str(path), f"faults[{index}].rotor is {fault.rotor}; {scenario.vehicle} has rotors 0 to {last}")
+        for index, fault in enumerate(scenario.faults)
+        if isinstance(fault, MotorFailure) and fault.rotor > last
+    ]
+    if wrong:
+        raise InputError(*wrong)
+    return Prepared(scenario, vehicle)
 
 
 def fly(
     prepared: Prepared, seed: int, directory: Path, progress: Progress, pace: Pace = LOCK_STEP
 ) -> dict[str, Value]:
-    """Fly it, and leave logs, the resolved configuration, the summary and the picture in ``directory``."""
-    scenario = prepared.scenario
-    resolved = {"seed": seed, "scenario": scenario.model_dump(mode="json")}
-    (directory / "configuration.yaml").write_text(
-        yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True), encoding="utf-8"
-    )
-    if pace.real_time:
-        outcome, cost = _flown_in_real_time(prepared, seed, progress, directory, pace)
-    else:
-        outcome, cost = _flown(prepared, seed, progress, directory)
-    summary = summarise(outcome, cost, directory)
-    write(summary, directory / "summary.json")
-    figures.draw(outcome, summary, directory / "flight.png")
-    return summary
+    """Fly it, and leave logs, the resolved configuration, the summary and the picture in ``directory``.
+    OutriderError if somebody stops it."""
+    with interruptible(f"{directory} keeps the configuration and the logs up to there, but no summary"):
+        scenario = prepared.scenario
+        resolved = {"seed": seed, "scenario": scenario.model_dump(mode="json")}
+        (directory / "configuration.yaml").write_text(
+            yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True), encoding="utf-8"
+        )
+        if pace.real_time:
+            outcome, cost = _flown_in_real_time(prepared, seed, progress, directory, pace)
+        else:
+            outcome, cost = _flown(prepared, seed, progress, directory)
+        summary = summarise(outcome, cost, directory)
+        write(summary, directory / "summary.json")
+        figures.draw(outcome, summary, directory / "flight.png")
+        return summary
 
 
 def measure(prepared: Prepared, seed: int) -> dict[str, Value]:
@@ -205,28 +164,3 @@ def _made(path: Path) -> Path:
     except OSError as error:
         raise InputError(f"{path}: cannot be made: {error.strerror}") from None
     return path
-
-
-def _wind(text: str) -> list[float]:
-    """``V`` m/s towards east, or ``EAST,NORTH`` or ``EAST,NORTH,UP``."""
-    try:
-        parts = [float(word) for word in text.split(",")]
-    except ValueError:
-        parts = []
-    if not 1 <= len(parts) <= 3:
-        raise InputError(
-            f"--wind {text}: allowed is a speed in m/s (towards east), or EAST,NORTH or EAST,NORTH,UP"
-        )
-    return parts + [0.0] * (3 - len(parts))
-
-
-def _methods(text: str) -> tuple[str, ...]:
-    names = tuple(text.split("+"))
-    for name in names:
-        if name not in METHODS:
-            raise InputError(
-                f"--method {text}: {name!r} is no method; allowed are {', '.join(METHODS)}, joined by +"
-            )
-    if len(set(names)) < len(names):
-        raise InputError(f"--method {text}: a method is there twice; allowed: once")
-    return names

@@ -66,6 +66,10 @@ class Encounters:
         self.minimum = min(self.minimum, least)
         if least < self._least or self._below.any():
             below = np.vstack([self._below, distances < self._least])
+            # A pair of which nothing is known for a moment is where it was.
+            unknown = np.isnan(distances)
+            for step in np.flatnonzero(unknown.any(axis=1)):
+                below[step + 1] |= below[step] & unknown[step]
             self.count += int((below[1:] & ~below[:-1]).sum())
             self._below = below[-1]
 
@@ -84,7 +88,7 @@ class Truth:
             vehicles * (0 if self._fixed is None else len(self._fixed)), limits.obstacles
         )
         self._target_counts = limits.target is not None
-        # What no distance has been worked out of yet: the track before each sample, and the target's place.
+        # What no distance has been worked out of yet: the tracks before each sample, and the target's.
         self._tracks: list[Array] = []
         self._places: list[Array] = []
         self._rows: list[tuple[int, Array, Array]] = []
@@ -108,14 +112,13 @@ class Truth:
         self._work_out()
         return self._obstacles
 
-    def take(self, now: int, track: Array, rows: Array, target: Array | None) -> None:
-        """A sample at ``now`` (µs): the positions ``track`` (n, K, 3) at all physics steps since the one
-        before, ENU, NaN on the ground; the ``rows`` (K, ROW); the target's place (3,), None where it is not
-        there."""
-        place = NOWHERE if target is None else target
-        self._rows.append((now, rows, place))
+    def take(self, now: int, track: Array, rows: Array, target: Array) -> None:
+        """A sample at ``now`` (µs) with the ``rows`` (K, ROW), and at all physics steps since the one before
+        the positions ``track`` (n, K, 3), ENU, NaN on the ground, and those of the ``target`` (n, 3), NaN
+        where it is not there."""
+        self._rows.append((now, rows, target[-1]))
         self._tracks.append(track)
-        self._places.append(place)
+        self._places.append(target)
         if len(self._tracks) * len(track) * (1 + len(self._pairs[0])) > _TOGETHER:
             self._work_out()
 
@@ -130,7 +133,7 @@ class Truth:
         least = np.fmin.reduce(distance, axis=1, initial=np.inf)
         self._least += [float(part.min(initial=np.inf)) for part in np.split(least, np.cumsum(lengths)[:-1])]
         if self._target_counts:
-            off = track - np.repeat(self._places, lengths, axis=0)[:, None]
+            off = track - np.concatenate(self._places)[:, None]
             self._target.see(np.sqrt(np.einsum("tki,tki->tk", off, off)))
         if self._fixed is not None:
             self._obstacles.see(self._fixed.distance(track).reshape(len(track), -1))

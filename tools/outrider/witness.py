@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -22,6 +22,7 @@ class Witness:
         self._last = -1
         self._next = 0
         self._pending: list[Array] = []
+        self._times: list[int] = []
 
     def see(self, now: int) -> bool:
         """Take in the physics steps since the last call; whether a sample was taken at ``now``."""
@@ -34,14 +35,21 @@ class Witness:
             if not autopilot.airborne:
                 track[:, k] = np.nan
         self._pending.append(track)
+        self._times += times.tolist()
         if now < self._next:
             return False
         self._next = now + SAMPLE
-        place = self._target.position(now)
         track = ned_to_enu(np.concatenate(self._pending))
+        self._truth.take(now, track, rows(self._autopilots), places(self._target, self._times))
         self._pending.clear()
-        self._truth.take(now, track, rows(self._autopilots), place)
+        self._times.clear()
         return True
+
+
+def places(target: Target, times: Iterable[int]) -> Array:
+    """Where the target is (n, 3) at ``times`` (µs, not decreasing), ENU; NaN where it is not there."""
+    found = [target.position(time) for time in times]
+    return np.array([NOWHERE if place is None else place for place in found])
 
 
 def rows(autopilots: Sequence[Autopilot]) -> Array:

@@ -174,7 +174,8 @@ class _Reading:
             self.flaws.append(
                 Flaw(at, f"alias {_shown(event.anchor or '')} names no finished value above it")
             )
-            return _Sized(Broken(at), 0, 1)
+            self._charge(_WEIGHT_OF_NODE, at)
+            return _Sized(Broken(at), _WEIGHT_OF_NODE, 1)
         if depth + sized.height - 1 > MOST_DEPTH:
             raise _Stop(Flaw(at, f"nested too deeply by an alias; allowed: {MOST_DEPTH} levels"))
         self._charge(sized.weight, at)
@@ -187,12 +188,11 @@ class _Reading:
             raise _Stop(Flaw(at, f"too much, aliases expanded; allowed: {most} values"))
 
     def _scalar(self, event: yaml.ScalarEvent, at: int) -> Tree:
-        text = event.value
-        self._charge(len(text), at)
+        self._charge(len(event.value), at)
         try:
-            text.encode()
+            text = _joined(event.value)
             value = resolve(text) if event.style is None else text
-        except UnicodeEncodeError:
+        except UnicodeDecodeError:
             self.flaws.append(Flaw(at, "half of a surrogate pair is no character"))
             return Broken(at)
         except ScalarError as error:
@@ -238,6 +238,12 @@ class _Reading:
 
 def _start(event: yaml.Event) -> int:
     return 0 if event.start_mark is None else event.start_mark.index
+
+
+def _joined(text: str) -> str:
+    """``text`` with surrogate pairs put together, as JSON escapes what lies beyond U+FFFF; UnicodeDecodeError
+    for half a pair."""
+    return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le")
 
 
 def _syntax_flaw(error: yaml.MarkedYAMLError) -> Flaw:

@@ -19,17 +19,19 @@ class Board:
     """For ``vehicles`` vehicles; made before the processes fork, which share it from then on.
 
     Times are µs, 0 for not yet. ``goal``: the goal event; ``end``: the end of the clock; ``stop``: all shall
-    end; ``gone`` (K,): the companions that shall end.
+    end; ``gone`` (K,): the companions that shall end; ``thaws`` (K,): how often each was let go on after it
+    had been stopped.
     """
 
     def __init__(self, vehicles: int) -> None:
-        numbers = 8 * (3 + vehicles * (_COLUMNS + 3))
+        numbers = 8 * (3 + vehicles * (_COLUMNS + 4))
         self._memory = mmap.mmap(-1, numbers + vehicles * _TEXT)
-        flags = np.frombuffer(self._memory, dtype=np.int64, count=3 + 3 * vehicles)
+        flags = np.frombuffer(self._memory, dtype=np.int64, count=3 + 4 * vehicles)
         self._flags = flags
         self.gone: NDArray[np.int64] = flags[3 : 3 + vehicles]
         self._ready: NDArray[np.int64] = flags[3 + vehicles : 3 + 2 * vehicles]
-        self._armed: NDArray[np.int64] = flags[3 + 2 * vehicles :]
+        self._armed: NDArray[np.int64] = flags[3 + 2 * vehicles : 3 + 3 * vehicles]
+        self.thaws: NDArray[np.int64] = flags[3 + 3 * vehicles :]
         rows = np.frombuffer(self._memory, dtype=np.float64, offset=flags.nbytes, count=vehicles * _COLUMNS)
         self._rows: NDArray[np.float64] = rows.reshape(vehicles, _COLUMNS)
         self._rows[:] = np.nan

@@ -20,7 +20,8 @@ from mavlink_bridge.histogram import Histogram
 from mavlink_bridge.node_clock import QUANTUM
 from mavlink_bridge.realtime import RealTime
 from mavlink_bridge.runtime import Scheduled
-from outrider.conductor import Conductor, Sight, Stage
+from outrider import names
+from outrider.conductor import PREPARE_CAP, Conductor, Sight, Stage
 from outrider.disturbances import Event, events, strike_computer
 from outrider.errors import OutriderError
 from outrider.fleet import Fleet
@@ -122,12 +123,15 @@ class RealTimeFlight:
             raise OutriderError("; ".join(faults))
         traces = [path for path in (scratch / f"trace-{system}" for system in systems) if path.exists()]
         if len(traces) < scenario.vehicles:
-            raise OutriderError("an autopilot's process was killed: there is no truth about its vehicle")
+            raise OutriderError(_nothing(conductor, "an autopilot's process was killed"))
+        found_traces = [Trace.load(path) for path in traces]
+        if not all(len(trace.times) for trace in found_traces):
+            raise OutriderError(_nothing(conductor, "an autopilot never began"))
         truth = Truth(scenario.vehicles, limits(scenario), FixedObstacles(scenario.obstacles))
         period, target = self.fleet.vehicle.physics_period, self.fleet.target()
-        put_together([Trace.load(path) for path in traces], period, target, conductor.clock_start, truth)
+        put_together(found_traces, period, target, conductor.clock_start, truth)
         self.priority_told = next((found.priority for found in remains.values() if found.priority), "")
-        companions = [remains[f"companion-{system}"] for system in systems]
+        companions = [remains[names.companion(system)] for system in systems]
         return Outcome(
             scenario,
             self.seed,
@@ -145,7 +149,7 @@ class RealTimeFlight:
                 operators.dropped + sum(found.dropped for found in remains.values()),
                 sum(found.bad for found in companions),
             ),
-            _punctuality(remains.values(), companions),
+            _punctuality(companions),
         )
 
 
@@ -175,10 +179,10 @@ class _Leader:
         self._check(now, interrupted)
         positions, velocities = board.positions, board.velocities
         if np.isnan(positions).any():
-            return False
+            return self._blind(now)
         self._progress(conductor.stage, 1e-6 * (now - (self._began if start is None else start)))
         waiting = tuple(
-            f"companion-{system} waits for {board.waiting(k)}"
+            f"{names.companion(system)} waits for {board.waiting(k)}"
             for k, system in enumerate(self._fleet.systems)
             if not board.ready[k] and not board.gone[k]
         )
@@ -191,6 +195,14 @@ class _Leader:
         if conductor.clock_end is not None and not board.end:
             board.end = conductor.clock_end
         return over
+
+    def _blind(self, now: int) -> bool:
+        """While somebody has not been seen yet; True ends the run: nothing comes of it any more."""
+        unseen = np.isnan(self._board.positions).any(axis=1)
+        if now - (self._began or now) > PREPARE_CAP:
+            systems = [str(self._fleet.systems[k]) for k in np.flatnonzero(unseen)]
+            self._conductor.abort(now, f"vehicles never seen: {', '.join(systems)}")
+        return self._conductor.stage is not Stage.PREPARE
 
     def _check(self, now: int, interrupted: bool) -> None:
         """Land everybody if somebody asked for it, or if a process is gone that should be there."""
@@ -210,10 +222,12 @@ class _Leader:
     # What happens to companions' computers; partitions are each companion's own.
 
     def freeze(self, system: int) -> None:
-        self._crew.freeze(f"companion-{system}")
+        self._crew.freeze(names.companion(system))
 
     def thaw(self, system: int) -> None:
-        self._crew.thaw(f"companion-{system}")
+        # Written while it stands still: its next step sees it.
+        self._board.thaws[self._fleet.systems.index(system)] += 1
+        self._crew.thaw(names.companion(system))
 
     def vanish(self, system: int) -> None:
         self._board.gone[self._fleet.systems.index(system)] = 1
@@ -225,9 +239,16 @@ class _Leader:
         pass
 
 
-def _punctuality(everybody: Collection[Remains], companions: Collection[Remains]) -> Punctuality:
+def _nothing(conductor: Conductor, why: str) -> str:
+    """Why there is no outcome."""
+    said = f"{conductor.failure}; " if conductor.failure else ""
+    return f"{said}{why}: there is no truth about its vehicle"
+
+
+def _punctuality(companions: Collection[Remains]) -> Punctuality:
     lateness = Histogram()
     for found in companions:
         lateness.include(found.lateness)
     p50, p99, largest = (1e-3 * value for value in lateness.spread)
-    return Punctuality(sum(found.misses for found in everybody), p50, p99, largest)
+    misses, deadlines = (sum(getattr(found, of) for found in companions) for of in ("misses", "deadlines"))
+    return Punctuality(misses, deadlines, p50, p99, largest)

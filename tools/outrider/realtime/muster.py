@@ -10,6 +10,7 @@ from mavlink_bridge.clock import Clock
 from mavlink_bridge.node import Node
 from mavlink_bridge.node_clock import QUANTUM
 from mavlink_bridge.runtime import Scheduled
+from outrider import names
 from outrider.disturbances import events
 from outrider.fleet import Fleet
 from outrider.realtime.board import Board
@@ -41,13 +42,19 @@ def muster(
         workers.append(
             AutopilotWorker(k, autopilot, own, trace, behind, every, wiring.autopilots[k], clock, board)
         )
-        senders = {"autopilot": autopilot.name, "swarm": None, "target": "target", "ground": "operator"}
+        senders = {
+            "autopilot": autopilot.name,
+            "swarm": None,
+            "target": names.TARGET,
+            "ground": names.OPERATOR,
+        }
         behind = rough(fleet, companion, senders)
         phase = start + staggered(k, count, timing.companion_us)
         every = Scheduled(behind, timing.companion_us, phase, fleet.clock(k, start))
-        log = logs / f"vehicle-{system}.tlog"
         workers.append(
-            CompanionWorker(k, companion, cuts, log, behind, every, wiring.companions[k], clock, board)
+            CompanionWorker(
+                k, companion, cuts, system, logs, behind, every, wiring.companions[k], clock, board
+            )
         )
     target = fleet.target()
     behind = rough(fleet, target, {})

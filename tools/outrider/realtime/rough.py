@@ -8,13 +8,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from mavlink_bridge.ether import Channel, Ether
 from mavlink_bridge.header import sending_system
 from mavlink_bridge.node import Datagram, Node
+from outrider import names
 
 
 class Rough:
     """``node`` behind ``ether``, in which every channel leads from one sender to it.
 
     ``senders``: for each link the node at its other end; None where there are many, who are told by the
-    system id in the header. What no channel is for is dropped.
+    system id in the header. What comes from elsewhere, as on a multicast group that others use too, is
+    dropped.
     """
 
     def __init__(
@@ -23,6 +25,7 @@ class Rough:
         self.node = node
         self._senders = senders
         self._channels = [channel.name for channel in channels]
+        self._known = {end for channel in channels for end in channel.members.items() if end[0] != node.name}
         self.ether = Ether(channels, seed, tick)
 
     @property
@@ -33,21 +36,22 @@ class Rough:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """As the node, with what has come through the ether by ``now``."""
         for datagram in inbox:
-            sender = self._senders[datagram.link] or f"companion-{sending_system(datagram.data)}"
-            self.ether.send(now, sender, [datagram])
+            sender = self._senders.get(datagram.link) or names.companion(sending_system(datagram.data))
+            if (sender, datagram.link) in self._known:
+                self.ether.send(now, sender, [datagram])
         return self.node.step(now, self.ether.receive(now, self.node.name))
 
     def cut(self, members: Iterable[str]) -> None:
         """Nothing passes on the swarm's channels between ``members`` and others."""
-        names = list(members)
+        inside = list(members)
         for channel in self._swarm:
-            self.ether.cut(channel, names)
+            self.ether.cut(channel, inside)
 
     def heal(self, members: Iterable[str]) -> None:
         """It passes again."""
-        names = list(members)
+        inside = list(members)
         for channel in self._swarm:
-            self.ether.heal(channel, names)
+            self.ether.heal(channel, inside)
 
     @property
     def _swarm(self) -> list[str]:

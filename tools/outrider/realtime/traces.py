@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mavlink_bridge.frames import ned_to_enu
 from outrider.targets import Target
 from outrider.truth import ROW, SAMPLE, Array, Truth
-from outrider.witness import rows
+from outrider.witness import places, rows
 from sitl.node import Autopilot
 
 
@@ -79,10 +79,10 @@ def put_together(traces: list[Trace], period: int, target: Target, goal: int | N
         if goal is not None and not begun and now >= goal:
             target.begin(goal)
             begun = True
-        place = target.position(now)
         steps = np.arange(now - SAMPLE + period, now + 1, period)
         track = np.stack([_at(trace, steps) for trace in traces], axis=1)
-        truth.take(now, track, np.array([_sample(trace, now) for trace in traces]), place)
+        sampled = np.array([_sample(trace, now) for trace in traces])
+        truth.take(now, track, sampled, places(target, steps.tolist()))
 
 
 def _at(trace: Trace, steps: NDArray[np.int64]) -> Array:

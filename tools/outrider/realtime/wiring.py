@@ -13,7 +13,6 @@ from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.links.udp import UdpListener
 
 _HOST = "127.0.0.1"
-_GROUP = "239.255.145.50"
 
 
 class Wiring(NamedTuple):
@@ -35,7 +34,6 @@ class Wiring(NamedTuple):
 
 def wire(vehicles: int, clock: Clock) -> Wiring:
     """Open all links, on ports that are free now. LinkError if one cannot be opened; then none stays open."""
-    swarm, target = (f"mcast:{_GROUP}:{port},{_HOST}" for port in _free_ports(2))
     with ExitStack() as opened:
 
         def opening(endpoint: str) -> Link:
@@ -46,9 +44,11 @@ def wire(vehicles: int, clock: Clock) -> Wiring:
         autopilots: list[dict[str, list[Link]]] = []
         companions: list[dict[str, list[Link]]] = []
         operator: list[Link] = []
-        for _ in range(vehicles):
+        listening = [(opening(f"udpin:{_HOST}:0"), opening(f"udpin:{_HOST}:0")) for _ in range(vehicles)]
+        group = _group(_port(listening[0][0]))
+        swarm, target = (f"mcast:{group}:{port},{_HOST}" for port in _free_ports(2))
+        for vehicle, ground in listening:
             # As real ones do, the autopilot speaks first.
-            vehicle, ground = opening(f"udpin:{_HOST}:0"), opening(f"udpin:{_HOST}:0")
             autopilots.append({"autopilot": [opening(f"udpout:{_HOST}:{_port(vehicle)}")]})
             companions.append(
                 {
@@ -68,6 +68,12 @@ def _port(link: Link) -> int:
     if not isinstance(link, UdpListener):
         raise TypeError(f"{link!r} has no port of its own")
     return int(link.address[1])
+
+
+def _group(port: int) -> str:
+    """A multicast group (of those of RFC 2365 for local use) of this run's own: no other run on this machine
+    has the unicast ``port``."""
+    return f"239.255.{port >> 8}.{port & 255}"
 
 
 def _free_ports(count: int) -> list[int]:

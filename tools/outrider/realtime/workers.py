@@ -21,20 +21,25 @@ from mavlink_bridge.links.link import Link
 from mavlink_bridge.priority import LEVEL, ask_for_priority, sharpen_timers
 from mavlink_bridge.realtime import RealTime
 from mavlink_bridge.runtime import Scheduled, Tap
-from mavlink_bridge.tlog import TlogWriter
+from outrider import names
 from outrider.disturbances import Event, strike_autopilot, strike_computer
-from outrider.flight import LINK_NUMBERS
 from outrider.realtime.board import Board
 from outrider.realtime.rough import Rough
 from outrider.realtime.traces import TraceWriter
+from outrider.recorder import Recorder
 from outrider.targets import Target
 from sitl.node import Autopilot
+
+TOLERANCE = 1_000
+"""µs; a deadline whose step begins later than that is missed: a tenth of a companion's usual period."""
 
 
 @dataclass
 class Remains:
-    """What a process leaves behind."""
+    """What a process leaves behind. ``deadlines`` passed, from the first step to the last; ``misses`` of them
+    had no step within the tolerance."""
 
+    deadlines: int = 0
     misses: int = 0
     lateness: Histogram = field(default_factory=Histogram)
     sent: int = 0
@@ -66,6 +71,10 @@ class Worker:
     def over(self) -> bool:
         """Whether to end: it was said, or the parent is gone."""
         return self.board.stop or os.getppid() != self._parent
+
+    def excused(self) -> bool:
+        """Whether it was stopped on purpose since this was asked for the last time."""
+        return False
 
     def begin(self, now: int) -> None:
         """The goal event, at ``now`` µs."""
@@ -101,12 +110,22 @@ class Worker:
 
     def _run(self) -> None:
         with IdleCollector() as garbage, ExitStack() as files:
-            loop = RealTime(self._scheduled, self.links, self._clock, self.taps(files), on_idle=garbage.idle)
+            loop = RealTime(
+                self._scheduled,
+                self.links,
+                self._clock,
+                self.taps(files),
+                tolerance=TOLERANCE,
+                on_idle=garbage.idle,
+                excused=self.excused,
+            )
             try:
                 statistics = loop.run(self.over, self._stepped)
             finally:
-                self.remains.lateness = loop.deadlines.lateness
-                self.remains.misses = loop.deadlines.misses
+                due = loop.deadlines
+                self.remains.lateness = due.lateness
+                self.remains.deadlines = due.lateness.count + due.skipped
+                self.remains.misses = due.misses + due.skipped
         counters = self.rough.ether.counters
         self.remains.sent = counters.sent
         self.remains.dropped = counters.dropped + statistics.overruns
@@ -158,14 +177,15 @@ class AutopilotWorker(Worker):
 
 
 class CompanionWorker(Worker):
-    """A companion; it writes its vehicle's tlog."""
+    """A companion; it writes its vehicle's tlog in ``logs``."""
 
     def __init__(
         self,
         k: int,
         node: Companion,
         events: list[Event],
-        log: Path,
+        system: int,
+        logs: Path,
         rough: Rough,
         scheduled: Scheduled,
         links: dict[str, list[Link]],
@@ -175,13 +195,18 @@ class CompanionWorker(Worker):
         super().__init__(rough, scheduled, links, clock, board)
         self._k, self._node = k, node
         self._events = deque(events)
-        self._log = log
+        self._system, self._logs = system, logs
+        self._thaws = 0
         self._shown: tuple[bool, str] | None = None
         self._first: Tally | None = None
         self._last: Tally | None = None
 
     def over(self) -> bool:
         return bool(self.board.gone[self._k]) or super().over()
+
+    def excused(self) -> bool:
+        before, self._thaws = self._thaws, int(self.board.thaws[self._k])
+        return self._thaws != before
 
     def begin(self, now: int) -> None:
         self._first = self._node.tally
@@ -205,10 +230,7 @@ class CompanionWorker(Worker):
         super().leave(path)
 
     def taps(self, files: ExitStack) -> list[Tap]:
-        writer = files.enter_context(TlogWriter(self._log))
-        return [
-            lambda now, _node, _way, datagram: writer.write(now, LINK_NUMBERS[datagram.link], datagram.data)
-        ]
+        return [Recorder(self._logs, [self._system], files)]
 
 
 class TargetWorker(Worker):
@@ -247,7 +269,7 @@ class _Radio:
         """The parent ends it."""
 
     def cut(self, systems: tuple[int, ...]) -> None:
-        self._rough.cut(f"companion-{system}" for system in systems)
+        self._rough.cut(map(names.companion, systems))
 
     def heal(self, systems: tuple[int, ...]) -> None:
-        self._rough.heal(f"companion-{system}" for system in systems)
+        self._rough.heal(map(names.companion, systems))

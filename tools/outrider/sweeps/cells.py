@@ -21,6 +21,7 @@ from outrider.sweeps.grid import Point, Sweep, overlay, points
 from outrider.sweeps.scenes import Scene
 from outrider.sweeps.tasks import Task
 from outrider.yaml_file import load, read
+from outrider.yaml_scalars import ScalarError, resolve
 
 Model = TypeVar("Model", bound=BaseModel)
 _KEY_LENGTH = 20
@@ -78,10 +79,26 @@ def scenario_of(task: Task) -> Scenario:
 def scenario_text(scenario: Scenario) -> str:
     """A scenario file that loads as exactly this scenario, every number to the last bit."""
     # A wide page: no value is folded over lines.
-    text: str = yaml.safe_dump(
-        scenario.model_dump(mode="json"), sort_keys=False, allow_unicode=True, width=4096
+    text: str = yaml.dump(
+        scenario.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=4096
     )
     return text
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes whatever our own reader would not take for text: ``1E5`` is a number in YAML 1.2 and in JSON,
+    but not in the YAML 1.1 that the library writes."""
+
+    def represent_str(self, data: str) -> yaml.ScalarNode:
+        """A text, quoted if it has to be."""
+        try:
+            is_text = resolve(data) == data
+        except ScalarError:
+            is_text = False
+        return self.represent_scalar("tag:yaml.org,2002:str", data, style=None if is_text else "'")
+
+
+_Dumper.add_representer(str, _Dumper.represent_str)
 
 
 def _cell(sweep: Sweep, point: Point, number: int) -> Cell:

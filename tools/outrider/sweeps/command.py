@@ -25,6 +25,7 @@ from outrider.sweeps.pool import Pool
 from outrider.sweeps.progress import Watch, duration, watching
 from outrider.sweeps.report import CellReport, cell_report, document, exit_status
 from outrider.sweeps.runs import Run, run_of
+from outrider.sweeps.sources import digest, sources
 from outrider.sweeps.table import show
 from outrider.sweeps.tasks import Entry, Task
 from outrider.yaml_file import load
@@ -145,14 +146,15 @@ def _ended(journal: Journal, one: Task) -> bool:
 
 def _header(spec: Sweep, found: Sequence[Cell]) -> Header:
     """The sweep is its cells: more runs of the same go on in the same journal."""
-    digest = hashlib.sha256(" ".join(sorted(cell.key for cell in found)).encode()).hexdigest()
+    of_cells = hashlib.sha256(" ".join(sorted(cell.key for cell in found)).encode()).hexdigest()
     versions = {"python": platform.python_version(), "machine": platform.machine()}
+    versions["code"] = digest(sources())
     for package in _PACKAGES:
         try:
             versions[package] = version(package)
         except PackageNotFoundError:
             versions[package] = "none"
-    return Header(spec.name, digest, versions)
+    return Header(spec.name, of_cells, versions)
 
 
 def _cores() -> int:

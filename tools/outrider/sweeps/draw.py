@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import JsonValue
 
+from outrider.streams import Stream, stream
 from outrider.sweeps.grid import leaves, overlay
 from outrider.sweeps.places import Array, Circles, obstacles, scatter, walk
 from outrider.sweeps.scenes import Scene
@@ -20,7 +21,6 @@ _MARGIN = 10.0
 """m around all places within which the planner may move."""
 _LEAST_RADIUS = 4.0
 """m, of the circle around an escorted target; it grows with the number of vehicles."""
-_FLEET, _STARTS, _GOALS, _TARGET, _OBSTACLES = range(5)
 
 
 class Dials(NamedTuple):
@@ -38,7 +38,7 @@ class Dials(NamedTuple):
 
 def vehicles(scene: Scene, seed: int) -> int:
     """How many vehicles the seed draws."""
-    return int(_stream(seed, _FLEET).integers(scene.vehicles[0], scene.vehicles[1] + 1))
+    return int(stream(seed, Stream.SCENE_FLEET).integers(scene.vehicles[0], scene.vehicles[1] + 1))
 
 
 def dials(scene: Scene, count: int) -> Dials:
@@ -68,7 +68,7 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
     count = vehicles(scene, seed)
     dial = dials(scene, count)
     where = f"scene {scene.name!r}, seed {seed}"
-    starts = scatter(_stream(seed, _STARTS), scene, count, dial.half, f"{where}: start")
+    starts = scatter(stream(seed, Stream.SCENE_STARTS), scene, count, dial.half, f"{where}: start")
     document: dict[str, JsonValue] = {
         "name": f"{scene.name}-{seed}",
         "description": f"drawn from scene {scene.name} with seed {seed}, difficulty {scene.difficulty:g}",
@@ -79,7 +79,7 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
     companion: dict[str, JsonValue] = {"task": scene.task}
     radius = 0.0
     if scene.task == "goto":
-        goals = scatter(_stream(seed, _GOALS), scene, count, dial.half, f"{where}: goal")
+        goals = scatter(stream(seed, Stream.SCENE_GOALS), scene, count, dial.half, f"{where}: goal")
         extent, last_jump = dial.half, 0.0
         document["target"] = {"kind": "fixed", "at": [0.0, 0.0, 0.0]}
         kept = [Circles(np.vstack([starts, goals])[:, :2], np.zeros(2 * count))]
@@ -87,7 +87,7 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
         goals = None
         radius = round(max(_LEAST_RADIUS, count * scene.apart / (2.0 * math.pi)), 3)
         extent = max(dial.half, dial.length)
-        places = walk(_stream(seed, _TARGET), dial.jumps, dial.length, extent)
+        places = walk(stream(seed, Stream.SCENE_TARGET), dial.jumps, dial.length, extent)
         last_jump = (dial.jumps - 1) * dial.every_s
         document["target"] = _target(places, dial.every_s)
         companion["surface"] = {"radius": radius}
@@ -101,7 +101,7 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
         "goals": None if goals is None else goals.tolist(),
     }
     document["obstacles"] = obstacles(
-        _stream(seed, _OBSTACLES), scene, (dial.spheres, dial.posts), extent, kept, where
+        stream(seed, Stream.SCENE_OBSTACLES), scene, (dial.spheres, dial.posts), extent, kept, where
     )
     reach = round(extent + radius + _MARGIN, 3)
     companion["limits"] = {
@@ -114,10 +114,6 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
     way = 2.0 * math.sqrt(2.0) * (extent + radius)
     document["cap_s"] = float(min(3600, math.ceil(last_jump + 60.0 + 3.0 * way / dial.speed)))
     return overlay(document, leaves(scene.scenario))
-
-
-def _stream(seed: int, which: int) -> np.random.Generator:
-    return np.random.default_rng([seed, which])
 
 
 def _target(places: Array, every_s: float) -> dict[str, JsonValue]:

@@ -1,0 +1,64 @@
+"""Commands to the autopilot, each repeated until it is acknowledged (COMMAND_LONG and COMMAND_ACK)."""
+
+from __future__ import annotations
+
+from mavlink_bridge.messages import CommandAck, CommandLong, Message, Source
+
+ACCEPTED, IN_PROGRESS = 0, 5
+_RETRY = 500_000
+_EXPIRY = 15_000_000
+"""µs after which an acknowledged command without effect is sent again; longer than a take-off."""
+
+_Call = tuple[int, tuple[float, ...]]
+
+
+class Calls:
+    """What was asked of the autopilot of ``own``'s system, and what it answered; ``refusals`` in words."""
+
+    def __init__(self, own: Source) -> None:
+        self._own = own
+        self.refusals: list[str] = []
+        self._acknowledged: set[_Call] = set()
+        self._sent: dict[_Call, int] = {}
+        self._asked: dict[int, _Call] = {}
+
+    def hear(self, message: CommandAck) -> None:
+        """An answer; it names the command alone and is taken for the last one of that kind."""
+        call = self._asked.pop(message.command, None)
+        if call is None:
+            return
+        if message.result in (ACCEPTED, IN_PROGRESS):
+            self._acknowledged.add(call)
+        else:
+            self.refusals.append(f"command {message.command}: result {message.result}")
+
+    def sent_at(self, command: int, params: tuple[float, ...]) -> int:
+        """When (µs) it was last sent, 0 for never."""
+        return self._sent.get(_key(command, params), 0)
+
+    def forget(self) -> None:
+        """Nothing was asked or answered."""
+        self._sent.clear()
+        self._asked.clear()
+        self._acknowledged.clear()
+
+    def call(self, now: int, command: int, params: tuple[float, ...]) -> list[Message]:
+        """The command, unless it was acknowledged, sent less than half a second ago, or must wait for its
+        turn: COMMAND_ACK names the command alone, so that one of a kind may be open at a time."""
+        key = _key(command, params)
+        if key in self._acknowledged and now - self._sent.get(key, now) > _EXPIRY:
+            # Acknowledged and yet without effect: ask again.
+            self._acknowledged.discard(key)
+        if key in self._acknowledged or self._recent(now, key) or self._recent(now, self._asked.get(command)):
+            return []
+        self._sent[key], self._asked[command] = now, key
+        p1, p2, p3, p4, p5, p6, p7 = params
+        return [CommandLong(self._own, self._own.system, 1, command, 0, (p1, p2, p3, p4, p5, p6, p7))]
+
+    def _recent(self, now: int, call: _Call | None) -> bool:
+        return call is not None and now - self._sent.get(call, -_RETRY) < _RETRY
+
+
+def _key(command: int, params: tuple[float, ...]) -> _Call:
+    # NaN is not itself.
+    return command, tuple(p for p in params if p == p)

@@ -1,0 +1,52 @@
+"""Whoever stops a flight hears what is left of it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from shipped import FIREFLY, scenario
+
+from mavlink_bridge.tlog import read_tlog
+from outrider.conductor import Stage
+from outrider.errors import OutriderError
+from outrider.interruption import interruptible
+from outrider.swarm import Prepared, fly
+
+
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_flight_says_what_is_left_and_leaves_whole_logs(
+    which: signal.Signals, tmp_path: Path
+) -> None:
+    of = scenario("antipodal-8", vehicles=2, airborne=True)
+
+    def watch(stage: Stage, seconds: float) -> None:
+        if stage is Stage.CLOCK and seconds > 0.2:
+            os.kill(os.getpid(), which)
+
+    before = signal.getsignal(which)
+    with pytest.raises(OutriderError, match="logs up to there, but no summary") as caught:
+        fly(Prepared(of, FIREFLY), 1, tmp_path, watch)
+    assert caught.value.exit_status == 3
+    assert str(tmp_path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert signal.getsignal(which) is before
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "configuration.yaml",
+        "vehicle-11.tlog",
+        "vehicle-12.tlog",
+    ]
+    for system in of.systems:
+        log = read_tlog(tmp_path / f"vehicle-{system}.tlog")
+        assert log.report.skipped_bytes == 0
+
+
+def test_what_is_not_stopped_is_left_alone() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    with interruptible("nothing"):
+        assert signal.getsignal(signal.SIGTERM) is not before
+    assert signal.getsignal(signal.SIGTERM) is before
+    with pytest.raises(ZeroDivisionError), interruptible("nothing"):
+        raise ZeroDivisionError

@@ -1,0 +1,173 @@
+"""Good bytes to begin with: a frame of every message that the bridge knows, in both versions; plans; logs."""
+
+from __future__ import annotations
+
+import gzip
+import math
+from collections.abc import Sequence
+from random import Random
+from struct import pack as stamp
+from typing import NamedTuple
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.converters import BY_TYPE, TABLE
+from mavlink_bridge.messages import (
+    Attitude,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    EkfStatus,
+    ExtendedSysState,
+    GlobalPosition,
+    GpsGlobalOrigin,
+    Heartbeat,
+    LocalPosition,
+    Message,
+    Ping,
+    PositionTarget,
+    SetpointLocal,
+    Source,
+    StatusText,
+    SysStatus,
+    SystemTime,
+    Timesync,
+    Tunnel,
+)
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, WirePlan, pack, quantise
+from outrider.resources import config_root
+
+AUTOPILOT, COMPANION, NEIGHBOUR = Source(11, 1), Source(11, 195), Source(12, 195)
+TARGET, GROUND = Source(1, 1), Source(255, 190)
+LATITUDE, LONGITUDE, ALTITUDE = 47.397742, 8.545594, 488.0
+NOW = 1_767_225_600_000_000
+ZERO = (0.0, 0.0, 0.0)
+NAN = math.nan
+_LOG_RECORDS = 60
+
+
+class Known(NamedTuple):
+    """A good message, and where a companion hears it: ``autopilot``, ``swarm``, ``target`` or ``ground``."""
+
+    link: str
+    message: Message
+
+
+def plan(fingerprint: int, epoch: int = NOW) -> Tunnel:
+    """A neighbour's plan, 3 m away and on its way."""
+    knots = [[0.5, -0.5, 0.1]] * 16
+    wire = quantise(epoch, 100_000, [3.0, 0.0, 5.0], [-1.0, 0.5, 0.0], knots, fingerprint)
+    return Tunnel(NEIGHBOUR, 0, 0, PAYLOAD_TYPE, pack(wire))
+
+
+def absurd_plan(random: Random, fingerprint: int, epoch: int) -> Tunnel:
+    """A plan that fits the wire and no vehicle: numbers at the ends of their ranges, steps of any length, or
+    some of its bytes lost or changed."""
+
+    def three(bits: int) -> tuple[int, int, int]:
+        low, high = -(1 << bits - 1), (1 << bits - 1) - 1
+        x, y, z = (random.choice((low, high, 0, 1, random.randint(low, high))) for _ in range(3))
+        return x, y, z
+
+    wire = WirePlan(
+        random.choice((epoch, epoch, epoch, 0, (1 << 56) - 1, epoch - 400_000, epoch + 60_000_000)),
+        4 * random.choice((1, 25_000, 25_000, 0xFFFF, random.randint(1, 0xFFFF))),
+        three(random.choice((8, 11, 32))),
+        three(random.choice((8, 11, 24))),
+        tuple(three(16) for _ in range(random.randint(0, 16))),
+        fingerprint,
+    )
+    data = pack(wire)
+    if random.random() < 0.3:
+        at = random.choice((0, 2, 4, random.randrange(len(data))))
+        data = data[:at] + random.choice((b"\0\0", b"\xff\xff", b"")) + data[at + 2 :]
+    return Tunnel(NEIGHBOUR, 0, 0, PAYLOAD_TYPE, data[:128])
+
+
+def messages(fingerprint: int = 0, now: int = NOW) -> tuple[Known, ...]:
+    """Of every row of the table at least one, with values as in a flight at ``now`` (µs)."""
+    place = LATITUDE, LONGITUDE, ALTITUDE + 5.0
+    boot = now - NOW
+    me = 11, 1
+    found = (
+        Known("autopilot", Heartbeat(AUTOPILOT, 2, 3, 0x89, 4, 4)),
+        Known("autopilot", SysStatus(AUTOPILOT, 0x10000000, 0x10000000, 0x10000000, 12.1, 0.9)),
+        Known("autopilot", SystemTime(AUTOPILOT, now, boot)),
+        Known("autopilot", Ping(GROUND, now, 7, 0, 0)),
+        Known("autopilot", Attitude(AUTOPILOT, boot, 0.01, -0.02, 1.5, (0.0, 0.1, 0.2))),
+        Known("autopilot", LocalPosition(AUTOPILOT, boot, (0.1, 0.2, -5.0), (0.0, 0.1, 0.0))),
+        Known("swarm", GlobalPosition(NEIGHBOUR, boot, *place, 5.0, (0.5, 0.0, 0.0), 1.0)),
+        Known("target", GlobalPosition(TARGET, boot, *place, 5.0, (0.0, 1.0, 0.0), None)),
+        Known("autopilot", GpsGlobalOrigin(AUTOPILOT, LATITUDE, LONGITUDE, ALTITUDE, 1)),
+        Known(
+            "ground",
+            CommandInt(
+                GROUND, 11, 195, 0, 192, (-1.0, 0.0, 0.0, NAN), round(LATITUDE * 1e7), 85_455_940, 493.0
+            ),
+        ),
+        Known("ground", CommandInt(GROUND, *me, 0, 22, (0.0, 0.0, 0.0, NAN), 0, 0, 5.0)),
+        Known("ground", CommandLong(GROUND, 11, 195, 22, 0, (0.0, 0.0, 0.0, NAN, NAN, NAN, 5.0))),
+        *(
+            Known("ground", CommandLong(GROUND, *me, command, 0, params))
+            for command, params in (
+                (176, (1.0, 4.0, *[0.0] * 5)),
+                (176, (1.0, 6.0, *[0.0] * 5)),
+                (400, (1.0, *[0.0] * 6)),
+                (22, (*[NAN] * 6, 5.0)),
+                (511, (30.0, 20_000.0, *[0.0] * 5)),
+                (512, (49.0, *[0.0] * 6)),
+            )
+        ),
+        Known("autopilot", CommandAck(AUTOPILOT, 400, 0, 0, 0, 11, 195)),
+        *(
+            Known(
+                "autopilot",
+                SetpointLocal(
+                    COMPANION, 0, *me, frame, mask, (1.0, 2.0, -5.0), (0.5, 0.0, 0.0), ZERO, 0.5, 0.1
+                ),
+            )
+            for frame, mask in ((1, 0x9F8), (1, 0x9C7), (1, 0x000), (8, 0xFC7), (9, 0xDF8), (1, 0xE3F))
+        ),
+        Known("autopilot", PositionTarget(AUTOPILOT, 0, 1, 0x9C0, (1.0, 2.0, -5.0), ZERO, ZERO, 0.5, 0.0)),
+        Known("autopilot", Timesync(GROUND, 0, 123_456_789)),
+        Known("autopilot", EkfStatus(AUTOPILOT, 0x3F)),
+        Known("autopilot", ExtendedSysState(AUTOPILOT, 0, 2)),
+        Known("autopilot", StatusText(AUTOPILOT, 4, "Arming refused: no position yet")),
+        Known("swarm", plan(fingerprint, now)),
+    )
+    missing = {row.message for row in TABLE} - {type(known.message) for known in found}
+    if missing:
+        raise LookupError(f"no good message of {missing}")
+    return found
+
+
+def frames(known: Sequence[Known]) -> tuple[bytes, ...]:
+    """Each in MAVLink 2, and in MAVLink 1 where there is one."""
+    codec = Codec()
+    v2 = [codec.encode(one.message) for one in known]
+    v1 = [codec.encode_v1(one.message) for one in known if BY_TYPE[type(one.message)].id < 256]
+    return (*v2, *v1)
+
+
+def recorded() -> bytes:
+    """The shipped log."""
+    return (config_root() / "logs" / "escort-target.tlog").read_bytes()
+
+
+def log(chosen: Sequence[bytes], records: int = _LOG_RECORDS) -> bytes:
+    """A tlog of ``chosen`` frames in turn, 20 ms apart, over all four links."""
+    times = range(NOW, NOW + 20_000 * records, 20_000)
+    return b"".join(
+        stamp(">Q", time | number % 4) + chosen[number % len(chosen)] for number, time in enumerate(times)
+    )
+
+
+def logs() -> tuple[bytes, ...]:
+    """Whole logs: the shipped one, synthetic ones, compressed ones."""
+    mixed = log(frames(messages()))
+    return (
+        recorded(),
+        recorded()[:1200],
+        mixed,
+        gzip.compress(mixed, mtime=0),
+        gzip.compress(recorded(), mtime=0),
+    )

@@ -1,0 +1,30 @@
+"""The streams of random numbers of a seed: one table, so that no two things draw the same numbers.
+
+A stream is numpy's default generator of the words seed, tag, and more if there are several of a kind. numpy
+fills missing words with zeros, so a tag is never 0: that would be the stream of the bare seed, which the
+jitter of the starts has. ``sitl`` has a vehicle's system id, 10 or more, in the place of the tag.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+
+class Stream(IntEnum):
+    """What is drawn."""
+
+    STARTS = 0
+    PHASES = 1
+    CLOCKS = 2
+    SCENE_TARGET = 3
+    SCENE_OBSTACLES = 4
+    SCENE_FLEET = 5
+    SCENE_STARTS = 6
+    SCENE_GOALS = 7
+
+
+def stream(seed: int, of: Stream, number: int = 0) -> np.random.Generator:
+    """The numbers of ``seed`` for one thing, the ``number``th of its kind."""
+    return np.random.default_rng([seed, of, number])
