@@ -151,7 +151,9 @@ def test_a_standing_vehicle_learns_nothing():
 
 
 @given(
-    offset=st.tuples(*[st.floats(-30.0, 30.0)] * 3),
+    # A step of more than 10 m up makes it climb faster than an autopilot ever lets it, with all rotors at
+    # full thrust, and what is left for roll and pitch lets it lean further: 72 deg was seen at 19 m/s.
+    offset=st.tuples(st.floats(-30.0, 30.0), st.floats(-30.0, 30.0), st.floats(-10.0, 30.0)),
     yaw=st.floats(-3.0, 3.0),
     wind=st.tuples(*[st.floats(-5.0, 5.0)] * 2),
 )

@@ -15,7 +15,7 @@ from outrider.resources import config_root
 
 pytestmark = pytest.mark.soak
 
-FLIGHTS, DRAWS = 20, 10
+FLIGHTS, DRAWS = 12, 10
 NAMES = {
     kind: [path.stem for path in sorted((config_root() / kind).glob("*.yaml"))]
     for kind in ("scenarios", "scenes")
@@ -37,12 +37,9 @@ def outrider(*words: str, cwd: Path) -> tuple[int, dict[str, Any]]:
 
 
 def swept(kind: str, name: str, runs: int, folder: Path) -> tuple[int, dict[str, Any]]:
-    """A sweep of one scenario or scene, replanned at 20 Hz as scenes are: a fifth of the work."""
-    changes = {"companion.rates.replan_us": 50_000} if kind == "scenarios" else {}
+    """A sweep of one scenario or scene, as it is shipped."""
     sweep = folder / "sweep.yaml"
-    sweep.write_text(
-        json.dumps({"name": name, kind: [name], "runs": runs, "first_seed": 101, "set": changes})
-    )
+    sweep.write_text(json.dumps({"name": name, kind: [name], "runs": runs, "first_seed": 101}))
     status, summary = outrider("sweep", str(sweep), "--jobs", "1", cwd=folder)
     (cell,) = summary["cells"]
     assert cell["runs"] == runs
@@ -54,7 +51,7 @@ def swept(kind: str, name: str, runs: int, folder: Path) -> tuple[int, dict[str,
 @pytest.mark.parametrize("name", NAMES["scenarios"])
 def test_a_shipped_scenario_over_many_seeds(name: str, tmp_path: Path) -> None:
     status, cell = swept("scenarios", name, FLIGHTS, tmp_path)
-    assert status == 0, cell
+    assert status == 0, cell["worst"]
 
 
 @pytest.mark.parametrize("name", NAMES["scenes"])
