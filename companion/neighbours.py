@@ -39,10 +39,8 @@ def _read(payload: bytes) -> tuple[int, Horizon]:
 @lru_cache(maxsize=256)
 def _placed(fleet: FleetFrame, message: GlobalPosition) -> tuple[Array, Array]:
     """Position and velocity (3,) of a message, fleet-local ENU; each worked out once in a process."""
-    position, velocity = (
-        fleet.to_enu(message.latitude, message.longitude, message.altitude),
-        ned_to_enu(message.velocity_ned),
-    )
+    position = fleet.to_enu(message.latitude, message.longitude, message.altitude)
+    velocity = ned_to_enu(message.velocity_ned)
     position.flags.writeable = velocity.flags.writeable = False
     return position, velocity
 

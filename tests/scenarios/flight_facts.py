@@ -14,7 +14,7 @@ from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Message
 from mavlink_bridge.tlog import read_tlog
 from outrider.conductor import SLOW, Stage
-from outrider.flight import LINK_NUMBERS
+from outrider.names import LINK_NUMBERS
 from outrider.truth import Samples
 
 

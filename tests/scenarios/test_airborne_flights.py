@@ -14,7 +14,8 @@ from lockstep_flights import Flown, check, fly, scenario, setpoints
 from companion.node import COMPONENT
 from companion.pilot import ARM_DISARM, DO_SET_MODE, NAV_LAND, NAV_TAKEOFF, Phase
 from mavlink_bridge.messages import CommandInt, CommandLong
-from outrider.flight import EPOCH, LINK_NUMBERS
+from outrider.flight import EPOCH
+from outrider.names import LINK_NUMBERS
 from outrider.summary import exit_status
 from sitl.flavours import Mode
 

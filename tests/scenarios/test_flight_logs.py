@@ -11,7 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.tlog import read_tlog
-from outrider.flight import EPOCH, LINK_NUMBERS
+from outrider.flight import EPOCH
+from outrider.names import LINK_NUMBERS
 from outrider.scenario import TARGET_SYSTEM
 
 OPERATOR = 255

@@ -21,7 +21,7 @@ from lockstep_flights import Flown, fly, scenario
 from companion.pilot import Phase
 from mavlink_bridge.messages import SetpointLocal, StatusText, Tunnel
 from outrider.conductor import NEAR
-from outrider.flight import LINK_NUMBERS
+from outrider.names import LINK_NUMBERS
 from outrider.summary import exit_status
 from sitl.flavours import Mode
 

@@ -14,7 +14,7 @@ from lockstep_flights import FIREFLY, Flown, check, fly, scenario
 from companion.obstacles import FixedObstacles
 from companion.surface import circle_error
 from mavlink_bridge.messages import GlobalPosition
-from outrider.flight import LINK_NUMBERS
+from outrider.names import LINK_NUMBERS
 from outrider.summary import exit_status
 
 BLOCKED: dict[str, Any] = {

@@ -49,9 +49,9 @@ class Fleet:
         self.starts = starts(scenario, seed, scenario.companion.planar)
         self.systems = list(scenario.systems)
         self._logs = logs
-        # One target is enough to know where it is: those of the other processes are the same.
-        self.target_system = self.target().system
-        self._facing = self.target().position(0)
+        target = self.target()
+        self.target_system = target.system
+        self._facing = target.position(0)
 
     @property
     def companion_config(self) -> CompanionConfig:

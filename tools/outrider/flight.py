@@ -18,7 +18,6 @@ from outrider import names
 from outrider.conductor import Conductor, Sight, Stage
 from outrider.disturbances import Event, events, strike_autopilot, strike_computer
 from outrider.fleet import Fleet
-from outrider.names import LINK_NUMBERS
 from outrider.outcome import Messages, Outcome
 from outrider.recorder import Recorder
 from outrider.scenario import Scenario
@@ -27,8 +26,6 @@ from outrider.scenario_links import PartitionPart
 from outrider.truth import Limits, Truth
 from outrider.witness import Witness
 from sitl.config import VehicleConfig
-
-__all__ = ["EPOCH", "LINK_NUMBERS", "Flight", "Progress", "limits"]
 
 EPOCH = 1_767_225_600_000_000
 """Unix µs at which every simulated flight begins (2026-01-01 00:00 UTC): logs then open in any tool."""

@@ -16,7 +16,7 @@ from outrider.fleet import Fleet
 from outrider.realtime.board import Board
 from outrider.realtime.rough import Rough
 from outrider.realtime.wiring import Wiring
-from outrider.realtime.workers import AutopilotWorker, CompanionWorker, TargetWorker, Worker
+from outrider.realtime.workers import AutopilotWorker, CompanionWorker, Seat, TargetWorker, Worker
 from outrider.scenario_links import PartitionPart
 
 
@@ -40,7 +40,7 @@ def muster(
         every = Scheduled(behind, timing.autopilot_us, start + staggered(k, count, timing.autopilot_us))
         trace = scratch / f"trace-{system}"
         workers.append(
-            AutopilotWorker(k, autopilot, own, trace, behind, every, wiring.autopilots[k], clock, board)
+            AutopilotWorker(k, autopilot, trace, Seat(behind, every, wiring.autopilots[k], clock, board), own)
         )
         senders = {
             "autopilot": autopilot.name,
@@ -53,7 +53,7 @@ def muster(
         every = Scheduled(behind, timing.companion_us, phase, fleet.clock(k, start))
         workers.append(
             CompanionWorker(
-                k, companion, cuts, system, logs, behind, every, wiring.companions[k], clock, board
+                k, companion, system, logs, Seat(behind, every, wiring.companions[k], clock, board), cuts
             )
         )
     target = fleet.target()
@@ -61,7 +61,7 @@ def muster(
     every = Scheduled(
         behind, timing.companion_us, start + staggered(2 * count - 1, 2 * count, timing.companion_us)
     )
-    workers.append(TargetWorker(target, behind, every, wiring.target, clock, board))
+    workers.append(TargetWorker(target, Seat(behind, every, wiring.target, clock, board)))
     return workers
 
 

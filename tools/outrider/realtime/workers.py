@@ -8,9 +8,11 @@ import pickle
 import signal
 import sys
 from collections import deque
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from companion.node import Companion, Tally
 from companion.pilot import Phase
@@ -50,22 +52,27 @@ class Remains:
     error: str = ""
 
 
+class Seat(NamedTuple):
+    """Where a node sits: behind its rough links, when it is due, its open links, the clock, the board."""
+
+    rough: Rough
+    scheduled: Scheduled
+    links: dict[str, list[Link]]
+    clock: Clock
+    board: Board
+
+
 class Worker:
-    """One node in its own process."""
+    """One node in its own process, to which ``events`` happen after the goal event."""
 
     above = 0
     """Levels of real-time priority above the others'."""
 
-    def __init__(
-        self, rough: Rough, scheduled: Scheduled, links: dict[str, list[Link]], clock: Clock, board: Board
-    ) -> None:
-        self.rough = rough
+    def __init__(self, seat: Seat, events: Iterable[Event] = ()) -> None:
+        self.rough, self._scheduled, self.links, self._clock, self.board = seat
         self.remains = Remains()
-        self.board = board
-        self._scheduled = scheduled._replace(node=rough)
-        self.links = links
-        self._clock = clock
         self._parent = os.getpid()
+        self._events = deque(events)
         self._goal_seen = False
 
     def over(self) -> bool:
@@ -78,6 +85,9 @@ class Worker:
 
     def begin(self, now: int) -> None:
         """The goal event, at ``now`` µs."""
+
+    def strike(self, event: Event) -> None:
+        """Let an event happen to the node."""
 
     def show(self, now: int) -> None:
         """After every step."""
@@ -131,9 +141,12 @@ class Worker:
         self.remains.dropped = counters.dropped + statistics.overruns
 
     def _stepped(self, now: int) -> None:
-        if not self._goal_seen and self.board.goal:
+        goal = self.board.goal
+        if goal and not self._goal_seen:
             self._goal_seen = True
-            self.begin(self.board.goal)
+            self.begin(goal)
+        while goal and self._events and self._events[0].after <= now - goal:
+            self.strike(self._events.popleft())
         self.show(now)
 
 
@@ -142,31 +155,19 @@ class AutopilotWorker(Worker):
 
     above = 1
 
-    def __init__(
-        self,
-        k: int,
-        node: Autopilot,
-        events: list[Event],
-        trace: Path,
-        rough: Rough,
-        scheduled: Scheduled,
-        links: dict[str, list[Link]],
-        clock: Clock,
-        board: Board,
-    ) -> None:
-        super().__init__(rough, scheduled, links, clock, board)
+    def __init__(self, k: int, node: Autopilot, trace: Path, seat: Seat, events: Iterable[Event]) -> None:
+        super().__init__(seat, events)
         self._k, self._node = k, node
-        self._events = deque(events)
         self._trace = TraceWriter(node)
         self._trace_path = trace
 
     def begin(self, now: int) -> None:
         self._node.begin(now)
 
+    def strike(self, event: Event) -> None:
+        strike_autopilot(event, self._node)
+
     def show(self, now: int) -> None:
-        goal = self.board.goal
-        while goal and self._events and self._events[0].after <= now - goal:
-            strike_autopilot(self._events.popleft(), self._node)
         sample = self._trace.see(now)
         if sample is not None:
             self.board.show_vehicle(self._k, sample[0:3], sample[3:6], self._node.armed)
@@ -180,21 +181,10 @@ class CompanionWorker(Worker):
     """A companion; it writes its vehicle's tlog in ``logs``."""
 
     def __init__(
-        self,
-        k: int,
-        node: Companion,
-        events: list[Event],
-        system: int,
-        logs: Path,
-        rough: Rough,
-        scheduled: Scheduled,
-        links: dict[str, list[Link]],
-        clock: Clock,
-        board: Board,
+        self, k: int, node: Companion, system: int, logs: Path, seat: Seat, events: Iterable[Event]
     ) -> None:
-        super().__init__(rough, scheduled, links, clock, board)
+        super().__init__(seat, events)
         self._k, self._node = k, node
-        self._events = deque(events)
         self._system, self._logs = system, logs
         self._thaws = 0
         self._shown: tuple[bool, str] | None = None
@@ -211,10 +201,10 @@ class CompanionWorker(Worker):
     def begin(self, now: int) -> None:
         self._first = self._node.tally
 
+    def strike(self, event: Event) -> None:
+        strike_computer(event, _Radio(self.rough))
+
     def show(self, now: int) -> None:
-        goal = self.board.goal
-        while goal and self._events and self._events[0].after <= now - goal:
-            strike_computer(self._events.popleft(), _Radio(self.rough))
         if self.board.end and self._last is None:
             self._last = self._node.tally
         pilot = self._node.pilot
@@ -236,16 +226,8 @@ class CompanionWorker(Worker):
 class TargetWorker(Worker):
     """The target."""
 
-    def __init__(
-        self,
-        node: Target,
-        rough: Rough,
-        scheduled: Scheduled,
-        links: dict[str, list[Link]],
-        clock: Clock,
-        board: Board,
-    ) -> None:
-        super().__init__(rough, scheduled, links, clock, board)
+    def __init__(self, node: Target, seat: Seat) -> None:
+        super().__init__(seat)
         self._node = node
 
     def begin(self, now: int) -> None:
