@@ -19,6 +19,7 @@ class Calls:
         self._own = own
         self.refusals: list[str] = []
         self._acknowledged: set[_Call] = set()
+        self._answered: set[_Call] = set()
         self._sent: dict[_Call, int] = {}
         self._asked: dict[int, _Call] = {}
 
@@ -27,6 +28,7 @@ class Calls:
         call = self._asked.pop(message.command, None)
         if call is None:
             return
+        self._answered.add(call)
         if message.result in (ACCEPTED, IN_PROGRESS):
             self._acknowledged.add(call)
         else:
@@ -36,11 +38,16 @@ class Calls:
         """When (µs) it was last sent, 0 for never."""
         return self._sent.get(_key(command, params), 0)
 
+    def answered(self, command: int, params: tuple[float, ...]) -> bool:
+        """Whether the autopilot has taken or refused it."""
+        return _key(command, params) in self._answered
+
     def forget(self) -> None:
         """Nothing was asked or answered."""
         self._sent.clear()
         self._asked.clear()
         self._acknowledged.clear()
+        self._answered.clear()
 
     def call(self, now: int, command: int, params: tuple[float, ...]) -> list[Message]:
         """The command, unless it was acknowledged, sent less than half a second ago, or must wait for its

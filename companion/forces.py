@@ -74,7 +74,7 @@ def repulsion(
     if not obstacles.ids:
         return np.zeros_like(own)
     away = own - obstacles.positions
-    distance = np.sqrt(np.einsum("jni,jni->jn", away, away))
+    distance = np.sqrt(np.vecdot(away, away))
     reserve = distance if braking is None else distance - stopping_distance(distance, braking, dt)
     if (reserve >= obstacles.d_safe[:, None]).all():
         return np.zeros_like(own)
@@ -100,7 +100,7 @@ def stopping_distance(distance: Array, braking: float, dt: float) -> Array:
 
 def limit(force: Array, bound: float) -> Array:
     """The same directions with norms of at most ``bound``: rows (…, 3)."""
-    norm = np.sqrt(np.einsum("...i,...i->...", force, force))
+    norm = np.sqrt(np.vecdot(force, force))
     scale = bound / np.maximum(norm, bound)
     limited: Array = force * scale[..., None]
     return limited

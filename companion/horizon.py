@@ -124,13 +124,13 @@ class HorizonTable:
         if not self._rows:
             return np.zeros((len(senders), self._steps, 3)), np.zeros(len(senders), dtype=np.bool_)
         rows = np.array([self._rows.get(sender, -1) for sender in senders])
-        epochs = self._epochs[rows]
+        epochs, dts = self._epochs[rows], self._dts[rows][:, None]
         known: NDArray[np.bool_] = (rows >= 0) & (epochs >= oldest)
         elapsed = (start - epochs)[:, None] + self._ahead
-        index = elapsed // self._dts[rows][:, None]
+        index = elapsed // dts
         np.maximum(index, 0, out=index)
         np.minimum(index, self._lasts[rows][:, None], out=index)
-        s = ((elapsed - index * self._dts[rows][:, None]) * 1e-6)[:, :, None]
+        s = ((elapsed - index * dts) * 1e-6)[:, :, None]
         chosen = self._knots[rows[:, None], index]
         # Before its first knot a horizon has no acceleration.
         result: Array = chosen[:, :, 6:9] * (0.5 * np.maximum(s, 0.0))

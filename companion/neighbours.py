@@ -123,7 +123,7 @@ class Neighbours:
         here = states[:, 0:3] + carried[:, None] * states[:, 3:6]
         positions, trusted = self._table.positions(ids, now, now - config.guard.plan_stale_us)
         off = positions[:, 0] - here
-        trusted &= np.einsum("ji,ji->j", off, off) <= _STRAYED**2
+        trusted &= np.vecdot(off, off) <= _STRAYED**2
         if not trusted.all():
             lost = ~trusted
             positions[lost] = here[lost][:, None]

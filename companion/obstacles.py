@@ -79,7 +79,7 @@ class FixedObstacles:
     def distance(self, positions: Array) -> Array:
         """From points (…, 3) to every surface (…, M), m; negative inside. A post has a flat top."""
         off = positions[..., None, :2] - self._xy
-        across = np.sqrt(np.einsum("...i,...i->...", off, off))
+        across = np.sqrt(np.vecdot(off, off))
         height = positions[..., 2, None]
         up = height - self._high
         ball = np.sqrt(across**2 + (height - np.where(self._ball, self._high, 0.0)) ** 2) - self._radius

@@ -40,10 +40,10 @@ HEARTBEAT_LOST = 3_000_000
 _NAN = float("nan")
 _NEEDED = tuple(
     (SET_MESSAGE_INTERVAL, (identifier, interval, 0.0, 0.0, 0.0, 0.0, 0.0))
-    for identifier, interval in ((32.0, 20_000.0), (30.0, 20_000.0), (1.0, 1_000_000.0), (245.0, 500_000.0))
+    for identifier, interval in ((32.0, 20_000.0), (30.0, 100_000.0), (1.0, 1_000_000.0), (245.0, 500_000.0))
 )
 """Message id and interval (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
-EXTENDED_SYS_STATE."""
+EXTENDED_SYS_STATE. The attitude tells only where the nose points when the set-points begin."""
 
 
 class Phase(Enum):
@@ -228,6 +228,8 @@ class Pilot:
             return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
         if self._status is None or not self._status.health & PREARM_OK:
             return "the autopilot's pre-arm checks"
+        if not all(self._calls.answered(*call) for call in _NEEDED):
+            return "the autopilot's answers to SET_MESSAGE_INTERVAL"
         if self._height is None:
             return "the operator's go"
         return ""

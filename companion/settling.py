@@ -42,7 +42,7 @@ class Settling:
         """A place (3,) clear of the nearest obstacle; None if it is far enough."""
         clearance = self._config.guard.landing_clearance
         apart = here[:2] - obstacles.positions[:, 0, :2]
-        centres = np.sqrt(np.einsum("ji,ji->j", apart, apart))
+        centres = np.sqrt(np.vecdot(apart, apart))
         distance = centres - obstacles.radius
         if distance.min(initial=np.inf) > clearance:
             return None

@@ -36,12 +36,13 @@ ZERO: Final[Vector] = (0.0, 0.0, 0.0)
 # A number at a limit may come back a little above it from float32.
 _ROUNDING: Final = 1.0 + 1e-6
 # Beyond any flight: larger numbers are damage, and would overflow the float32 of the echo.
+_FAR, _FAST, _TURNING = 1e5, 1e3, 1e2
 _RANGES: Final = (
-    ("position", 1e5),
-    ("velocity", 1e3),
-    ("acceleration", 1e3),
-    ("yaw", 1e3),
-    ("yaw rate", 1e2),
+    ("position", _FAR),
+    ("velocity", _FAST),
+    ("acceleration", _FAST),
+    ("yaw", _FAST),
+    ("yaw rate", _TURNING),
 )
 
 
@@ -141,6 +142,8 @@ def rotated(vector: Vector, yaw: float) -> Vector:
 
 def unusable(message: SetpointLocal, mask: int) -> str | None:
     """Why a field that ``mask`` uses cannot be used (NaN, infinite, beyond any flight), or None."""
+    if _usable(message):
+        return None
     fields = (message.position, message.velocity, message.acceleration, (message.yaw,), (message.yaw_rate,))
     bits = (1, 8, 64, IGNORE_YAW, IGNORE_YAW_RATE)
     for values, bit, (name, bound) in zip(fields, bits, _RANGES, strict=True):
@@ -149,6 +152,24 @@ def unusable(message: SetpointLocal, mask: int) -> str | None:
                 fault = "out of range" if math.isfinite(value) else "not a number"
                 return f"Set-point refused: {name} {fault}"
     return None
+
+
+def _usable(message: SetpointLocal) -> bool:
+    """Whether there is nothing wrong with any field, used or not: nearly always, and soon seen."""
+    (x, y, z), (u, v, w), (a, b, c) = message.position, message.velocity, message.acceleration
+    return (
+        -_FAR <= x <= _FAR
+        and -_FAR <= y <= _FAR
+        and -_FAR <= z <= _FAR
+        and -_FAST <= u <= _FAST
+        and -_FAST <= v <= _FAST
+        and -_FAST <= w <= _FAST
+        and -_FAST <= a <= _FAST
+        and -_FAST <= b <= _FAST
+        and -_FAST <= c <= _FAST
+        and -_FAST <= message.yaw <= _FAST
+        and -_TURNING <= message.yaw_rate <= _TURNING
+    )
 
 
 def mask_of(setpoint: Setpoint) -> int:

@@ -70,7 +70,7 @@ class Tangential:
         """How much each obstacle's band acts, (M,) in 0…1; ``away`` (M, 3) and its norms ``distance``."""
         config, obstacles = self._config, scene.obstacles
         moving = (obstacles.positions[:, 1] - obstacles.positions[:, 0]) / self._dt
-        closing = np.maximum(np.einsum("ji,ji->j", away, moving - scene.velocity) / distance, 0.0)
+        closing = np.maximum(np.vecdot(away, moving - scene.velocity) / distance, 0.0)
         edge = obstacles.d_safe + config.d_band + config.reach_s * closing
         depth = _share((edge - distance) / (edge - config.d_full - obstacles.radius))
         to_go = scene.to_go

@@ -105,12 +105,14 @@ class Rig:
 
 
 class Want(NamedTuple):
-    """What is known to the pilot, and what it must then name as missing ("": nothing is)."""
+    """What is known to the pilot, what it must then name as missing ("": nothing is), and whether the
+    autopilot answers its requests."""
 
     heard: tuple[Message, ...]
     view: View
     go: bool
     missing: str
+    answers: bool = True
 
 
 BEAT = beat("ardupilot")
@@ -127,6 +129,7 @@ MISSING = {
     "no status": Want((BEAT,), READY, True, "pre-arm checks"),
     "not ready to arm": Want((BEAT, ILL), READY, True, "pre-arm checks"),
     "no go": Want((BEAT, HEALTHY), READY, False, "the operator's go"),
+    "no answers": Want((BEAT, HEALTHY), READY, True, "answers to SET_MESSAGE_INTERVAL", answers=False),
     "everything": Want((BEAT, HEALTHY), READY, True, ""),
 }
 
@@ -137,7 +140,7 @@ def test_connecting_waits_and_names_what_is_missing(name):
     rig = Rig(view=want.view)
     if want.go:
         assert rig.pilot.go(HEIGHT)
-    sent = rig.run(3.0, *want.heard)
+    sent = rig.run(3.0, *want.heard, acks=want.answers)
     if want.missing:
         assert rig.pilot.phase is Phase.CONNECT
         assert want.missing in rig.pilot.waiting_for
@@ -381,7 +384,7 @@ def test_an_order_to_land_before_the_start_takes_the_go_back(flavour):
     assert rig.pilot.go(6.0)
     assert rig.pilot.land()
     rig.view = READY
-    rig.run(5.0, beat(flavour), HEALTHY)
+    rig.run(5.0, beat(flavour), HEALTHY, acks=True)
     assert rig.pilot.phase is Phase.CONNECT
     assert rig.pilot.waiting_for == "the operator's go"
 

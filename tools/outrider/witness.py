@@ -21,7 +21,7 @@ class Witness:
         self._truth = truth
         self._last = -1
         self._next = 0
-        self._pending: list[Array] = []
+        self._pending: list[list[Array]] = [[] for _ in autopilots]
         self._times: list[int] = []
 
     def see(self, now: int) -> bool:
@@ -30,18 +30,17 @@ class Witness:
         if not len(times) or times[-1] == self._last:
             return False
         self._last = int(times[-1])
-        track = np.stack([autopilot.trace for autopilot in self._autopilots], axis=1)
-        for k, autopilot in enumerate(self._autopilots):
-            if not autopilot.airborne:
-                track[:, k] = np.nan
-        self._pending.append(track)
+        for autopilot, pending in zip(self._autopilots, self._pending, strict=True):
+            trace = autopilot.trace
+            pending.append(trace if autopilot.airborne else np.full_like(trace, np.nan))
         self._times += times.tolist()
         if now < self._next:
             return False
         self._next = now + SAMPLE
-        track = ned_to_enu(np.concatenate(self._pending))
+        track = ned_to_enu(np.stack([np.concatenate(pending) for pending in self._pending], axis=1))
         self._truth.take(now, track, rows(self._autopilots), places(self._target, self._times))
-        self._pending.clear()
+        for pending in self._pending:
+            pending.clear()
         self._times.clear()
         return True
 
