@@ -34,21 +34,30 @@ class Rewind:
         """
         times = self._times
         time = dated.time
-        place = len(times)
         if times and time <= times[-1]:
             if time < times[-1] - self._window:
                 self.too_late += 1
                 return False
-            place = bisect_right(times, time)
-            if dated.stamped and place > 0 and times[place - 1] == time:
-                return self._accepted(place - 1)
+            return self._between(dated, z)
+        before = self.belief
+        self.belief = belief = self._estimator.after(before, time, z)
+        times.append(time)
+        self._measured.append(z)
+        self._beliefs.append(belief)
+        if times[0] < time - self._window:
+            self._forget()
+        return before is None or belief.refused == before.refused
+
+    def _between(self, dated: Dated, z: Six) -> bool:
+        """Take a late measurement."""
+        times, time = self._times, dated.time
+        place = bisect_right(times, time)
+        if dated.stamped and place > 0 and times[place - 1] == time:
+            return self._accepted(place - 1)
         times.insert(place, time)
         self._measured.insert(place, z)
         self._replay(place)
-        accepted = self._accepted(place)
-        if times[0] < times[-1] - self._window:
-            self._forget()
-        return accepted
+        return self._accepted(place)
 
     def _replay(self, first: int) -> None:
         """Take the measurements from ``first`` on, again or for the first time."""

@@ -104,13 +104,14 @@ def frame_at(data: bytes, start: int) -> Frame | Flaw:
 @lru_cache(maxsize=2048)
 def _leading(data: bytes) -> tuple[tuple[Frame, ...], int]:
     frames: list[Frame] = []
-    at = 0
-    while True:
+    at, size = 0, len(data)
+    while at < size:
         frame = frame_at(data, at)
         if isinstance(frame, Flaw) or not frame.known:
-            return tuple(frames), at
+            break
         frames.append(frame)
         at += len(frame.data)
+    return tuple(frames), at
 
 
 def leading_frames(data: bytes) -> tuple[tuple[Frame, ...], int]:
