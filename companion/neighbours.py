@@ -105,7 +105,7 @@ class Neighbours:
         if begins is None:
             self.refused_plans += 1
             return
-        self._table.put(system, horizon._replace(epoch=begins))
+        self._table.put(system, Horizon(begins, horizon.dt, horizon.knots))
 
     def obstacles(self, now: int) -> Obstacles:
         """All neighbours aligned with ``now + n·dt``, n = 0…N.

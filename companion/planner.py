@@ -91,7 +91,7 @@ class Planner:
         force = influence.force
         if config.planar:
             force = force * _FLAT
-        return influence._replace(force=self._smoothed(now, limit(force, a_total)))
+        return Influence(self._smoothed(now, limit(force, a_total)), influence.omega_scale)
 
     def _smoothed(self, now: int, force: Array) -> Array:
         """The field without its steps: neighbours' plans arrive at 10 Hz and would jolt the attitude."""

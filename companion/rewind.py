@@ -44,7 +44,8 @@ class Rewind:
         times.append(time)
         self._measured.append(z)
         self._beliefs.append(belief)
-        if times[0] < time - self._window:
+        # Not one by one: what is kept for longer is never asked for.
+        if times[0] < time - 2 * self._window:
             self._forget()
         return before is None or belief.refused == before.refused
 
