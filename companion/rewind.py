@@ -14,7 +14,8 @@ from companion.timing import Dated
 
 
 class Rewind:
-    """Measurements of the last ``window`` µs, and what was believed before them."""
+    """Measurements of the last ``window`` µs, and for a while some older ones, and what was believed before
+    them."""
 
     def __init__(self, estimator: Estimator, window: int) -> None:
         self._estimator = estimator
