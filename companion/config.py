@@ -7,6 +7,7 @@ here. A scenario file may say otherwise.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -75,6 +76,17 @@ class FieldConfig(Settings):
     smoothing_us: int = Field(
         50_000, ge=0, le=2_000_000, description="time constant of the field's low-pass, µs; 0 for none"
     )
+    position_sigma: float = Field(
+        0.0, ge=0.0, le=5.0, description="m, σ of a vehicle's estimated position on its worst axis"
+    )
+    margin_sigmas: float = Field(
+        2.0, ge=0.0, le=6.0, description="k: the field's distances grow by k·σ of the error of a distance"
+    )
+
+    def margin(self, estimates: int) -> float:
+        """By how much (m) d_min and d_safe grow where a distance is known from so many estimates: k·σ·√n,
+        n = 2 between vehicles, 1 to what stands."""
+        return self.margin_sigmas * self.position_sigma * math.sqrt(estimates)
 
     @model_validator(mode="after")
     def _order(self) -> FieldConfig:

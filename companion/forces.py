@@ -32,7 +32,8 @@ class Obstacles(NamedTuple):
     """What is to be avoided, M of them, aligned in time with the own horizon (fleet-local ENU, m).
 
     ``positions`` (M, N + 1, 3) at n = 0…N; ``d_min``, ``d_safe`` (M,) between centres, ``radius`` (M,) or
-    (1,) included, which is what an obstacle is larger than a vehicle; ``ids`` name them for latches and logs.
+    (1,) included, which is what an obstacle is larger than a vehicle: its own size, and a margin for not
+    knowing where it is; ``ids`` name them for latches and logs.
     """
 
     ids: tuple[int, ...]

@@ -59,8 +59,10 @@ class Neighbours:
         self._times = np.zeros(0, dtype=np.int64)
         self._clocks: dict[int, PlanClock] = {}
         self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
-        self._d_min: Array = np.full(_MOST, config.field.d_min)
-        self._d_safe: Array = np.full(_MOST, config.field.d_safe)
+        margin = config.field.margin(2)
+        self._margin: Array = np.full(_MOST, margin)
+        self._d_min: Array = np.full(_MOST, config.field.d_min + margin)
+        self._d_safe: Array = np.full(_MOST, config.field.d_safe + margin)
         self.refused_plans = 0
 
     def hear_position(self, now: int, message: GlobalPosition) -> None:
@@ -133,7 +135,7 @@ class Neighbours:
                 ahead = 1e-6 * config.horizon.dt_us * np.arange(steps)
                 positions[moving] += ahead[:, None] * states[moving, None, 3:6]
         count = len(ids)
-        return Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count])
+        return Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count], self._margin[:count])
 
     def ages(self, now: int) -> dict[int, int]:
         """Age (µs) of every neighbour's track."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ COMPONENT = 195
 """MAV_COMP_ID_PATHPLANNER."""
 DO_REPOSITION = 192
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
+_LONGEST_NS = (1 << 32) - 1
 _GLOBAL = (0, 5)
 """MAV_FRAME_GLOBAL and its INT twin."""
 _HIGHEST = 1e5
@@ -39,14 +41,14 @@ _ZERO.flags.writeable = False
 
 
 class Tally(NamedTuple):
-    """What a companion counted so far; ``plan_ns`` holds one stopwatch reading per plan."""
+    """What a companion counted so far; ``plan_ns`` holds one stopwatch reading per plan, at most 4.29 s."""
 
     plans: int
     relaxed: int
     solver_failures: int
     held: int
     anchored_anew: int
-    plan_ns: tuple[int, ...]
+    plan_ns: Sequence[int]
 
 
 class Companion:
@@ -83,14 +85,14 @@ class Companion:
         self._boot: int | None = None
         self._next_plan = self._next_setpoint = 0
         self._plans = self._relaxed = 0
-        self._plan_ns: list[int] = []
+        self._plan_ns = array("I")
 
     @property
     def tally(self) -> Tally:
         """Counters for the summary."""
         guard = self.guard
         return Tally(
-            self._plans, self._relaxed, guard.failures, guard.held, guard.anchored_anew, tuple(self._plan_ns)
+            self._plans, self._relaxed, guard.failures, guard.held, guard.anchored_anew, self._plan_ns[:]
         )
 
     @property
@@ -215,7 +217,7 @@ class Companion:
             self.guard.hold(now, solver=True)
             return
         finally:
-            self._plan_ns.append(self._stopwatch() - started)
+            self._plan_ns.append(min(max(self._stopwatch() - started, 0), _LONGEST_NS))
         self._plans += 1
         self._relaxed += self.plan.relaxed
         self.guard.accept(now, self.plan.horizon)

@@ -41,7 +41,7 @@ def reach(config: CompanionConfig) -> float:
     closing at v_max."""
     field, band, speed = config.field, config.tangential, max(config.limits.v_max)
     stopping = 0.0 if field.braking is None else speed**2 / (2.0 * field.braking)
-    return field.d_safe + max(stopping, band.d_band + band.reach_s * speed)
+    return field.d_safe + field.margin(1) + max(stopping, band.d_band + band.reach_s * speed)
 
 
 class World:
@@ -91,17 +91,20 @@ class World:
         if view.target is not None and config.target_d_min is not None and config.target_d_safe is not None:
             ahead = 1e-6 * config.horizon.dt_us * np.arange(config.horizon.steps + 1)
             moving = view.target.position + ahead[:, None] * view.target.velocity
+            margin = np.array([config.field.margin(2)])
             obstacles = obstacles.joined(
                 Obstacles(
                     (self._target_system,),
                     moving[None],
-                    np.array([config.target_d_min]),
-                    np.array([config.target_d_safe]),
+                    config.target_d_min + margin,
+                    config.target_d_safe + margin,
+                    margin,
                 )
             )
         if len(self._fixed):
             ids, positions, radius = self._fixed.around(prediction, self._reach)
             field = config.field
+            radius = radius + field.margin(1)
             obstacles = obstacles.joined(
                 Obstacles(ids, positions, field.d_min + radius, field.d_safe + radius, radius)
             )

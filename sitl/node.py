@@ -48,8 +48,8 @@ class Autopilot:
 
     The physics moves in the NED frame of ``site``; what is sent and received is in the vehicle's own local
     NED. It flies on what its sensors make it believe. The truth of the last step is there for who composes a
-    simulation: ``trace``, ``trace_times``, ``state``, ``reference``; and so are ``begin`` and the faults,
-    which act from the next step on.
+    simulation: ``trace``, ``trace_times``, ``moved_to``, ``state``, ``reference``; and so are ``begin`` and
+    the faults, which act from the next step on.
     """
 
     def __init__(
@@ -196,6 +196,11 @@ class Autopilot:
     def trace(self) -> npt.NDArray[np.float64]:
         """Positions (n, 3) (m, site NED) after each physics step of the last ``step``."""
         return self._plant.trace
+
+    @property
+    def moved_to(self) -> int:
+        """When the last physics step ended (µs, on the clock of ``step``)."""
+        return self._plant.time + (self._boot or 0)
 
     @property
     def trace_times(self) -> npt.NDArray[np.int64]:

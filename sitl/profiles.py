@@ -72,6 +72,11 @@ class SensorProfile(BaseModel):
         return not any(errors)
 
     @property
+    def worst_axis(self) -> float:
+        """σ of the error of a position on the axis where it is largest (m)."""
+        return math.hypot(max(self.horizontal_drift, self.vertical_drift), self.position_white)
+
+    @property
     def deviation(self) -> float:
         """σ of the error of a position as a distance (m): of all three axes together."""
         white = 3.0 * self.position_white**2

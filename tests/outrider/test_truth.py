@@ -119,9 +119,10 @@ class OnRails:
         self.estimate_error = np.zeros(3)
         self.trace = np.empty((0, 3))
         self.trace_times = np.empty(0, dtype=np.int64)
+        self.moved_to = 0
 
     def move(self, begin: int, end: int, step: int = 2_500) -> None:
-        self.trace_times = np.arange(begin + step, end + 1, step)
+        self.trace_times, self.moved_to = np.arange(begin + step, end + 1, step), end
         self.trace = ned_to_enu([self._path(time * 1e-6) for time in self.trace_times]).reshape(-1, 3)
 
     @property

@@ -26,6 +26,7 @@ from outrider.targets import Recorded, Standing, Target
 from sitl.autopilot_config import AutopilotConfig
 from sitl.config import VehicleConfig
 from sitl.node import Autopilot
+from sitl.profiles import PROFILES
 
 
 class End(NamedTuple):
@@ -55,10 +56,13 @@ class Fleet:
 
     @property
     def companion_config(self) -> CompanionConfig:
-        """The companions' settings with the obstacles of the scenario in them."""
-        companion = self.scenario.companion
+        """The companions' settings with the obstacles of the scenario in them, and in the field how wrong the
+        sensor profile is, unless the settings say more."""
+        companion, profile = self.scenario.companion, PROFILES[self.scenario.sensors]
         known = (*companion.obstacles, *self.scenario.obstacles)
-        return companion.model_copy(update={"obstacles": known}) if known else companion
+        sigma = max(companion.field.position_sigma, profile.worst_axis)
+        field = companion.field.model_copy(update={"position_sigma": sigma})
+        return companion.model_copy(update={"obstacles": known, "field": field})
 
     def target(self) -> Target:
         """The target's node."""

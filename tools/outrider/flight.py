@@ -36,8 +36,11 @@ Progress = Callable[[Stage, float], None]
 
 
 class Flight:
-    """Builds the nodes of a scenario for one seed, and runs them. ``progress`` hears the stage and simulated
-    seconds; with a ``run_directory`` each vehicle leaves a tlog there."""
+    """Builds the nodes of a scenario for one seed, and runs them.
+
+    ``progress`` hears the stage and simulated seconds; with a ``run_directory`` each vehicle leaves a tlog
+    there. ``stopwatch`` (ns) measures planning.
+    """
 
     def __init__(
         self,
@@ -48,13 +51,14 @@ class Flight:
         progress: Progress = lambda _stage, _seconds: None,
         reverse_nodes: bool = False,
         run_directory: Path | None = None,
+        stopwatch: Callable[[], int] = time.thread_time_ns,
     ) -> None:
         self.scenario, self.seed = scenario, seed
         self.fleet = fleet = Fleet(scenario, vehicle, seed, logs)
         self.systems = fleet.systems
         self.target = fleet.target()
         self.autopilots = [fleet.autopilot(k) for k in range(scenario.vehicles)]
-        self.companions = [fleet.companion(k, time.thread_time_ns) for k in range(scenario.vehicles)]
+        self.companions = [fleet.companion(k, stopwatch) for k in range(scenario.vehicles)]
         self.operator = fleet.operator()
         self.truth = Truth(scenario.vehicles, limits(scenario), FixedObstacles(scenario.obstacles))
         self.ether = Ether(fleet.channels(), seed, scenario.timing.base_tick_us)

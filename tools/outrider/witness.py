@@ -26,10 +26,13 @@ class Witness:
 
     def see(self, now: int) -> bool:
         """Take in the physics steps since the last call; whether a sample was taken at ``now``."""
-        times = self._autopilots[0].trace_times
-        if not len(times) or times[-1] == self._last:
+        moved_to = self._autopilots[0].moved_to
+        if moved_to == self._last:
             return False
-        self._last = int(times[-1])
+        times = self._autopilots[0].trace_times
+        if not len(times):
+            return False
+        self._last = moved_to
         for autopilot, pending in zip(self._autopilots, self._pending, strict=True):
             trace = autopilot.trace
             pending.append(trace if autopilot.airborne else np.full_like(trace, np.nan))

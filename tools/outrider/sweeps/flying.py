@@ -1,11 +1,11 @@
-"""What a worker does with a task: the flight, and its summary without what depends on the machine."""
+"""What a worker does with a task: the flight, and of its summary what does not depend on the machine."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
 from outrider.scenario import Scenario
-from outrider.summary import WALL_FIELDS, Value
+from outrider.summary import Value
 from outrider.swarm import Prepared, measure
 from outrider.sweeps.cells import scenario_of
 from outrider.sweeps.tasks import Task
@@ -17,8 +17,7 @@ RUN = f"{__name__}:fly"
 
 def fly(task: Task) -> dict[str, Value]:
     """Fly it without files. The same task gives the same summary."""
-    summary = measure(Prepared(_scenario(task), _vehicle(task.vehicle)), task.seed)
-    return {key: value for key, value in summary.items() if key not in WALL_FIELDS}
+    return measure(Prepared(_scenario(task), _vehicle(task.vehicle)), task.seed)
 
 
 def _scenario(task: Task) -> Scenario:
