@@ -14,7 +14,10 @@ from pydantic import Field, model_validator
 
 from companion.obstacles import Obstacle, Post, Sphere
 from companion.settings import Settings
+from companion.surfaces import Circle, Surface, SurfaceConfig
 
+MethodName = Literal["baseline", "swivel", "approach_angle", "tangential"]
+TurningSense = Literal["own", "right", "left"]
 Positive = Annotated[float, Field(gt=0.0, le=1e4)]
 Micros = Annotated[int, Field(gt=0, le=10_000_000, multiple_of=4)]
 Triple = tuple[float, float, float]
@@ -40,7 +43,7 @@ class CostConfig(Settings):
     flying the swap and the escort."""
 
     omega_t_position: Positive = 100.0
-    omega_t_velocity: Positive = 20.0
+    omega_t_velocity: Positive = 40.0
     omega_i: Positive = 0.5
 
 
@@ -103,17 +106,41 @@ class TangentialConfig(Settings):
     reach_s: float = Field(0.5, ge=0.0, le=5.0, description="the band grows by this times the closing speed")
     d_full: Positive = Field(1.0, description="m, between centres: the force is at its full there")
     omega_scale: float = Field(0.1, gt=0.0, le=1.0, description="Ω_t,min / Ω_t,max inside the band")
-    force_max: Positive = Field(3.0, description="m/s²; above u_max, or the input cancels it")
-    turning_sense: Literal["own", "right", "left"] = Field(
-        "own", description="'own': by approach, as the paper; otherwise one sense for all vehicles"
+    force_max: Positive = Field(6.0, description="m/s²; above u_max, or the input cancels it")
+    pass_speed: Positive = Field(5.0, description="m/s sideways at which the force is gone; whole up to half")
+    gap: float = Field(
+        3.2, ge=0.0, le=100.0, description="m between surfaces; what is nearer to each other is passed as one"
     )
 
 
-class SurfaceConfig(Settings):
-    """The circle around the target."""
+class SwivelConfig(Settings):
+    """The swivelling destination, Sec. III-C.1."""
 
-    radius: float = Field(4.0, ge=0.0, le=100.0)
-    height: float = Field(5.0, ge=-50.0, le=100.0, description="m above the target")
+    k_s: Positive = Field(0.08, description="rad per m of ‖∇J‖/Ω_t; the paper has 0.05 of its own gradient")
+    arrived: Positive = Field(0.3, description="‖∇J‖ below which the vehicle is there and its sense is free")
+
+
+class ApproachAngleConfig(Settings):
+    """The field of approach angles, Sec. III-C.2. Its distances are squares of angles, rad²."""
+
+    gain: Positive = Field(2.0, description="K of the angles")
+    d_min: Positive = Field(0.01, description="rad²: the field is clamped there")
+    d_safe: Positive = Field(1.0, description="rad²: the field begins there; (2π/8)² is 0.62")
+    force_max: Positive = Field(4.0, description="m/s²; above u_max, or the input cancels it")
+    pass_speed: Positive = Field(3.0, description="m/s across at which the force is gone; whole up to half")
+
+    @model_validator(mode="after")
+    def _order(self) -> ApproachAngleConfig:
+        if self.d_safe <= self.d_min:
+            raise ValueError("d_safe must be larger than d_min")
+        return self
+
+
+class OwnSurface(Settings):
+    """The surface of one vehicle."""
+
+    vehicle: int = Field(ge=1, le=255, description="system id")
+    surface: SurfaceConfig
 
 
 class TrackConfig(Settings):
@@ -179,8 +206,12 @@ class CompanionConfig(Settings):
     """Everything one companion needs beside its links."""
 
     task: Literal["escort", "goto"] = "escort"
-    methods: tuple[Literal["baseline", "tangential"], ...] = ("tangential",)
+    methods: tuple[MethodName, ...] = ("tangential",)
+    turning_sense: TurningSense = Field(
+        "own", description="'own': by approach, as the paper; otherwise one sense for all vehicles"
+    )
     planar: bool = False
+    shares_plan: bool = Field(True, description="tell the others the horizon that is flown")
     neighbour_prediction: Literal["held", "velocity"] = Field(
         "held",
         description="without a shared horizon: the paper holds the n = 0 position; 'velocity' moves it on",
@@ -199,10 +230,22 @@ class CompanionConfig(Settings):
     limits: LimitsConfig = LimitsConfig()
     field: FieldConfig = FieldConfig()
     tangential: TangentialConfig = TangentialConfig()
-    surface: SurfaceConfig = SurfaceConfig()
+    swivel: SwivelConfig = SwivelConfig()
+    approach_angle: ApproachAngleConfig = ApproachAngleConfig()
+    surface: SurfaceConfig = Circle()
+    surfaces: tuple[OwnSurface, ...] = Field(
+        (), max_length=255, description="of vehicles that have their own"
+    )
+    turn_rate: float = Field(
+        0.0, ge=-1.0, le=1.0, description="rad/s, counter-clockwise from above: the ring turns on its surface"
+    )
     heading: HeadingConfig = HeadingConfig()
     guard: GuardConfig = GuardConfig()
     rates: RatesConfig = RatesConfig()
+
+    def surface_of(self, system: int) -> Surface:
+        """Where the vehicle of that system id is to be around the target."""
+        return next((own.surface for own in self.surfaces if own.vehicle == system), self.surface)
 
     @model_validator(mode="after")
     def _consistent(self) -> CompanionConfig:
@@ -210,8 +253,11 @@ class CompanionConfig(Settings):
         least = max(self.limits.v_max[:2]) * dt + max(self.limits.u_max[:2]) * dt**2 / 2
         if self.tangential.d_band <= least:
             raise ValueError(f"tangential.d_band must exceed v_max·dt + u_max·dt²/2 = {least:.2f} m")
-        if self.tangential.force_max <= max(self.limits.u_max):
-            raise ValueError("tangential.force_max must exceed u_max, or the input cancels it")
+        for name in ("tangential", "approach_angle"):
+            if name in self.methods and getattr(self, name).force_max <= max(self.limits.u_max):
+                raise ValueError(f"{name}.force_max must exceed u_max, or the input cancels it")
+        if len(set(self.methods)) != len(self.methods):
+            raise ValueError("methods: a method is there twice; allowed: once")
         if (self.target_d_min is None) != (self.target_d_safe is None):
             raise ValueError("target_d_min and target_d_safe come together")
         nearest = self.field.d_safe

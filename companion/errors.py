@@ -18,3 +18,7 @@ class SolverError(CompanionError):
         super().__init__(f"the QP was not solved: {status} after {iterations} iterations")
         self.status = status
         self.iterations = iterations
+
+
+class SurfaceError(CompanionError):
+    """A user's surface cannot be used. Example: its function raises, or gives a NaN."""

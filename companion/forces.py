@@ -3,14 +3,16 @@
 F(d) = K · (π/2)/(d_safe − d_min) · (cot z + z − π/2),  z = (π/2)(d − d_min)/(d_safe − d_min)
 
 Settled against the text: the force points *away* from the obstacle (the printed α points towards it); below
-d_min the formula turns negative, so it is clamped there; "tends to infinity" ends at the acceleration that
-the vehicle has.
+d_min the formula turns negative, so it is clamped there, far above what the vehicle has. It is the sum that
+is limited to a_total, not its parts, or one that pushes from behind would cancel one that is about to be hit.
 
 Closing speed. From d_safe = 3 m the bare field cannot stop two vehicles that meet at 5 m/s each: that takes
 about 10 m/s² net. So the distance that enters F is what would be left after braking, d − ċ²/(2 a_rel) with ċ
 the speed of closing and a_rel the relative deceleration to count on. At rest this is the paper's field; when
 closing fast its reach grows with the square of the speed, and d_min is approached no faster than can be
-braked. ``braking=None`` is the paper's field alone.
+braked. Who moves away has as much to spare, up to twice its distance from d_min: a field that pushes as hard
+on the way out as on the way in flings vehicles out of every encounter. ``braking=None`` is the paper's field
+alone.
 """
 
 from __future__ import annotations
@@ -76,7 +78,10 @@ def repulsion(
         return np.zeros_like(own)
     away = own - obstacles.positions
     distance = np.sqrt(np.vecdot(away, away))
-    reserve = distance if braking is None else distance - stopping_distance(distance, braking, dt)
+    reserve = distance
+    if braking is not None:
+        spare = np.maximum(distance - obstacles.d_min[:, None], 0.0)
+        reserve = distance - np.maximum(stopping_distance(distance, braking, dt), -spare)
     if (reserve >= obstacles.d_safe[:, None]).all():
         return np.zeros_like(own)
     force = magnitude(reserve, obstacles.d_min[:, None], obstacles.d_safe[:, None], gain, clamp)
@@ -89,13 +94,12 @@ def repulsion(
 
 
 def stopping_distance(distance: Array, braking: float, dt: float) -> Array:
-    """ċ²/(2 a_rel) (M, N + 1) from predicted distances (M, N + 1), with ċ their rate where they shrink, else
-    0."""
+    """ċ²/(2 a_rel) (M, N + 1) from predicted distances (M, N + 1), with ċ their rate; negative where they
+    grow."""
     closing = np.empty_like(distance)
     np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
     closing[:, -1] = closing[:, -2]
-    np.maximum(closing, 0.0, out=closing)
-    result: Array = closing**2 * (0.5 / (braking * dt**2))
+    result: Array = closing * np.abs(closing) * (0.5 / (braking * dt**2))
     return result
 
 

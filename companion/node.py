@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -9,18 +10,18 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.config import CompanionConfig
-from companion.errors import CompanionError
+from companion.errors import CompanionError, SurfaceError
 from companion.forces import Obstacles
 from companion.guard import Guard
 from companion.heading import Heading
 from companion.horizon import Array, Horizon, Motion
 from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
+from companion.plan_log import PlanLog
 from companion.planner import Aim, Plan, Planner
 from companion.reception import LINKS, accepts
 from companion.setpoint import setpoint
 from companion.settling import Settling
 from companion.sharing import Sharing
-from companion.surface import circle
 from companion.world import View, World
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, LocalFrame
@@ -80,12 +81,14 @@ class Companion:
         self._frame: LocalFrame | None = None
         self._goal: Array | None = None
         self._settling = Settling(config)
+        self._surface = config.surface_of(system)
         self._obstacles = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
         self._heading = Heading(config.heading, config.horizon)
         self._boot: int | None = None
         self._next_plan = self._next_setpoint = 0
         self._plans = self._relaxed = 0
         self._plan_ns = array("I")
+        self.plan_log = PlanLog()
 
     @property
     def tally(self) -> Tally:
@@ -198,7 +201,10 @@ class Companion:
         self._plan(now, view, measured)
 
     def _plan(self, now: int, view: View, measured: Motion) -> None:
-        aim = self._aim(now, view, measured)
+        try:
+            aim = self._aim(now, view, measured)
+        except SurfaceError:
+            aim = None
         if aim is None:
             self.guard.hold(now, solver=False)
             return
@@ -219,6 +225,7 @@ class Companion:
         finally:
             self._plan_ns.append(min(max(self._stopwatch() - started, 0), _LONGEST_NS))
         self._plans += 1
+        self.plan_log.add(now, self.plan.gradient)
         self._relaxed += self.plan.relaxed
         self.guard.accept(now, self.plan.horizon)
         self._face(now, view, self.plan.horizon)
@@ -246,8 +253,16 @@ class Companion:
         if target is None:
             return None
         ahead = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
-        destination = circle(target.position, measured.position, config.surface.radius, config.surface.height)
-        return Aim(destination + ahead * target.velocity, target.velocity, target.position)
+        surface, velocity = self._surface, target.velocity
+        offset = surface.nearest(measured.position - target.position)
+        if config.turn_rate:
+            angle = config.turn_rate * ahead
+            c, s = math.cos(angle), math.sin(angle)
+            x, y, z = offset
+            offset = surface.nearest(np.array([c * x - s * y, s * x + c * y, z]))
+            velocity = velocity + config.turn_rate * np.array([-offset[1], offset[0], 0.0])
+        destination = target.position + ahead * target.velocity + offset
+        return Aim(destination, velocity, target.position, surface)
 
     def _setpoints(self, now: int, view: View) -> list[Message]:
         if now < self._next_setpoint:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import expm1
 from typing import NamedTuple
 
@@ -12,15 +13,20 @@ from companion.dqmpc import Dqmpc, Problem
 from companion.forces import Obstacles, limit, repulsion
 from companion.horizon import Array, Horizon, roll_out
 from companion.methods import Influence, Method, Scene
+from companion.methods.approach_angle import ApproachAngle
+from companion.methods.swivel import Swivel
 from companion.methods.tangential import Tangential
+from companion.surfaces import Surface
 
 
 class Aim(NamedTuple):
-    """Where to: destination x̌ (3,), terminal velocity (3,), and the target to face (3,); fleet-local ENU."""
+    """Where to: destination x̌ (3,), terminal velocity (3,), the target to face (3,), fleet-local ENU; and the
+    surface that x̌ lies on, None for a goal."""
 
     destination: Array
     velocity: Array
     target: Array
+    surface: Surface | None = None
 
 
 class Plan(NamedTuple):
@@ -53,7 +59,8 @@ class Planner:
 
         SolverError when there is no solution: the caller holds what it has.
         """
-        to_go = aim.destination - self.dqmpc.seconds * aim.velocity - position
+        travel = self.dqmpc.seconds * aim.velocity
+        to_go = aim.destination - travel - position
         scene = Scene(
             position,
             velocity,
@@ -64,16 +71,18 @@ class Planner:
             aim.target,
             obstacles,
             self._gradient,
+            aim.target + travel,
+            aim.surface,
         )
         influence = self._influence(now, scene)
         problem = self.dqmpc.problem(
-            position, velocity, influence.force, aim.destination, aim.velocity, influence.omega_scale
+            position, velocity, influence.force, influence.destination, aim.velocity, influence.omega_scale
         )
         solution = self.dqmpc.solve(problem, influence.omega_scale)
         horizon = roll_out(now, self.config.horizon.dt_us, position, velocity, solution.acceleration)
         end = horizon.knots[-1]
         self._gradient = self.dqmpc.gradient(
-            solution.acceleration, end[0:3], end[3:6], aim.destination, aim.velocity
+            solution.acceleration, end[0:3], end[3:6], influence.destination, aim.velocity
         )
         return Plan(
             horizon, aim, influence.force, self._gradient, influence.omega_scale, solution.relaxed, problem
@@ -83,15 +92,20 @@ class Planner:
         config = self.config
         a_total = config.limits.a_total
         field = repulsion(
-            scene.prediction, scene.obstacles, config.field.gain, a_total, config.field.braking, self.dqmpc.dt
+            scene.prediction,
+            scene.obstacles,
+            config.field.gain,
+            _NEAREST_COUNTS * a_total,
+            config.field.braking,
+            self.dqmpc.dt,
         )
-        influence = Influence(field, 1.0)
+        influence = Influence(field, 1.0, scene.destination)
         for method in self._methods:
             influence = method.influence(scene, influence)
         force = influence.force
         if config.planar:
             force = force * _FLAT
-        return Influence(self._smoothed(now, limit(force, a_total)), influence.omega_scale)
+        return influence._replace(force=self._smoothed(now, limit(force, a_total)))
 
     def _smoothed(self, now: int, force: Array) -> Array:
         """The field without its steps: neighbours' plans arrive at 10 Hz and would jolt the attitude."""
@@ -104,9 +118,17 @@ class Planner:
 
 
 _FLAT = np.array([1.0, 1.0, 0.0])
+_NEAREST_COUNTS = 20.0
+"""The sum is limited to a_total, not its parts: were each limited, two that push from behind would cancel one
+that is about to be hit."""
 
 
 def build(config: CompanionConfig) -> list[Method]:
     """The strategies that the configuration names, in its order; ``baseline`` adds nothing."""
     u_max, dt = max(config.limits.u_max), config.horizon.dt_us * 1e-6
-    return [Tangential(config.tangential, u_max, dt) for name in config.methods if name == "tangential"]
+    makers: dict[str, Callable[[], Method]] = {
+        "swivel": lambda: Swivel(config.swivel, config.turning_sense),
+        "approach_angle": lambda: ApproachAngle(config.approach_angle, config.turning_sense),
+        "tangential": lambda: Tangential(config.tangential, config.turning_sense, u_max, dt),
+    }
+    return [makers[name]() for name in config.methods if name != "baseline"]

@@ -56,7 +56,7 @@ class Sharing:
         fresh = view.own is not None and view.own.age <= self._config.guard.own_stale_us
         if self._passes(1, now, rates.state_us) and fresh:
             shared.swarm.append(self._position(now - self._boot, view))
-        if self._passes(2, now, rates.plan_us) and horizon is not None:
+        if self._passes(2, now, rates.plan_us) and horizon is not None and self._config.shares_plan:
             plan = self._plan(horizon)
             if plan is not None:
                 shared.swarm.append(plan)

@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 
 from companion.forces import Obstacles
 from companion.horizon import Array
+from companion.surfaces import Surface
 
 
 class Scene(NamedTuple):
@@ -14,7 +15,8 @@ class Scene(NamedTuple):
 
     ``prediction`` (N + 1, 3) is the previous plan at n = 0…N from now; ``gradient`` the last ∇J (3,), zero at
     first. ``to_go`` (3,) leads from the vehicle to where its destination is *now*: in a moving formation what
-    flies along with everybody is in nobody's way.
+    flies along with everybody is in nobody's way. ``target_end`` (3,) is where the target will be when the
+    horizon ends, ``surface`` what the destination lies on around it, None for a goal of its own.
     """
 
     position: Array
@@ -26,13 +28,16 @@ class Scene(NamedTuple):
     target: Array
     obstacles: Obstacles
     gradient: Array
+    target_end: Array
+    surface: Surface | None = None
 
 
 class Influence(NamedTuple):
-    """What a method changes: the field f (N + 1, 3), and the factor on Ω_t."""
+    """What a method changes: the field f (N + 1, 3), the factor on Ω_t, and the destination x̌ (3,)."""
 
     force: Array
     omega_scale: float
+    destination: Array
 
 
 class Method(Protocol):

@@ -9,7 +9,8 @@ time, not distance. The force grows from zero at the band's edge, quickly up to 
 much of it − and then up to ``force_max`` at ``d_full``. It acts only about obstacles that stand in the way:
 ahead, fading out from 60° off the bow to abeam, so that the band is left once the obstacle is passed; and not
 beyond the destination, fading out over d_safe. The sense is latched per obstacle for as long as the encounter
-lasts, otherwise it chatters when the bearing crosses zero.
+lasts, otherwise it chatters when the bearing crosses zero. Obstacles with no way between them (``gap``) are
+passed as one, with one sense: about each with its own, a vehicle before a U would be sent between its ends.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from math import sqrt
 
 import numpy as np
 
-from companion.config import TangentialConfig
+from companion.config import TangentialConfig, TurningSense
 from companion.forces import Obstacles
 from companion.horizon import Array
 from companion.methods import Influence, Scene
@@ -28,6 +29,8 @@ _ABEAM = 0.5
 _QUICK = 10.0
 """How much faster the force grows up to u_max than beyond."""
 _NEAR = 1e-6
+_SLOW, _SOON = 0.5, 3.0
+"""m/s and s: slower than that nobody is on the way; what happens later does not count."""
 _RIGHT: Array = np.array([1.0])
 _LEFT: Array = np.array([-1.0])
 
@@ -35,8 +38,9 @@ _LEFT: Array = np.array([-1.0])
 class Tangential:
     """The band around every obstacle; latches one turning sense per obstacle id."""
 
-    def __init__(self, config: TangentialConfig, u_max: float, dt: float) -> None:
+    def __init__(self, config: TangentialConfig, turning: TurningSense, u_max: float, dt: float) -> None:
         self._config = config
+        self._turning = turning
         self._u_max = u_max
         self._dt = dt
         self._sense: dict[int, float] = {}
@@ -64,7 +68,13 @@ class Tangential:
             config.k_tang * sqrt(scene.gradient @ scene.gradient),
             u_max * min(1.0, _QUICK * whole) + (config.force_max - u_max) * whole,
         )
-        return Influence(influence.force + total * (strength / norm), config.omega_scale)
+        direction = total / norm
+        # Who is under way sideways already is not made faster still, or it is flung out.
+        sideways = float(scene.velocity @ direction)
+        strength *= min(max(2.0 * (1.0 - sideways / config.pass_speed), 0.0), 1.0)
+        return influence._replace(
+            force=influence.force + direction * strength, omega_scale=config.omega_scale
+        )
 
     def _weights(self, scene: Scene, away: Array, distance: Array) -> Array:
         """How much each obstacle's band acts, (M,) in 0…1; ``away`` (M, 3) and its norms ``distance``."""
@@ -78,8 +88,18 @@ class Tangential:
         along = -(away @ to_go) / length
         ahead = _share(along / (_ABEAM * distance))
         before = _share(1.0 + (length - along) / obstacles.d_safe)
-        weights: Array = depth * ahead * before
+        weights: Array = depth * ahead * before * self._meeting(obstacles, away, moving - scene.velocity)
         return weights
+
+    def _meeting(self, obstacles: Obstacles, away: Array, velocity: Array) -> Array:
+        """How near (0…1) each obstacle comes if both go on as they do; ``velocity`` (M, 3) is relative to the
+        own."""
+        config = self._config
+        square = np.vecdot(velocity, velocity) + _SLOW**2
+        time = np.minimum(np.maximum(np.vecdot(away, velocity) / square, 0.0), _SOON)
+        miss = away - time[:, None] * velocity
+        distance = np.sqrt(np.vecdot(miss, miss))
+        return _share((obstacles.d_safe - distance) / (obstacles.d_safe - config.d_full - obstacles.radius))
 
     def _release(self, obstacles: Obstacles, weight: Array) -> None:
         if not self._sense:
@@ -93,20 +113,61 @@ class Tangential:
         """Per obstacle +1: counter-clockwise about it as seen from above (it stays on the left), −1:
         clockwise."""
         config = self._config
-        if config.turning_sense != "own":
-            return _RIGHT if config.turning_sense == "right" else _LEFT
+        if self._turning != "own":
+            return _RIGHT if self._turning == "right" else _LEFT
         senses = np.zeros(len(weight))
-        for j in np.flatnonzero(weight > 0.0):
-            name = obstacles.ids[j]
-            if name not in self._sense:
-                # An obstacle to the left of the course is left on the left.
-                left = to_go[1] * away[j, 0] - to_go[0] * away[j, 1]
-                self._sense[name] = 1.0 if left >= 0.0 else -1.0
-            senses[j] = self._sense[name]
+        acting = np.flatnonzero(weight > 0.0)
+        new = [j for j in acting if obstacles.ids[j] not in self._sense]
+        if new:
+            for group in groups(
+                away[acting, :2], np.broadcast_to(obstacles.radius, len(weight))[acting], config.gap
+            ):
+                self._latch([int(acting[j]) for j in group], obstacles, weight, away, to_go)
+        for j in acting:
+            senses[j] = self._sense[obstacles.ids[j]]
         return senses
+
+    def _latch(
+        self, group: list[int], obstacles: Obstacles, weight: Array, away: Array, to_go: Array
+    ) -> None:
+        """The sense of those that are new in a group: that of the group, or on which side most of it is."""
+        names = [obstacles.ids[j] for j in group]
+        known = [
+            (weight[j], self._sense[name])
+            for j, name in zip(group, names, strict=True)
+            if name in self._sense
+        ]
+        if known:
+            sense = max(known)[1]
+        else:
+            # What is to the left of the course is left on the left.
+            x, y = (weight[group, None] * away[group, :2]).sum(axis=0)
+            sense = 1.0 if to_go[1] * x - to_go[0] * y >= 0.0 else -1.0
+        for name in names:
+            self._sense.setdefault(name, sense)
 
 
 def _share(x: Array) -> Array:
     """Clipped to 0…1; ``np.clip`` costs four times as much for arrays this small."""
     result: Array = np.minimum(np.maximum(x, 0.0), 1.0)
     return result
+
+
+def groups(places: Array, radius: Array, gap: float) -> list[list[int]]:
+    """Indices of places (m, 2), those in one group that are connected by gaps of less than ``gap`` between
+    their surfaces."""
+    count = len(places)
+    off = places[:, None] - places[None, :]
+    size = np.broadcast_to(radius, count)
+    near = np.hypot(off[..., 0], off[..., 1]) - size[:, None] - size[None, :] < gap
+    left, found = set(range(count)), []
+    while left:
+        group, todo = [], [left.pop()]
+        while todo:
+            one = todo.pop()
+            group.append(one)
+            joined = [other for other in left if near[one, other]]
+            left.difference_update(joined)
+            todo += joined
+        found.append(sorted(group))
+    return found

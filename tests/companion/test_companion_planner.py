@@ -24,7 +24,7 @@ def configured(**settings):
 
 
 def sense(name):
-    return configured(tangential={"turning_sense": name})
+    return configured(turning_sense=name)
 
 
 def encounter(seed, config, matrix=None, epoch=START, count=12):
@@ -178,7 +178,7 @@ def test_the_band_leads_out_of_the_deadlock_in_which_the_field_alone_ends(name):
     goals = np.array([[7.0, 0.0, 5.0], *standing])
     errors = {}
     for method in ("baseline", "tangential"):
-        config = configured(methods=(method,), tangential={"turning_sense": turning})
+        config = configured(methods=(method,), turning_sense=turning)
         sightings = list(fly(config, starts, goals, 20.0, still=len(standing)))
         track = np.array([s.position for s in sightings])
         apart = np.linalg.norm(track[:, None] - np.array(standing), axis=2)

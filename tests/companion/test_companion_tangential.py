@@ -17,19 +17,21 @@ CONFIG = TangentialConfig()
 EDGE = D_SAFE + CONFIG.d_band
 STRONG = np.array([10.0, 0.0, 0.0])
 SENSES = st.sampled_from(["own", "right", "left"])
-NOTHING = Influence(np.zeros((16, 3)), 1.0)
+NOTHING = Influence(np.zeros((16, 3)), 1.0, ZERO)
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
 def method(sense="own", **settings):
-    return Tangential(TangentialConfig(turning_sense=sense, **settings), U_MAX, DT)
+    return Tangential(TangentialConfig(**settings), sense, U_MAX, DT)
 
 
 def scene(others, to_go=(10.0, 0.0, 0.0), position=ZERO, velocity=ZERO, gradient=STRONG):
     to_go, position = np.asarray(to_go, dtype=float), np.asarray(position, dtype=float)
     prediction = position + DT * np.arange(16)[:, None] * velocity
     destination = position + to_go
-    return Scene(position, velocity, prediction, destination, ZERO, to_go, ZERO, others, np.asarray(gradient))
+    return Scene(
+        position, velocity, prediction, destination, ZERO, to_go, ZERO, others, np.asarray(gradient), ZERO
+    )
 
 
 def force(*args, sense="own", **kwargs):
@@ -82,7 +84,7 @@ def test_it_begins_at_zero_at_the_edge_of_the_band(angle, inside, sense):
 
 
 @LAWS
-@given(closing=numbers(0.1, 8.0), offset=numbers(-0.5, 0.5))
+@given(closing=numbers(2.5, 8.0), offset=numbers(-0.5, 0.5))
 def test_what_comes_fast_is_met_further_out(closing, offset):
     """The band reaches further by ``reach_s`` times the closing speed, whoever moves."""
     distance = EDGE + 0.5 * CONFIG.reach_s * closing
@@ -228,7 +230,7 @@ def test_senses_belong_to_obstacles_not_to_rows():
 
 
 def test_the_fields_force_is_kept():
-    field = Influence(np.arange(48.0).reshape(16, 3), 1.0)
+    field = Influence(np.arange(48.0).reshape(16, 3), 1.0, ZERO)
     others = obstacles([[2.0, 0.2, 0.0]])
     alone = method().influence(scene(others), NOTHING).force
     np.testing.assert_allclose(method().influence(scene(others), field).force, field.force + alone)
@@ -239,3 +241,41 @@ def test_an_obstacle_in_the_same_place_or_above_gives_a_finite_force(place):
     f, _ = force(obstacles([place]), velocity=np.array([1.0, 0.0, 0.0]))
     assert np.isfinite(f).all()
     assert np.linalg.norm(f) <= CONFIG.force_max + 1e-9
+
+
+@LAWS
+@given(aside=numbers(D_SAFE + 0.1, 3.9), speed=numbers(1.0, 5.0))
+def test_who_is_passed_by_far_is_not_passed_around(aside, speed):
+    """In the band and ahead, but its course leads past by more than d_safe."""
+    place = [2.0, aside, 0.0]
+    assert not force(obstacles([place]), velocity=[speed, 0.0, 0.0])[0].any()
+
+
+def test_who_is_fast_sideways_is_not_made_faster():
+    """From rest the force is whole; at ``pass_speed`` along it there is none."""
+    ahead = obstacles([[1.5, 0.05, 0.0]])
+    still = force(ahead)[0]
+    sideways = still / np.linalg.norm(still)
+    half, whole = (force(ahead, velocity=share * CONFIG.pass_speed * sideways)[0] for share in (0.5, 1.0))
+    assert np.linalg.norm(half) > 0.0
+    assert not whole.any()
+
+
+@pytest.mark.parametrize("shift", [-0.4, 0.4])
+def test_a_row_with_no_way_through_is_passed_as_one(shift):
+    """Each alone would be left on its own side, and the forces would cancel between the two."""
+    row = obstacles([[2.0, shift + 0.7, 0.0], [2.0, shift - 0.7, 0.0]])
+    f = force(row)[0]
+    assert abs(f[1]) > CONFIG.force_max / 2
+    # The middle of the row is to the left if it is shifted there: it is passed on its right.
+    assert np.sign(f[1]) == -np.sign(shift)
+    wide = obstacles([[2.0, shift + 1.7, 0.0], [2.0, shift - 1.7, 0.0]])
+    assert abs(force(wide)[0][1]) < abs(f[1])
+
+
+def test_who_joins_a_group_is_passed_as_the_group_is():
+    method_ = method()
+    one, two = [[2.0, 0.3, 0.0]], [[2.0, 0.3, 0.0], [2.0, -2.0, 0.0]]
+    first = method_.influence(scene(obstacles(one)), NOTHING).force[0]
+    second = method_.influence(scene(obstacles(two)), NOTHING).force[0]
+    assert np.sign(first[1]) == np.sign(second[1]) == -1.0

@@ -266,6 +266,7 @@ def test_a_flight_ends_with_one_json_object_and_a_full_directory(run: Run, tmp_p
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == [
         "configuration.yaml",
         "flight.png",
+        "plans.npz",
         "summary.json",
         "vehicle-11.tlog",
     ]

@@ -34,7 +34,7 @@ def test_a_shipped_file_is_named_after_its_scenario_and_can_be_flown(name: str) 
     assert shipped.name == name
     assert shipped.description
     flight = Flight(shipped, FIREFLY, 1, LOGS)
-    assert len(flight.autopilots) == len(flight.companions) == shipped.vehicles
+    assert len(flight.autopilots) == len(flight.companions) == shipped.size
     assert flight.systems[0] == FIRST_SYSTEM
 
 
@@ -48,10 +48,15 @@ def test_a_scenario_survives_json(name: str) -> None:
 def test_vehicles_start_farther_apart_than_d_min_and_inside_the_box(name: str) -> None:
     shipped = load(SCENARIOS[name], Scenario)
     limits, jitter = shipped.companion.limits, shipped.starts.jitter
-    exact = shipped.model_copy(update={"starts": shipped.starts.model_copy(update={"jitter": 0.0})})
+    still = tuple(other.model_copy(update={"jitter": 0.0}) for other in shipped.bystanders)
+    exact = shipped.model_copy(
+        update={"starts": shipped.starts.model_copy(update={"jitter": 0.0}), "bystanders": still}
+    )
     places = starts(exact, 1, False).positions
-    apart = np.linalg.norm(places[:, None] - places, axis=2)[np.triu_indices(len(places), 1)]
-    assert apart.min() - 2.0 * jitter > 2.0 * shipped.d_min
+    moved = np.array([jitter] * shipped.vehicles + [other.jitter for other in shipped.bystanders])
+    i, j = np.triu_indices(len(places), 1)
+    apart = np.linalg.norm(places[i] - places[j], axis=1) - moved[i] - moved[j]
+    assert apart.min() > 2.0 * shipped.d_min
     assert (places - jitter > limits.box_min).all()
     assert (places + jitter < limits.box_max).all()
 

@@ -159,7 +159,7 @@ def test_violations_are_those_of_vehicles_and_of_the_target() -> None:
 def test_the_method_and_its_turning_sense_are_named(
     of: Scenario, methods: tuple[str, ...], sense: str, said: tuple[str, str]
 ) -> None:
-    companion = {"methods": methods, "tangential": {"turning_sense": sense}}
+    companion = {"methods": methods, "turning_sense": sense}
     found = summary(scenario=scenario(of.name, vehicles=2, companion=companion))
     assert (found["method"], found["turning_sense"]) == said
 

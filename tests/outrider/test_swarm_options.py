@@ -81,7 +81,10 @@ def test_options_leave_the_scenario_that_was_given_alone() -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (Options(method="tangentail"), "'tangentail' is no method; allowed are baseline, tangential"),
+        (
+            Options(method="tangentail"),
+            "'tangentail' is no method; allowed are baseline, swivel, approach_angle, tangential",
+        ),
         (Options(method=""), "is no method"),
         (Options(method="tangential+"), "is no method"),
         (Options(method="tangential+tangential"), "twice"),

@@ -12,9 +12,9 @@ from flight_facts import arrived, check_told, clock, log
 from lockstep_flights import FIREFLY, Flown, check, fly, scenario
 
 from companion.obstacles import FixedObstacles
-from companion.surface import circle_error
 from mavlink_bridge.messages import GlobalPosition
 from outrider.names import LINK_NUMBERS
+from outrider.standoff import standoff
 from outrider.summary import exit_status
 
 BLOCKED: dict[str, Any] = {
@@ -90,11 +90,10 @@ def test_a_target_that_jumps_is_followed_each_time(tmp_path: Path) -> None:
     flown = fly(of, 1, tmp_path)
     check_told(flown)
     samples, times = clock(flown)
-    surface = of.companion.surface
     # True places: at every sample after the goal event the newest of those whose time has come.
     expected = [max(jump for jump in JUMPS if jump[0] <= time + 1e-6)[1] for time in times[1:]]
     assert np.array_equal(samples.target[1:], expected)
-    error = circle_error(samples.target[:, None], samples.position, surface.radius, surface.height)
+    error = standoff(of, samples.position, samples.target)
     speed = np.linalg.norm(samples.velocity, axis=-1)
     for jump, _ in JUMPS:
         assert error[(times > jump) & (times < jump + 0.1)].max() > 1.0

@@ -19,6 +19,7 @@ app = typer.Typer(
     help="A ring of MAVs escorts a moving target without colliding.",
 )
 BAD_INPUT, FAULT = 2, 3
+_METHODS: Final = "baseline, swivel, approach_angle, tangential; joined by +."
 _INTERRUPTED = 130
 """What typer makes of Ctrl-C."""
 _EXTRAS: Final = {"numba": "sitl", "llvmlite": "sitl", "jsbsim": "sitl"}
@@ -35,7 +36,9 @@ def _root() -> None:
 @app.command()
 def swarm(
     scenario: Annotated[str, typer.Argument(help="A file, or the name of a shipped scenario.")],
-    method: Annotated[Optional[str], typer.Option(help="baseline, tangential; joined by +.")] = None,  # noqa: UP045
+    method: Annotated[
+        str | None, typer.Option(help="baseline, swivel, approach_angle, tangential; joined by +.")
+    ] = None,
     avoidance: Annotated[Optional[str], typer.Option(help="field.")] = None,  # noqa: UP045
     planar: Annotated[bool, typer.Option("--planar", help="Fix the height, as the paper.")] = False,
     vehicles: Annotated[Optional[int], typer.Option(help="How many fly.")] = None,  # noqa: UP045
@@ -86,6 +89,19 @@ def sweep(
     from outrider.sweeps.command import sweep as sweeping
 
     raise typer.Exit(sweeping(name, runs, jobs, out, as_json, wall_limit))
+
+
+@app.command()
+def paper(
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Flights of each row.")] = 10,
+    jobs: Annotated[Optional[int], typer.Option(min=1, help="Processes; as many as cores.")] = None,  # noqa: UP045
+    out: Annotated[Optional[Path], typer.Option(help="Directory; one begun is gone on with.")] = None,  # noqa: UP045
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Fly the paper's methods and scenarios, and put its table beside ours."""
+    from outrider.paper.command import paper as comparing
+
+    raise typer.Exit(comparing(seeds, jobs, out, as_json))
 
 
 @app.command()

@@ -14,10 +14,9 @@ import numpy as np
 
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
-from companion.heading import Heading
+from companion.heading import Heading, bearing
 from companion.planner import Aim, Planner
 from companion.setpoint import setpoint
-from companion.surface import bearing
 from companion.world import World
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, enu_to_ned

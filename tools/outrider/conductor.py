@@ -3,14 +3,15 @@ convergence or the cap, land."""
 
 from __future__ import annotations
 
+from collections import deque
 from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 
-from companion.surface import circle_error
 from outrider.operator import Operator
 from outrider.scenario import FixedTarget, Scenario
+from outrider.standoff import standoff
 from outrider.starts import Starts
 from outrider.truth import Array
 from sitl.profiles import PROFILES
@@ -53,6 +54,24 @@ class Sight(NamedTuple):
     armed: bool
 
 
+class _Intruder(NamedTuple):
+    """A bystander that sets out ``after`` µs for its goal (3,)."""
+
+    after: int
+    system: int
+    goal: Array
+
+
+def _intruders(scenario: Scenario) -> list[_Intruder]:
+    """In the order of time."""
+    found = [
+        _Intruder(round(1e6 * other.after_s), system, np.array(other.goal))
+        for system, other in zip(scenario.systems[scenario.vehicles :], scenario.bystanders, strict=True)
+        if other.goal is not None
+    ]
+    return sorted(found, key=lambda intruder: intruder.after)
+
+
 class Conductor:
     """The stages of one flight. ``failure`` says why if it never got to its clock or did not land."""
 
@@ -71,6 +90,11 @@ class Conductor:
         target = scenario.target
         jumps = target.jumps if isinstance(target, FixedTarget) else ()
         self._last_jump = round(1e6 * jumps[-1].after_s) if jumps else 0
+        self._intruders = deque(_intruders(scenario))
+        self._reach = max(
+            float(np.hypot(outline[:, 0], outline[:, 1]).max())
+            for outline in (scenario.companion.surface_of(s).outline() for s in scenario.systems)
+        )
         for k, system in enumerate(scenario.systems):
             operator.take_off(system, float(starts.positions[k, 2]))
 
@@ -104,19 +128,21 @@ class Conductor:
             self._land(now)
 
     def errors(self, sight: Sight) -> Array:
-        """Distance (K,) of each vehicle from where it should be: its goal, or the surface around the
-        target."""
+        """Distance (vehicles,) of each that flies the task from where it should be: its goal, or its surface
+        around the target."""
+        positions = sight.positions[: self._scenario.vehicles]
         if self._starts.goals is not None:
-            return np.asarray(np.linalg.norm(sight.positions - self._starts.goals, axis=1))
+            return np.asarray(np.linalg.norm(positions - self._starts.goals, axis=1))
         if sight.target is None:
-            return np.full(len(sight.positions), np.nan)
-        surface = self._scenario.companion.surface
-        return circle_error(sight.target, sight.positions, surface.radius, surface.height)
+            return np.full(len(positions), np.nan)
+        return standoff(self._scenario, positions, sight.target)
 
     def _prepare(self, sight: Sight) -> None:
         now, still = sight.now, _RESTLESS[self._scenario.sensors]
         if self._scenario.weather.w20 > 0.0:
             still = _TOSSED
+        # A ring that turns never stands still.
+        still += abs(self._scenario.companion.turn_rate) * self._reach
         calm = sight.ready and float(np.linalg.norm(sight.velocities, axis=1).max()) < still
         if not calm:
             self._calm_since = None
@@ -129,15 +155,19 @@ class Conductor:
             return
         self.stage, self.clock_start = Stage.CLOCK, now
         if self._starts.goals is not None:
-            for system, goal in zip(self._scenario.systems, self._starts.goals, strict=True):
+            for system, goal in zip(self._scenario.systems, self._starts.goals, strict=False):
                 self._operator.goal(system, goal)
 
     def _count(self, sight: Sight) -> None:
         now = sight.now
         since = now - (self.clock_start or 0)
+        while self._intruders and self._intruders[0].after <= since:
+            _, system, goal = self._intruders.popleft()
+            self._operator.goal(system, goal)
         if self._scenario.has_goal and self.converged_at is None and since >= self._last_jump:
             near = bool((self.errors(sight) < self.near).all())
-            if near and bool((np.linalg.norm(sight.velocities, axis=1) < SLOW).all()):
+            speeds = np.linalg.norm(sight.velocities[: self._scenario.vehicles], axis=1)
+            if near and bool((speeds < SLOW).all()):
                 self._near_since = now if self._near_since is None else self._near_since
                 if now - self._near_since >= HOLD:
                     self.converged_at = self._near_since

@@ -25,17 +25,18 @@ def draw(flight: Outcome, summary: dict[str, Value], path: Path) -> None:
     from matplotlib.figure import Figure
 
     samples = flight.truth.samples()
-    figure = Figure(figsize=(13, 9), layout="constrained")
+    figure = Figure(figsize=(13, 10.5), layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(4, 2, width_ratios=(1.15, 1.0))
+    grid = figure.add_gridspec(5, 2, width_ratios=(1.15, 1.0))
     _paths(figure.add_subplot(grid[:, 0]), flight, samples)
     time = (samples.time - (flight.clock_start or samples.time[0])) * 1e-6
-    right = [figure.add_subplot(grid[row, 1]) for row in range(4)]
-    for axes in right[1:3]:
+    right = [figure.add_subplot(grid[row, 1]) for row in range(5)]
+    for axes in right[1:4]:
         axes.sharex(right[0])
     _separation(right[0], flight, samples, time)
     _errors(right[1], right[2], flight, samples, time)
-    _plan_time(right[3], flight)
+    _gradients(right[3], flight)
+    _plan_time(right[4], flight)
     figure.suptitle(_headline(flight, summary))
     figure.savefig(path, dpi=110)
 
@@ -66,15 +67,8 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
         name = "target" if flight.target_system == TARGET_SYSTEM else f"target {flight.target_system}"
         axes.plot(*there[-1, :2], "*", ms=12, color=_TARGET, label=name)
         if flight.scenario.task == "escort":
-            angle = np.linspace(0.0, 2.0 * np.pi, 200)
-            radius = flight.scenario.companion.surface.radius
-            axes.plot(
-                there[-1, 0] + radius * np.cos(angle),
-                there[-1, 1] + radius * np.sin(angle),
-                color=_TARGET,
-                lw=0.8,
-                ls="--",
-            )
+            outline = there[-1] + flight.scenario.companion.surface.outline()
+            axes.plot(outline[:, 0], outline[:, 1], color=_TARGET, lw=0.8, ls="--")
     axes.set(title="paths from above (o start, ● end)", xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
@@ -104,7 +98,8 @@ def _errors(standoff: Axes, yaw: Axes, flight: Outcome, samples: Samples, time: 
         standoff.set(title="stand-off error")
     else:
         goals = flight.starts.goals
-        values = np.linalg.norm(samples.position - (0.0 if goals is None else goals), axis=-1)
+        positions = samples.position[:, : flight.scenario.vehicles]
+        values = np.linalg.norm(positions - (0.0 if goals is None else goals), axis=-1)
         standoff.set(title="distance to the own goal")
     standoff.plot(time[on_clock], values[on_clock], lw=0.9)
     standoff.set(ylabel="m")
@@ -114,6 +109,16 @@ def _errors(standoff: Axes, yaw: Axes, flight: Outcome, samples: Samples, time: 
         title="yaw error", ylabel="deg", xlabel="s after the goal event" if flight.scenario.has_goal else "s"
     )
     _finish(yaw, flight)
+
+
+def _gradients(axes: Axes, flight: Outcome) -> None:
+    """‖∇J‖ of every plan: near 0 where a vehicle is done (the paper, Sec. IV)."""
+    for log in flight.plan_logs:
+        time = (log.times - (flight.clock_start or 0)) * 1e-6
+        axes.plot(time, np.linalg.norm(log.gradients, axis=1), lw=0.8)
+    axes.set(title="‖∇J‖ / Ω_t", ylabel="m")
+    axes.set_yscale("symlog", linthresh=0.1)
+    _finish(axes, flight)
 
 
 def _plan_time(axes: Axes, flight: Outcome) -> None:

@@ -10,19 +10,20 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.config import CompanionConfig
+from companion.heading import bearing
 from companion.node import Companion
-from companion.surface import bearing
 from mavlink_bridge.ether import Channel, Faults
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.node_clock import NodeClock
 from outrider import names
+from outrider.bystander import Bystander
 from outrider.operator import Operator
-from outrider.scenario import FixedTarget, Scenario
+from outrider.scenario import FixedTarget, PathTarget, Scenario
 from outrider.scenario_faults import ClockFault
 from outrider.scenario_links import Links
 from outrider.starts import starts
 from outrider.streams import Stream, stream
-from outrider.targets import Recorded, Standing, Target
+from outrider.targets import Recorded, Standing, Target, Walking
 from sitl.autopilot_config import AutopilotConfig
 from sitl.config import VehicleConfig
 from sitl.node import Autopilot
@@ -64,11 +65,31 @@ class Fleet:
         field = companion.field.model_copy(update={"position_sigma": sigma})
         return companion.model_copy(update={"obstacles": known, "field": field})
 
+    def companion_config_of(self, k: int) -> CompanionConfig:
+        """Those of vehicle ``k``: a bystander flies to goals, shares no plan and knows of no obstacle."""
+        config = self.companion_config
+        if k < self.scenario.vehicles:
+            return config
+        changes: dict[str, object] = {
+            "task": "goto",
+            "methods": ("baseline",),
+            "shares_plan": False,
+            "target_d_min": None,
+            "target_d_safe": None,
+            "obstacles": (),
+        }
+        speed = self.scenario.bystanders[k - self.scenario.vehicles].speed
+        if speed is not None:
+            changes["limits"] = config.limits.model_copy(update={"v_max": (speed,) * 3})
+        return config.model_copy(update=changes)
+
     def target(self) -> Target:
         """The target's node."""
         config = self.scenario.target
         if isinstance(config, FixedTarget):
             return Standing(config, self.frame)
+        if isinstance(config, PathTarget):
+            return Walking(config, self.frame)
         return Recorded(config, self._logs / config.log, self.frame)
 
     def operator(self) -> Operator:
@@ -77,7 +98,9 @@ class Fleet:
 
     def companion(self, k: int, stopwatch: Callable[[], int]) -> Companion:
         """The companion of vehicle ``k``; ``stopwatch`` (ns) measures its planning."""
-        return Companion(self.companion_config, self.systems[k], self.target_system, self.frame, stopwatch)
+        kind = Companion if k < self.scenario.vehicles else Bystander
+        config = self.companion_config_of(k)
+        return kind(config, self.systems[k], self.target_system, self.frame, stopwatch)
 
     def autopilot(self, k: int) -> Autopilot:
         """The autopilot and vehicle ``k``: on the ground below its start, or hovering there."""

@@ -57,10 +57,10 @@ class Flight:
         self.fleet = fleet = Fleet(scenario, vehicle, seed, logs)
         self.systems = fleet.systems
         self.target = fleet.target()
-        self.autopilots = [fleet.autopilot(k) for k in range(scenario.vehicles)]
-        self.companions = [fleet.companion(k, stopwatch) for k in range(scenario.vehicles)]
+        self.autopilots = [fleet.autopilot(k) for k in range(scenario.size)]
+        self.companions = [fleet.companion(k, stopwatch) for k in range(scenario.size)]
         self.operator = fleet.operator()
-        self.truth = Truth(scenario.vehicles, limits(scenario), FixedObstacles(scenario.obstacles))
+        self.truth = Truth(scenario.size, limits(scenario), FixedObstacles(scenario.obstacles))
         self.ether = Ether(fleet.channels(), seed, scenario.timing.base_tick_us)
         self.conductor = Conductor(scenario, fleet.starts, self.operator, EPOCH)
         self._witness = Witness(self.autopilots, self.target, self.truth)
@@ -100,6 +100,7 @@ class Flight:
             conductor.failure,
             list(zip(self._tally_at_start or now, self._tally_at_end or now, strict=True)),
             Messages(counters.sent, counters.dropped, sum(c.bad_frames for c in self.companions)),
+            plan_logs=[c.plan_log for c in self.companions],
         )
 
     def _schedule(self) -> list[Scheduled]:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from companion.config import MethodName
 from outrider.errors import InputError
 from outrider.scenario import Points, Scenario
 from outrider.schema_nodes import Schema
 
-METHODS = ("baseline", "tangential")
+METHODS = get_args(MethodName)
 _SLOWEST_PLAN = 10_000_000
 """µs."""
 _FASTEST_AIR = 50.0

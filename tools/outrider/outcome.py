@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from companion.node import Tally
+from companion.plan_log import PlanLog
 from outrider.scenario import Scenario
 from outrider.starts import Starts
 from outrider.truth import Truth
@@ -35,7 +37,7 @@ class Outcome:
     """A finished flight. Times in µs on the clock of the run; None where it did not come to that.
 
     ``tallies``: per companion at the start of the clock and at its end. ``punctuality`` is that of a
-    real-time run; lock-step has none.
+    real-time run; lock-step has none. ``plan_logs``: per companion, on its own clock.
     """
 
     scenario: Scenario
@@ -51,6 +53,7 @@ class Outcome:
     tallies: list[tuple[Tally, Tally]]
     messages: Messages
     punctuality: Punctuality | None = None
+    plan_logs: Sequence[PlanLog] = ()
 
     @property
     def systems(self) -> list[int]:

@@ -12,7 +12,17 @@ from outrider.scenario_faults import Clocks, FaultPart
 from outrider.scenario_links import ROLES, AllLinks, PartitionPart
 from outrider.scenario_overlaps import overlaps
 from outrider.scenario_part import FIRST_SYSTEM, TARGET_SYSTEM, Length, Part, Period
-from outrider.scenario_places import FixedTarget, Origin, Points, RecordedTarget, Ring, Starts, Target
+from outrider.scenario_places import (
+    Bystander,
+    FixedTarget,
+    Origin,
+    PathTarget,
+    Points,
+    RecordedTarget,
+    Ring,
+    Starts,
+    Target,
+)
 from sitl.weather import WeatherConfig
 
 __all__ = [
@@ -20,11 +30,16 @@ __all__ = [
     "TARGET_SYSTEM",
     "FixedTarget",
     "Origin",
+    "PathTarget",
     "Points",
     "RecordedTarget",
     "Ring",
     "Scenario",
 ]
+
+
+_MOST_SYSTEMS = 244
+"""System ids from 11 to 254; 255 is the operator's."""
 
 
 class Timing(Part):
@@ -43,11 +58,12 @@ class Scenario(Part):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     description: str = ""
     task: Literal["escort", "antipodal", "goto"]
-    vehicles: int = Field(ge=1, le=244)
+    vehicles: int = Field(ge=1, le=244, description="how many fly the task; bystanders are more")
     vehicle: str = Field("firefly", description="file in config/vehicles")
     flavour: Literal["ardupilot", "px4"] = "ardupilot"
     origin: Origin = Origin()
     starts: Starts
+    bystanders: tuple[Bystander, ...] = Field((), max_length=50)
     airborne: bool = Field(
         False, description="begin in the air, hovering at the starts, and end there: no take-off, no landing"
     )
@@ -81,8 +97,13 @@ class Scenario(Part):
 
     @property
     def systems(self) -> range:
-        """System ids of the fleet."""
-        return range(FIRST_SYSTEM, FIRST_SYSTEM + self.vehicles)
+        """System ids of the fleet: those that fly the task, then the bystanders."""
+        return range(FIRST_SYSTEM, FIRST_SYSTEM + self.size)
+
+    @property
+    def size(self) -> int:
+        """How many vehicles there are in all."""
+        return self.vehicles + len(self.bystanders)
 
     @model_validator(mode="after")
     def _consistent(self) -> Scenario:
@@ -112,6 +133,8 @@ class Scenario(Part):
             )
 
     def _place_faults(self) -> Iterator[str]:
+        if self.size > _MOST_SYSTEMS:
+            yield f"vehicles and bystanders are {self.size}; at most {_MOST_SYSTEMS} are allowed"
         if self.task == "antipodal" and not isinstance(self.starts, Ring):
             yield "task 'antipodal' needs starts of kind 'ring'"
         if isinstance(self.starts, Points) and self.vehicles != len(self.starts.at):

@@ -49,6 +49,23 @@ class Points(Part):
         return self
 
 
+class Bystander(Part):
+    """One more vehicle that shares no plan and heeds nobody: it hovers at its place, or with a ``goal`` flies
+    straight there, ``after_s`` seconds after the goal event."""
+
+    at: Position = Field(description="m, ENU; hovering there at first")
+    goal: Position | None = Field(None, description="m, ENU; null: it stays")
+    after_s: Seconds = 0.0
+    speed: float | None = Field(None, gt=0.0, le=20.0, description="m/s; null: as fast as the others may be")
+    jitter: float = Field(0.0, ge=0.0, le=2.0, description="m, radius of the ball around its place")
+
+    @model_validator(mode="after")
+    def _in_the_air(self) -> Self:
+        if self.at[2] < 0.5:
+            raise ValueError(f"at: it hovers at {self.at[2]} m; at least 0.5 m above the ground is allowed")
+        return self
+
+
 class Jump(Part):
     """The target is suddenly elsewhere, ``after_s`` seconds after the goal event."""
 
@@ -74,6 +91,17 @@ class FixedTarget(Part):
         return self
 
 
+class PathTarget(Part):
+    """A target on a smooth closed path through some places, at a constant speed; it sets out at the goal
+    event."""
+
+    kind: Literal["path"]
+    through: tuple[Position, ...] = Field(min_length=3, max_length=100, description="m, ENU; in this order")
+    speed: float = Field(gt=0.0, le=20.0, description="m/s")
+    setting_out: float = Field(1.0, gt=0.0, le=10.0, description="m/s², until it has its speed")
+    rate_hz: float = Field(5.0, gt=0.0, le=50.0)
+
+
 class RecordedTarget(Part):
     """A target that really flew: GLOBAL_POSITION_INT frames of a tlog, unchanged, at their recorded times."""
 
@@ -85,4 +113,4 @@ class RecordedTarget(Part):
 
 
 Starts = Annotated[Ring | Points, Field(discriminator="kind")]
-Target = Annotated[FixedTarget | RecordedTarget, Field(discriminator="kind")]
+Target = Annotated[FixedTarget | PathTarget | RecordedTarget, Field(discriminator="kind")]

@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 
 
 class Starts(NamedTuple):
-    """Fleet-local ENU, m. ``positions`` (K, 3): where each hovers first, jittered; ``goals`` (K, 3) or
-    None."""
+    """Fleet-local ENU, m. ``positions`` (K, 3): where each hovers first, jittered, bystanders last; ``goals``
+    (vehicles, 3) of those that fly the task, or None."""
 
     positions: Array
     goals: Array | None
@@ -31,22 +31,31 @@ def starts(scenario: Scenario, seed: int, planar: bool) -> Starts:
     the jittered start.
     """
     config, count = scenario.starts, scenario.vehicles
-    if isinstance(config, Points):
-        slots = np.array(config.at)
-        goals = None if config.goals is None else np.array(config.goals)
-    else:
-        slots = _on_ring(config, count)
-        goals = None
-        if scenario.task == "antipodal":
-            goals = slots.copy()
-            goals[:, :2] = 2.0 * np.array(config.centre) - slots[:, :2]
+    slots, goals = _slots(scenario)
+    jitter = np.full(scenario.size, config.jitter)
+    if scenario.bystanders:
+        slots = np.vstack([slots, [other.at for other in scenario.bystanders]])
+        jitter[count:] = [other.jitter for other in scenario.bystanders]
     random = stream(seed, Stream.STARTS)
-    direction = random.normal(size=(count, 3))
+    direction = random.normal(size=(scenario.size, 3))
     if planar:
         direction[:, 2] = 0.0
     direction /= np.linalg.norm(direction, axis=1)[:, None]
-    radius = config.jitter * np.cbrt(random.uniform(size=(count, 1)))
+    radius = jitter[:, None] * np.cbrt(random.uniform(size=(scenario.size, 1)))
     return Starts(slots + direction * radius, goals)
+
+
+def _slots(scenario: Scenario) -> tuple[Array, Array | None]:
+    """Where those start that fly the task, and their goals."""
+    config = scenario.starts
+    if isinstance(config, Points):
+        return np.array(config.at), None if config.goals is None else np.array(config.goals)
+    slots = _on_ring(config, scenario.vehicles)
+    if scenario.task != "antipodal":
+        return slots, None
+    goals = slots.copy()
+    goals[:, :2] = 2.0 * np.array(config.centre) - slots[:, :2]
+    return slots, goals
 
 
 def _on_ring(ring: Ring, count: int) -> Array:

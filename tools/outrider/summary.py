@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.surface import circle_error
 from outrider.falls import first_fall
 from outrider.outcome import Outcome
+from outrider.standoff import standoff
 
 Array = NDArray[np.float64]
 Value = float | int | str | bool | None | dict[str, float] | dict[str, float | None] | dict[str, int]
@@ -34,7 +34,7 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
     lock-step flight with the field has no figure for is null."""
     scenario, truth = flight.scenario, flight.truth
     config = scenario.companion
-    start = flight.clock_start
+    start, count = flight.clock_start, scenario.vehicles
     samples = truth.samples(start if start is not None else 0, flight.clock_end)
     everything = truth.samples()
     tallies = flight.tallies
@@ -53,9 +53,9 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "method": "+".join(config.methods),
         "avoidance": "field",
         "planar": config.planar,
-        "turning_sense": config.tangential.turning_sense if "tangential" in config.methods else "own",
+        "turning_sense": config.turning_sense if set(config.methods) - {"baseline"} else "own",
         "seed": flight.seed,
-        "vehicles": scenario.vehicles,
+        "vehicles": scenario.size,
         "sensors": scenario.sensors,
         "converged": converged,
         "convergence_time_s": seconds,
@@ -70,7 +70,9 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "max_speed_m_s": _largest(np.linalg.norm(samples.velocity, axis=-1)),
         "max_acceleration_m_s2": _largest(np.linalg.norm(samples.acceleration, axis=-1)),
         "max_tilt_deg": _largest(np.degrees(samples.tilt)),
-        "yaw_error_deg": _percentiles(yaw_errors(samples.position, samples.yaw, samples.target), 50, 95),
+        "yaw_error_deg": _percentiles(
+            yaw_errors(samples.position[:, :count], samples.yaw[:, :count], samples.target), 50, 95
+        ),
         "standoff_error_m": _percentiles(standoff_errors(flight, samples.position, samples.target), 50, 95),
         "plan_ms": _percentiles(plan_ms, 50, 99, "max"),
         "plans": sum(after.plans - before.plans for before, after in tallies),
@@ -120,10 +122,10 @@ def yaw_errors(position: Array, yaw: Array, target: Array) -> Array:
 
 def standoff_errors(flight: Outcome, position: Array, target: Array) -> Array:
     """Distance (T, K) from the surface around the true target, m; empty where the task is no escort."""
+    count = flight.scenario.vehicles
     if flight.scenario.task != "escort":
-        return np.empty((0, position.shape[1] if position.ndim > 1 else 0))
-    surface = flight.scenario.companion.surface
-    return circle_error(target[:, None, :], position, surface.radius, surface.height)
+        return np.empty((0, count))
+    return standoff(flight.scenario, position[:, :count], target)
 
 
 def _percentiles(values: Array, *which: int | str) -> dict[str, float | None]:

@@ -17,6 +17,7 @@ from outrider.flight import Flight, Progress
 from outrider.interruption import interruptible
 from outrider.options import METHODS, Options, apply
 from outrider.outcome import Outcome
+from outrider.plans_file import write_plans
 from outrider.resources import config_root, find
 from outrider.scenario import RecordedTarget, Scenario
 from outrider.scenario_faults import MotorFailure
@@ -94,6 +95,7 @@ def fly(
             outcome, cost = _flown(prepared, seed, progress, directory)
         summary = summarise(outcome, cost, directory)
         write(summary, directory / "summary.json")
+        write_plans(outcome, directory / "plans.npz")
         figures.draw(outcome, summary, directory / "flight.png")
         return summary
 

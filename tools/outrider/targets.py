@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.frames import FleetFrame, enu_to_ned
 from mavlink_bridge.messages import GlobalPosition, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog import read_tlog
 from outrider.errors import InputError
+from outrider.paths import ClosedPath, Motion
 from outrider.scenario_part import TARGET_SYSTEM
-from outrider.scenario_places import FixedTarget, RecordedTarget
+from outrider.scenario_places import FixedTarget, PathTarget, RecordedTarget
 
 Array = NDArray[np.float64]
 LINK = "target"
@@ -96,19 +97,67 @@ class Standing:
         if now < self._next:
             return []
         self._next += self._period
-        place = self._place
-        latitude, longitude, altitude = self._fleet.to_geodetic(place)
-        message = GlobalPosition(
-            Source(self.system, 1),
-            now - self._boot,
-            latitude,
-            longitude,
-            altitude,
-            float(place[2]),
-            (0.0, 0.0, 0.0),
-            None,
-        )
+        message = told(self._fleet, now - self._boot, Motion(self._place, np.zeros(3)))
         return [Datagram(LINK, self._codec.encode(message))]
+
+
+class Walking:
+    """Goes along a closed path from the goal event on; until then it stands at its beginning."""
+
+    name = "target"
+    system = TARGET_SYSTEM
+
+    def __init__(self, config: PathTarget, fleet: FleetFrame) -> None:
+        self._config, self._fleet = config, fleet
+        self.path = ClosedPath(np.array(config.through))
+        self._period = round(1e6 / config.rate_hz)
+        self._start: int | None = None
+        self._next: int | None = None
+        self._boot = 0
+        self._codec = Codec()
+
+    def begin(self, now: int) -> None:
+        """Set out."""
+        self._start = now
+
+    def motion(self, now: int) -> Motion:
+        """True position and velocity at ``now`` (µs)."""
+        since = 0.0 if self._start is None else max(now - self._start, 0) * 1e-6
+        config = self._config
+        ramp = config.speed / config.setting_out
+        speed = config.setting_out * min(since, ramp)
+        gone = 0.5 * speed * min(since, ramp) + config.speed * max(since - ramp, 0.0)
+        return self.path.at(gone, speed)
+
+    def position(self, now: int) -> Array | None:
+        """Where it is."""
+        return self.motion(now).position
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Its position and velocity, at its rate."""
+        if self._next is None:
+            self._boot = self._next = now
+        if now < self._next:
+            return []
+        self._next += self._period
+        message = told(self._fleet, now - self._boot, self.motion(now))
+        return [Datagram(LINK, self._codec.encode(message))]
+
+
+def told(fleet: FleetFrame, since_boot: int, motion: Motion) -> GlobalPosition:
+    """What a target says of itself."""
+    latitude, longitude, altitude = fleet.to_geodetic(motion.position)
+    north, east, down = enu_to_ned(motion.velocity).tolist()
+    return GlobalPosition(
+        Source(TARGET_SYSTEM, 1),
+        since_boot,
+        latitude,
+        longitude,
+        altitude,
+        float(motion.position[2]),
+        (north, east, down),
+        None,
+    )
 
 
 class Recording(NamedTuple):

@@ -76,8 +76,8 @@ class RealTimeFlight:
         """Fly to the end; ``outcome`` then says how it was. OutriderError if a process ended by a fault."""
         # Compiled before forking, so that not every process has to.
         Vehicle(self.fleet.vehicle, np.zeros(3)).advance(1, None)
-        board = Board(self.scenario.vehicles)
-        wiring = wire(self.scenario.vehicles, self._clock)
+        board = Board(self.scenario.size)
+        wiring = wire(self.scenario.size, self._clock)
         with TemporaryDirectory() as folder, self._interruptible():
             scratch = Path(folder)
             start = self._clock.now() + (_START_WITH_PRIORITY if self._priority else _START)
@@ -122,12 +122,12 @@ class RealTimeFlight:
         if faults:
             raise OutriderError("; ".join(faults))
         traces = [path for path in (scratch / f"trace-{system}" for system in systems) if path.exists()]
-        if len(traces) < scenario.vehicles:
+        if len(traces) < scenario.size:
             raise OutriderError(_nothing(conductor, "an autopilot's process was killed"))
         found_traces = [Trace.load(path) for path in traces]
         if not all(len(trace.times) for trace in found_traces):
             raise OutriderError(_nothing(conductor, "an autopilot never began"))
-        truth = Truth(scenario.vehicles, limits(scenario), FixedObstacles(scenario.obstacles))
+        truth = Truth(scenario.size, limits(scenario), FixedObstacles(scenario.obstacles))
         period, target = self.fleet.vehicle.physics_period, self.fleet.target()
         put_together(found_traces, period, target, conductor.clock_start, truth)
         self.priority_told = next((found.priority for found in remains.values() if found.priority), "")
@@ -150,6 +150,7 @@ class RealTimeFlight:
                 sum(found.bad for found in companions),
             ),
             _punctuality(companions),
+            [found.plan_log for found in companions],
         )
 
 

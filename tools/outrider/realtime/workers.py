@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from companion.node import Companion, Tally
 from companion.pilot import Phase
+from companion.plan_log import PlanLog
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.garbage import IdleCollector
 from mavlink_bridge.histogram import Histogram
@@ -48,6 +49,7 @@ class Remains:
     dropped: int = 0
     bad: int = 0
     tallies: tuple[Tally, Tally] | None = None
+    plan_log: PlanLog = field(default_factory=PlanLog)
     priority: str = ""
     error: str = ""
 
@@ -217,6 +219,7 @@ class CompanionWorker(Worker):
         now = self._node.tally
         self.remains.tallies = (self._first or now, self._last or now)
         self.remains.bad = self._node.bad_frames
+        self.remains.plan_log = self._node.plan_log
         super().leave(path)
 
     def taps(self, files: ExitStack) -> list[Tap]:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
-import platform
 import shlex
 import sys
 import time
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -18,21 +14,19 @@ from outrider.resources import find
 from outrider.sweeps import directory as places
 from outrider.sweeps import picture
 from outrider.sweeps.cells import Cell, cells, task
+from outrider.sweeps.execution import cores, has_ended, header, work
 from outrider.sweeps.flying import RUN
 from outrider.sweeps.grid import Sweep
-from outrider.sweeps.journal import Header, Journal, opened
-from outrider.sweeps.pool import Pool
+from outrider.sweeps.journal import Journal, opened
 from outrider.sweeps.progress import Watch, duration, watching
 from outrider.sweeps.report import CellReport, cell_report, document, exit_status
 from outrider.sweeps.runs import Run, run_of
-from outrider.sweeps.sources import digest, sources
 from outrider.sweeps.table import show
-from outrider.sweeps.tasks import Entry, Task
+from outrider.sweeps.tasks import Task
 from outrider.yaml_file import load
 
 WALL_LIMIT_S = 1800.0
 INTERRUPTED = 3
-_PACKAGES = ("outrider", "numpy", "scipy", "numba", "piqp", "filterpy", "pymavlink", "pymap3d")
 
 
 def sweep(
@@ -58,13 +52,13 @@ def sweep(
     found = cells(spec, str(path))
     folder = places.prepare(out, spec.name)
     began = time.perf_counter()
-    with opened(folder / places.JOURNAL, _header(spec, found)) as journal:
+    with opened(folder / places.JOURNAL, header(spec.name, found)) as journal:
         tasks = [task(cell, seed) for seed in spec.seeds for cell in found]
-        waiting = [one for one in tasks if not _ended(journal, one)]
+        waiting = [one for one in tasks if not has_ended(journal, one)]
         with watching(len(tasks), len(tasks) - len(waiting)) as watch:
-            stopped = _work(journal, waiting, watch, run, jobs or _cores(), wall_limit_s)
+            stopped = work(journal, waiting, watch, run, jobs or cores(), wall_limit_s)
         if stopped:
-            left = sum(not _ended(journal, one) for one in tasks)
+            left = sum(not has_ended(journal, one) for one in tasks)
             words = ["outrider", "sweep", name, *([] if runs is None else ["--runs", str(runs)]), "--out"]
             sys.stderr.write(
                 f"stopped after {len(tasks) - left} of {len(tasks)} runs, which are kept; this goes on with "
@@ -85,27 +79,6 @@ class _Effort:
         """Values of JSON; every run that a worker was lost at is named, retried or not."""
         lost = [{"cell": labels[one.key], "seed": one.seed, "what": one.what} for one in self.lost]
         return {"flown_now": self.flown, "wall_s": round(self.wall_s, 3), "lost_on_the_way": lost}
-
-
-def _work(
-    journal: Journal, waiting: Sequence[Task], watch: Watch, run: str, jobs: int, wall_limit_s: float
-) -> bool:
-    """Run what is waiting; True if somebody pressed Ctrl-C."""
-
-    def ended(entry: Entry) -> None:
-        journal.append(entry)
-        watch.ended(entry)
-
-    def tick() -> None:
-        journal.settle()
-        watch.tick()
-
-    try:
-        with Pool(run, jobs, wall_limit_s) as pool:
-            pool.work(waiting, ended, tick)
-    except KeyboardInterrupt:
-        return True
-    return False
 
 
 def _conclude(
@@ -136,27 +109,3 @@ def _report(folder: Path, cell: Cell, runs: Sequence[Run]) -> CellReport:
 
 def _runs(journal: Journal, cell: Cell, spec: Sweep) -> list[Run]:
     return [run_of(journal.entries[cell.key, seed]) for seed in spec.seeds]
-
-
-def _ended(journal: Journal, one: Task) -> bool:
-    """A lost run has not ended: it is tried again on resume."""
-    entry = journal.entries.get(one.run)
-    return entry is not None and entry.status != "lost"
-
-
-def _header(spec: Sweep, found: Sequence[Cell]) -> Header:
-    """The sweep is its cells: more runs of the same go on in the same journal."""
-    of_cells = hashlib.sha256(" ".join(sorted(cell.key for cell in found)).encode()).hexdigest()
-    versions = {"python": platform.python_version(), "machine": platform.machine()}
-    versions["code"] = digest(sources())
-    for package in _PACKAGES:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            versions[package] = "none"
-    return Header(spec.name, of_cells, versions)
-
-
-def _cores() -> int:
-    """Those that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,89 @@
+"""Approach angle (Sec. III-C.2): a force across the way to the destination keeps vehicles from approaching
+the target at the same angle.
+
+F_ang(n) = ‖∇J‖ F_hyp((θ_k(n) − θ_j(n))²) β̂,  β̂ ⊥ β = (x_R(n) − x̌)/‖x_R(n) − x̌‖,  horizontal.
+
+Settled against the text. The gradient is its norm divided by Ω_t. θ is the bearing from the target; a
+difference of two is wrapped before it is squared, and F_hyp has thresholds of its own in rad². β̂ points to
+where the difference grows; its sense is latched for as long as the encounter lasts, otherwise it chatters
+between two at one angle. Only others that may be met count: not those behind (further from the destination)
+by more than d_safe. The sum is clamped to ``force_max``, above u_max, or the input would cancel it.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.config import ApproachAngleConfig, TurningSense
+from companion.forces import Obstacles, limit, magnitude
+from companion.horizon import Array
+from companion.methods import Influence, Scene
+from companion.methods.swivel import wrapped
+
+_NEAR = 1e-6
+
+
+class ApproachAngle:
+    """The field of angles; latches one sense per obstacle id."""
+
+    def __init__(self, config: ApproachAngleConfig, turning: TurningSense) -> None:
+        self._config = config
+        self._turning = turning
+        self._sense: dict[int, float] = {}
+
+    def influence(self, scene: Scene, influence: Influence) -> Influence:
+        """Adds Σ_j F_ang(n) on the predicted positions."""
+        config, obstacles = self._config, scene.obstacles
+        if not obstacles.ids:
+            self._sense.clear()
+            return influence
+        aside = self._aside(scene)
+        square = aside * aside
+        strength = magnitude(square, _of(config.d_min), _of(config.d_safe), config.gain, config.force_max)
+        strength *= sqrt(scene.gradient @ scene.gradient) * self._met(scene)
+        senses = self._senses(obstacles, aside[:, 0], square[:, 0] < config.d_safe)
+        along = scene.prediction[:, :2] - influence.destination[:2]
+        beta = along / np.maximum(np.hypot(along[:, 0], along[:, 1]), _NEAR)[:, None]
+        total = senses @ strength
+        # Who is under way across already is not made faster still, or it never comes round.
+        across = scene.velocity[1] * beta[:, 0] - scene.velocity[0] * beta[:, 1]
+        share = 2.0 * (1.0 - np.sign(total) * across / config.pass_speed)
+        total *= np.minimum(np.maximum(share, 0.0), 1.0)
+        force = np.zeros_like(influence.force)
+        force[:, 0], force[:, 1] = -total * beta[:, 1], total * beta[:, 0]
+        return influence._replace(force=influence.force + limit(force, config.force_max))
+
+    def _aside(self, scene: Scene) -> Array:
+        """θ_k(n) − θ_j(n), (M, N + 1)."""
+        own = scene.prediction[:, :2] - scene.target[:2]
+        other = scene.obstacles.positions[:, :, :2] - scene.target[:2]
+        return wrapped(np.arctan2(own[:, 1], own[:, 0]) - np.arctan2(other[..., 1], other[..., 0]))
+
+    def _met(self, scene: Scene) -> Array:
+        """1 for those that may still be met, 0 for those left behind, (M, 1)."""
+        obstacles = scene.obstacles
+        left = sqrt(scene.to_go @ scene.to_go)
+        goal = scene.position + scene.to_go
+        off = obstacles.positions[:, 0] - goal
+        ahead: Array = (np.sqrt(np.vecdot(off, off)) < left + obstacles.d_safe).astype(np.float64)
+        return ahead[:, None]
+
+    def _senses(self, obstacles: Obstacles, aside: Array, met: NDArray[np.bool_]) -> Array:
+        """Per obstacle +1: to a larger bearing from the target, −1: to a smaller one."""
+        if self._turning != "own":
+            # β points back along the way, so that β̂ = ẑ × β is to the right of it.
+            return np.full(len(obstacles.ids), 1.0 if self._turning == "right" else -1.0)
+        latched = self._sense
+        for name in set(latched).difference(n for n, m in zip(obstacles.ids, met, strict=True) if m):
+            del latched[name]
+        for j in np.flatnonzero(met):
+            latched.setdefault(obstacles.ids[j], 1.0 if aside[j] >= 0.0 else -1.0)
+        # No force acts where nothing is latched: any sense will do.
+        return np.array([latched.get(name, 1.0) for name in obstacles.ids])
+
+
+def _of(value: float) -> Array:
+    return np.array([[value]])

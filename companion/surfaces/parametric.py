@@ -1,0 +1,113 @@
+"""A user's own surface, as a Python function of two parameters.
+
+A package that is installed beside this one offers the function as an entry point of the group
+``outrider.surfaces``; a configuration can name no other code. It is called with arrays u and v (n,) in 0…1
+and the ``parameters`` of the configuration as keywords, and returns offsets (n, 3) from the target,
+fleet-local ENU, m; it must be continuous.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from importlib.metadata import entry_points
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from companion.errors import SurfaceError
+from companion.horizon import Array
+from companion.settings import Settings
+
+GROUP = "outrider.surfaces"
+_GRID = 48
+_AROUND = np.linspace(-1.0, 1.0, 7)
+_ROUNDS = 9
+"""Each narrows the search to a third: the last step is 2e-6 of the parameters' range."""
+
+Function = Callable[..., Any]
+
+
+class Parametric(Settings):
+    """The points of a function of u and v."""
+
+    kind: Literal["parametric"]
+    function: str = Field(min_length=1, max_length=200, description=f"an entry point of {GROUP}")
+    parameters: dict[str, float] = Field(default_factory=dict, max_length=20)
+
+    @model_validator(mode="after")
+    def _usable(self) -> Parametric:
+        try:
+            _grid(self._name)
+        except SurfaceError as error:
+            raise ValueError(error) from error
+        return self
+
+    def nearest(self, offset: Array) -> Array:
+        """By search: the nearest of a grid, and then of finer and finer ones around it."""
+        flat = offset.reshape(-1, 3)
+        return np.array([self._nearest(one) for one in flat]).reshape(offset.shape)
+
+    def outline(self) -> Array:
+        """Where v is halfway."""
+        u = np.linspace(0.0, 1.0, 73)
+        return _points(self._name, u, np.full(len(u), 0.5))
+
+    def _nearest(self, offset: Array) -> Array:
+        name = self._name
+        uv, points = _grid(name)
+        best = int(np.argmin(np.sum((points - offset) ** 2, axis=1)))
+        (u, v), step = uv[best], 1.0 / _GRID
+        point: Array = points[best]
+        for _ in range(_ROUNDS):
+            us = np.clip(u + step * _AROUND, 0.0, 1.0)
+            vs = np.clip(v + step * _AROUND, 0.0, 1.0)
+            around = np.stack(np.meshgrid(us, vs, indexing="ij"), axis=-1).reshape(-1, 2)
+            candidates = _points(name, around[:, 0], around[:, 1])
+            best = int(np.argmin(np.sum((candidates - offset) ** 2, axis=1)))
+            (u, v), point = around[best], candidates[best]
+            step /= 3.0
+        return point
+
+    @property
+    def _name(self) -> tuple[str, tuple[tuple[str, float], ...]]:
+        return self.function, tuple(sorted(self.parameters.items()))
+
+
+_Name = tuple[str, tuple[tuple[str, float], ...]]
+
+
+@lru_cache(maxsize=64)
+def _function(name: str) -> Function:
+    found = entry_points(group=GROUP)
+    if name not in found.names:
+        known = ", ".join(sorted(found.names)) or "none; none is installed"
+        raise SurfaceError(f"{name!r} is no entry point of {GROUP}; allowed: {known}")
+    try:
+        loaded: Function = found[name].load()
+    except (ImportError, AttributeError) as error:
+        raise SurfaceError(f"{name!r} of {GROUP} cannot be loaded: {error}") from error
+    return loaded
+
+
+def _points(name: _Name, u: Array, v: Array) -> Array:
+    """Points (n, 3) of the function. Raises SurfaceError if it does not give them."""
+    function, parameters = _function(name[0]), dict(name[1])
+    try:
+        points = np.asarray(function(u, v, **parameters), dtype=np.float64)
+    except Exception as error:  # a user's code may raise anything; who uses it is told what
+        raise SurfaceError(f"{name[0]} failed: {type(error).__name__}: {error}") from error
+    if points.shape != (len(u), 3):
+        raise SurfaceError(f"{name[0]} gives an array {points.shape}; allowed is ({len(u)}, 3)")
+    if not np.isfinite(points).all():
+        raise SurfaceError(f"{name[0]} gives points that are not finite")
+    return points
+
+
+@lru_cache(maxsize=64)
+def _grid(name: _Name) -> tuple[Array, Array]:
+    """Parameters (n, 2) and points (n, 3) to begin a search from."""
+    line = np.linspace(0.0, 1.0, _GRID + 1)
+    uv = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+    return uv, _points(name, uv[:, 0], uv[:, 1])

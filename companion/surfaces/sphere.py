@@ -1,0 +1,58 @@
+"""A sphere around a point above the target, or the part of it above a height."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from companion.horizon import Array
+from companion.settings import Settings
+from companion.surfaces.circle import outward, ring
+
+_NEAR = 1e-9
+
+
+class Sphere(Settings):
+    """All that is ``radius`` from the centre and not below ``lowest``."""
+
+    kind: Literal["sphere"]
+    radius: float = Field(4.0, gt=0.0, le=100.0, description="m")
+    height: float = Field(0.0, ge=-50.0, le=100.0, description="of the centre, m above the target")
+    lowest: float = Field(3.0, ge=-150.0, le=200.0, description="m above the target: no lower")
+
+    @model_validator(mode="after")
+    def _open(self) -> Sphere:
+        if self.lowest >= self.height + self.radius:
+            raise ValueError(f"lowest must lie below the sphere's top, {self.height + self.radius:g}")
+        return self
+
+    def nearest(self, offset: Array) -> Array:
+        """In the direction from the centre; from below ``lowest``, on the circle there."""
+        away = offset - (0.0, 0.0, self.height)
+        distance = np.linalg.norm(away, axis=-1, keepdims=True)
+        # From the centre all are equally near; straight up nobody is in the way.
+        away = np.where(distance < _NEAR, (0.0, 0.0, 1.0), away / np.maximum(distance, _NEAR))
+        result: Array = self.radius * away
+        result[..., 2] += self.height
+        low = result[..., 2] < self.lowest
+        if low.any():
+            result[..., 0], result[..., 1] = (
+                np.where(low, edge, inner)
+                for edge, inner in zip(
+                    outward(offset, self._edge), (result[..., 0], result[..., 1]), strict=True
+                )
+            )
+            result[..., 2] = np.maximum(result[..., 2], self.lowest)
+        return result
+
+    def outline(self) -> Array:
+        """Its widest circle."""
+        low = max(self.lowest, self.height)
+        return ring(float(np.sqrt(self.radius**2 - (low - self.height) ** 2)), low)
+
+    @property
+    def _edge(self) -> float:
+        """Radius (m) of the circle at ``lowest``."""
+        return float(np.sqrt(max(0.0, self.radius**2 - (self.lowest - self.height) ** 2)))

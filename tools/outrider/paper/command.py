@@ -1,0 +1,83 @@
+"""``outrider paper``: every row by every seed, resumable, then table, Markdown and figures."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from outrider.paper import figures
+from outrider.paper.flying import RUN, TRACED
+from outrider.paper.results import Result, result_of
+from outrider.paper.rows import ROWS, Row, cells_of
+from outrider.paper.table import markdown, show
+from outrider.sweeps import directory as places
+from outrider.sweeps.cells import Cell, task
+from outrider.sweeps.execution import cores, has_ended, header, work
+from outrider.sweeps.journal import Journal, opened
+from outrider.sweeps.progress import watching
+from outrider.sweeps.runs import run_of
+
+INTERRUPTED = 3
+_WALL_LIMIT_S = 1800.0
+
+
+def paper(
+    seeds: int = 10,
+    jobs: int | None = None,
+    out: Path | None = None,
+    as_json: bool = False,
+    rows: tuple[Row, ...] = ROWS,
+    run: str = RUN,
+) -> int:
+    """Fly the paper's table; the exit status.
+
+    0 flown; 1 a violation of d_min somewhere, or a run that came to nothing; 3 interrupted. That a row gets
+    stuck is a result. Writes ``paper.json``, ``paper.md`` and figures beside the journal in ``out``
+    (``runs/sweep-paper``).
+    """
+    found = cells_of(rows)
+    folder = places.prepare(out, "paper")
+    numbers = range(TRACED, TRACED + seeds)
+    with opened(folder / places.JOURNAL, header("paper", found)) as journal:
+        tasks = [task(cell, seed) for seed in numbers for cell in found]
+        waiting = [one for one in tasks if not has_ended(journal, one)]
+        with watching(len(tasks), len(tasks) - len(waiting)) as watch:
+            stopped = work(journal, waiting, watch, run, jobs or cores(), _WALL_LIMIT_S)
+        if stopped:
+            left = sum(not has_ended(journal, one) for one in tasks)
+            sys.stderr.write(
+                f"stopped with {left} of {len(tasks)} flights left; the same command with --out {folder} "
+                "goes on\n"
+            )
+            return INTERRUPTED
+        results = [
+            result_of(row, [run_of(journal.entries[cell.key, seed]) for seed in numbers])
+            for row, cell in zip(rows, found, strict=True)
+        ]
+        traces = _traces(rows, found, journal)
+    document = {"rows": [result.document() for result in results]}
+    (folder / "paper.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    (folder / "paper.md").write_text(markdown(rows, results), encoding="utf-8")
+    figures.draw(rows, results, traces, folder)
+    if as_json:
+        sys.stdout.write(json.dumps(document) + "\n")
+    else:
+        show(rows, results)
+    sys.stderr.write(f"table, Markdown and figures: {folder}\n")
+    return _status(results)
+
+
+def _traces(rows: tuple[Row, ...], found: list[Cell], journal: Journal) -> dict[Row, dict[str, Any]]:
+    """Of the seed that is drawn, where it was flown."""
+    traces = {}
+    for row, cell in zip(rows, found, strict=True):
+        summary = journal.entries[cell.key, TRACED].summary
+        if summary is not None and "trace" in summary:
+            traces[row] = summary["trace"]
+    return traces
+
+
+def _status(results: list[Result]) -> int:
+    return 1 if any(result.d_min_violations or result.failed for result in results) else 0

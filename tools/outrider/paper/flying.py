@@ -1,0 +1,52 @@
+"""What a worker does with a run of the paper's table: the flight, its summary, and its trace for the
+figures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from outrider.flight import Flight
+from outrider.resources import config_root
+from outrider.summary import WALL_FIELDS, Cost, summarise
+from outrider.sweeps.cells import scenario_of
+from outrider.sweeps.tasks import Task
+from sitl.config import VehicleConfig
+
+RUN = f"{__name__}:fly"
+TRACED = 1
+"""The seed that is drawn."""
+_EVERY = 5
+"""Samples of the truth to a point of the trace: 0.1 s."""
+
+
+def fly(task: Task) -> dict[str, Any]:
+    """Fly it without files. The same task gives the same result."""
+    vehicle = VehicleConfig.model_validate_json(task.vehicle, strict=True)
+    flight = Flight(scenario_of(task), vehicle, task.seed, config_root() / "logs", stopwatch=lambda: 0)
+    flight.run()
+    summary = summarise(flight.outcome, Cost(0.0, 0.0), None)
+    result: dict[str, Any] = {key: value for key, value in summary.items() if key not in WALL_FIELDS}
+    if task.seed == TRACED:
+        result["trace"] = _trace(flight)
+    return result
+
+
+def _trace(flight: Flight) -> dict[str, Any]:
+    """Times (T,) s after the goal event; positions (T, K, 3) m; ‖∇J‖ (T, vehicles) of the plan before each
+    time; where the target is at the end. Rounded to mm: it goes into a journal."""
+    outcome = flight.outcome
+    start = outcome.clock_start or 0
+    samples = outcome.truth.samples(start, outcome.clock_end)
+    time = samples.time[::_EVERY]
+    steepness = []
+    for log in outcome.plan_logs[: outcome.scenario.vehicles]:
+        norms, index = np.linalg.norm(log.gradients, axis=1), np.searchsorted(log.times, time) - 1
+        steepness.append(norms[np.clip(index, 0, len(norms) - 1)] if len(norms) else np.zeros(len(time)))
+    return {
+        "time_s": np.round((time - start) * 1e-6, 3).tolist(),
+        "position": np.round(samples.position[::_EVERY], 3).tolist(),
+        "gradient": np.round(np.array(steepness).T, 3).tolist(),
+        "target": np.round(samples.target[-1], 3).tolist() if len(samples.target) else None,
+    }

@@ -1,0 +1,54 @@
+"""The rows of the paper's comparison: which scenario by which method, and what the paper reports."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from outrider.sweeps.cells import Cell, cells
+from outrider.sweeps.grid import Sweep
+
+SENSORS = "rtk"
+"""Times are compared with vehicles that know where they are to 2 cm."""
+
+
+class Row(NamedTuple):
+    """One row. ``told``: what the paper says (Sec. IV-C to IV-F), s, "stuck", or nothing."""
+
+    scenario: str
+    method: str
+    told: str
+
+
+ROWS = (
+    Row("scenario-1", "baseline", "40"),
+    Row("scenario-1", "swivel", "12"),
+    Row("scenario-1", "approach_angle", "≈ 15"),
+    Row("scenario-1", "tangential", "≈ 15"),
+    Row("scenario-2", "baseline", "30"),
+    Row("scenario-2", "swivel", "15"),
+    Row("scenario-2", "approach_angle", "≈ 15"),
+    Row("scenario-2", "tangential", "≈ 15"),
+    Row("scenario-3", "baseline", "stuck"),
+    Row("scenario-3", "swivel", "stuck"),
+    Row("scenario-3", "approach_angle", "stuck"),
+    Row("scenario-3", "tangential", "12"),
+    Row("antipodal-8", "approach_angle", "13"),
+    Row("antipodal-8", "tangential", "11"),
+    Row("antipodal-16", "tangential", ""),
+)
+
+
+def cells_of(rows: tuple[Row, ...]) -> list[Cell]:
+    """What each row flies: the shipped scenario with its method; it begins in the air, since the clock does
+    so too."""
+    found = []
+    for number, row in enumerate(rows, 1):
+        spec = Sweep(
+            name="paper",
+            scenarios=(row.scenario,),
+            set={"airborne": True, "sensors": SENSORS, "companion.methods": [row.method]},
+        )
+        (cell,) = cells(spec, f"{row.scenario} by {row.method}")
+        slug = f"{number:03d}-{row.scenario}-{row.method}"
+        found.append(cell._replace(label=f"{row.scenario}, {row.method}", slug=slug))
+    return found
