@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 from typer.main import get_command
 
+from companion.config import CompanionConfig
 from outrider.__main__ import app
 from outrider.resources import find
 from outrider.scenario import Scenario
@@ -16,12 +17,24 @@ from outrider.yaml_file import load, read
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 
 
-def test_its_scenario_is_one() -> None:
-    (block,) = re.findall(r"```yaml\n(.*?)```", README, re.DOTALL)
-    base = load(find("scenarios", "antipodal-8"), Scenario).model_dump(mode="json")
-    shown = yaml.safe_load(block)
-    text = yaml.safe_dump({**base, **shown}, allow_unicode=True)
-    found = read(text.encode(), "README.md", Scenario)
+def shown(name: str, number: int) -> Scenario:
+    """A shipped scenario with what a block of YAML shows."""
+    block = re.findall(r"```yaml\n(.*?)```", README, re.DOTALL)[number]
+    base = load(find("scenarios", name), Scenario).model_dump(mode="json")
+    text = yaml.safe_dump({**base, **yaml.safe_load(block)}, allow_unicode=True)
+    return read(text.encode(), "README.md", Scenario)
+
+
+def test_its_surfaces_are_some() -> None:
+    found = shown("scenario-1", 0)
+    assert found.companion.surface_of(12).height == 8.0
+    assert found.size == found.vehicles + 2
+    for other in re.findall(r"(\{kind: (?:sphere|cylinder|ellipsoid).*?\})", README):
+        CompanionConfig.model_validate({"surface": yaml.safe_load(other)})
+
+
+def test_its_rough_world_is_one() -> None:
+    found = shown("antipodal-8", 1)
     assert found.faults
     assert found.weather.wind == (6.0, 0.0, 0.0)
 
