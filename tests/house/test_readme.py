@@ -29,7 +29,7 @@ def test_its_surfaces_are_some() -> None:
     found = shown("scenario-1", 0)
     assert found.companion.surface_of(12).height == 8.0
     assert found.size == found.vehicles + 2
-    for other in re.findall(r"(\{kind: (?:sphere|cylinder|ellipsoid).*?\})", README):
+    for other in re.findall(r"(\{kind: (?:sphere|cylinder|ellipsoid), (?:radius|semi).*?\})", README):
         CompanionConfig.model_validate({"surface": yaml.safe_load(other)})
 
 
