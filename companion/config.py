@@ -128,6 +128,7 @@ class ApproachAngleConfig(Settings):
     d_safe: Positive = Field(1.0, description="rad²: the field begins there; (2π/8)² is 0.62")
     force_max: Positive = Field(4.0, description="m/s²; above u_max, or the input cancels it")
     pass_speed: Positive = Field(3.0, description="m/s across at which the force is gone; whole up to half")
+    reach: Positive = Field(6.0, description="m: who is further off is not met yet")
 
     @model_validator(mode="after")
     def _order(self) -> ApproachAngleConfig:

@@ -6,8 +6,9 @@ F_ang(n) = ‖∇J‖ F_hyp((θ_k(n) − θ_j(n))²) β̂,  β̂ ⊥ β = (x_R(n
 Settled against the text. The gradient is its norm divided by Ω_t. θ is the bearing from the target; a
 difference of two is wrapped before it is squared, and F_hyp has thresholds of its own in rad². β̂ points to
 where the difference grows; its sense is latched for as long as the encounter lasts, otherwise it chatters
-between two at one angle. Only others that may be met count: not those behind (further from the destination)
-by more than d_safe. The sum is clamped to ``force_max``, above u_max, or the input would cancel it.
+between two at one angle. Only others that may be met count: not those that are further off than ``reach``,
+nor those behind (further from the destination) by more than d_safe. The sum is clamped to ``force_max``,
+above u_max, or the input would cancel it; who is fast across already is not pushed further.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from companion.methods import Influence, Scene
 from companion.methods.swivel import wrapped
 
 _NEAR = 1e-6
+_FADING = 1.0
+"""m beyond ``reach`` over which the force fades out."""
 
 
 class ApproachAngle:
@@ -69,6 +72,9 @@ class ApproachAngle:
         goal = scene.position + scene.to_go
         off = obstacles.positions[:, 0] - goal
         ahead: Array = (np.sqrt(np.vecdot(off, off)) < left + obstacles.d_safe).astype(np.float64)
+        here = obstacles.positions[:, 0] - scene.position
+        room = self._config.reach - np.sqrt(np.vecdot(here, here))
+        ahead *= np.clip(1.0 + room / _FADING, 0.0, 1.0)
         return ahead[:, None]
 
     def _senses(self, obstacles: Obstacles, aside: Array, met: NDArray[np.bool_]) -> Array:

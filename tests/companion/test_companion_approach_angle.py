@@ -57,7 +57,7 @@ def test_it_acts_level_across_the_way_and_is_bounded(place, others, v, gradient)
 
 
 @LAWS
-@given(reach=numbers(6.0, 16.0), offset=numbers(0.01, 0.7), gradient=vectors(20.0))
+@given(reach=numbers(4.5, 9.0), offset=numbers(0.01, 0.7), gradient=vectors(20.0))
 def test_two_at_nearly_one_angle_are_pushed_apart(reach, offset, gradient):
     """Both at one distance from the target, ``offset`` rad apart."""
     assume(np.linalg.norm(gradient) > 0.1 and offset**2 < 0.9 * CONFIG.d_safe)
@@ -109,3 +109,16 @@ def test_the_sense_is_latched_while_the_encounter_lasts():
     assert force(scene(own, left), method)[0][1] > 0.0
     force(scene(own, obstacles([beside(10.0, 0.0, 5.0)])), method)
     assert force(scene(own, left), method)[0][1] < 0.0
+
+
+def test_who_is_far_off_is_not_met_yet():
+    own, near, far = beside(-14.0, 0.2, 5.0), beside(-9.0, 0.0, 5.0), beside(-5.0, 0.0, 5.0)
+    assert (force(scene(own, obstacles([near]))) != 0.0).any()
+    assert (force(scene(own, obstacles([far]))) == 0.0).all()
+
+
+def test_who_is_fast_across_is_not_made_faster():
+    own, other = beside(-10.0, 0.2, 5.0), obstacles([beside(-10.0, -0.2, 5.0)])
+    across = np.sign(force(scene(own, other))[0]) * [0.0, 1.1 * CONFIG.pass_speed, 0.0]
+    assert not force(scene(own, other, velocity=across))[0].any()
+    assert force(scene(own, other, velocity=-across))[0].any()
