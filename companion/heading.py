@@ -8,7 +8,6 @@ acceleration.
 
 from __future__ import annotations
 
-from math import atan2
 from typing import NamedTuple
 
 import numpy as np
@@ -28,14 +27,6 @@ class Yaw(NamedTuple):
     yaw: float
     rate: float
     acceleration: float
-
-
-def bearing(origin: Array, point: Array) -> float:
-    """Horizontal bearing of ``point`` seen from ``origin``: ENU, rad, from east towards north.
-
-    Two arguments, not the paper's quotient, which loses the half plane. Zero if the points coincide.
-    """
-    return atan2(point[1] - origin[1], point[0] - origin[0])
 
 
 class Heading:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from array import array
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from companion.bearings import turned
 from companion.config import CompanionConfig
 from companion.errors import CompanionError, SurfaceError
 from companion.forces import Obstacles
@@ -256,10 +256,7 @@ class Companion:
         surface, velocity = self._surface, target.velocity
         offset = surface.nearest(measured.position - target.position)
         if config.turn_rate:
-            angle = config.turn_rate * ahead
-            c, s = math.cos(angle), math.sin(angle)
-            x, y, z = offset
-            offset = surface.nearest(np.array([c * x - s * y, s * x + c * y, z]))
+            offset = surface.nearest(turned(offset, config.turn_rate * ahead))
             velocity = velocity + config.turn_rate * np.array([-offset[1], offset[0], 0.0])
         destination = target.position + ahead * target.velocity + offset
         return Aim(destination, velocity, target.position, surface)

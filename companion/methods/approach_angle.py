@@ -18,11 +18,11 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.bearings import wrapped
 from companion.config import ApproachAngleConfig, TurningSense
 from companion.forces import Obstacles, limit, magnitude
 from companion.horizon import Array
 from companion.methods import Influence, Scene
-from companion.methods.swivel import wrapped
 
 _NEAR = 1e-6
 _FADING = 1.0

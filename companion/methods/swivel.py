@@ -14,12 +14,12 @@ The sense is latched until the vehicle has all but arrived, otherwise two that a
 
 from __future__ import annotations
 
-from math import atan2, copysign, cos, pi, sin, sqrt
+from math import atan2, copysign, pi, sqrt
 
 import numpy as np
 
+from companion.bearings import turned, wrapped
 from companion.config import SwivelConfig, TurningSense
-from companion.horizon import Array
 from companion.methods import Influence, Scene
 
 _MOST = 0.5 * pi
@@ -50,12 +50,10 @@ class Swivel:
         if self._sense == 0.0:
             return influence
         angle = self._sense * min(self._config.k_s * steepness, _MOST)
-        c, s = cos(angle), sin(angle)
-        x, y, z = influence.destination - scene.target_end
-        turned = np.array([c * x - s * y, s * x + c * y, z])
+        offset = turned(influence.destination - scene.target_end, angle)
         if scene.surface is not None:
-            turned = scene.surface.nearest(turned)
-        return influence._replace(destination=scene.target_end + turned)
+            offset = scene.surface.nearest(offset)
+        return influence._replace(destination=scene.target_end + offset)
 
 
 def _away(scene: Scene) -> float:
@@ -71,9 +69,3 @@ def _away(scene: Scene) -> float:
     aside = wrapped(atan2(own[1], own[0]) - np.arctan2(off[seen, 1], off[seen, 0]))
     total = float(np.sum(np.sign(aside) * np.exp(-np.abs(aside) / _BESIDE)))
     return copysign(1.0, total) if total else 0.0
-
-
-def wrapped(angles: Array) -> Array:
-    """The same angles (rad) in [−π, π)."""
-    result: Array = (angles + pi) % (2.0 * pi) - pi
-    return result

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.bearings import bearing
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
-from companion.heading import Heading, bearing
+from companion.heading import Heading
 from companion.planner import Aim, Planner
 from companion.setpoint import setpoint
 from companion.world import World

@@ -72,6 +72,16 @@ def _intruders(scenario: Scenario) -> list[_Intruder]:
     return sorted(found, key=lambda intruder: intruder.after)
 
 
+def _turning_speed(scenario: Scenario) -> float:
+    """How fast (m/s) the outermost vehicle of a ring that turns goes round."""
+    companion = scenario.companion
+    if not companion.turn_rate:
+        return 0.0
+    outlines = [companion.surface_of(system).outline() for system in scenario.systems]
+    reach = max(float(np.hypot(outline[:, 0], outline[:, 1]).max()) for outline in outlines)
+    return abs(companion.turn_rate) * reach
+
+
 class Conductor:
     """The stages of one flight. ``failure`` says why if it never got to its clock or did not land."""
 
@@ -91,10 +101,7 @@ class Conductor:
         jumps = target.jumps if isinstance(target, FixedTarget) else ()
         self._last_jump = round(1e6 * jumps[-1].after_s) if jumps else 0
         self._intruders = deque(_intruders(scenario))
-        self._reach = max(
-            float(np.hypot(outline[:, 0], outline[:, 1]).max())
-            for outline in (scenario.companion.surface_of(s).outline() for s in scenario.systems)
-        )
+        self._turning = _turning_speed(scenario)
         for k, system in enumerate(scenario.systems):
             operator.take_off(system, float(starts.positions[k, 2]))
 
@@ -142,7 +149,7 @@ class Conductor:
         if self._scenario.weather.w20 > 0.0:
             still = _TOSSED
         # A ring that turns never stands still.
-        still += abs(self._scenario.companion.turn_rate) * self._reach
+        still += self._turning
         calm = sight.ready and float(np.linalg.norm(sight.velocities, axis=1).max()) < still
         if not calm:
             self._calm_since = None

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.bearings import bearing
 from companion.config import CompanionConfig
-from companion.heading import bearing
 from companion.node import Companion
 from mavlink_bridge.ether import Channel, Faults
 from mavlink_bridge.frames import FleetFrame

@@ -35,6 +35,7 @@ __all__ = [
     "apply",
     "fly",
     "measure",
+    "measured",
     "prepare",
     "run_directory",
 ]
@@ -102,11 +103,17 @@ def fly(
 
 def measure(prepared: Prepared, seed: int) -> dict[str, Value]:
     """Fly it for what its seed decides: no files, and of the summary all but ``WALL_FIELDS``."""
+    return measured(prepared, seed)[1]
+
+
+def measured(prepared: Prepared, seed: int) -> tuple[Outcome, dict[str, Value]]:
+    """As ``measure``, with all that is left of the flight."""
     # Reading the CPU clock before and after every plan costs more than a hundredth of a flight.
     flight = Flight(*prepared, seed, config_root() / "logs", stopwatch=lambda: 0)
     flight.run()
-    summary = summarise(flight.outcome, Cost(0.0, 0.0), None)
-    return {key: value for key, value in summary.items() if key not in WALL_FIELDS}
+    outcome = flight.outcome
+    summary = summarise(outcome, Cost(0.0, 0.0), None)
+    return outcome, {key: value for key, value in summary.items() if key not in WALL_FIELDS}
 
 
 def _flown(prepared: Prepared, seed: int, progress: Progress, directory: Path | None) -> tuple[Outcome, Cost]:

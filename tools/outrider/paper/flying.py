@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from outrider.flight import Flight
-from outrider.resources import config_root
-from outrider.summary import WALL_FIELDS, Cost, summarise
-from outrider.sweeps.cells import scenario_of
+from outrider.outcome import Outcome
+from outrider.swarm import measured
+from outrider.sweeps.flying import prepared
 from outrider.sweeps.tasks import Task
-from sitl.config import VehicleConfig
 
 RUN = f"{__name__}:fly"
 TRACED = 1
@@ -23,20 +21,13 @@ _EVERY = 5
 
 def fly(task: Task) -> dict[str, Any]:
     """Fly it without files. The same task gives the same result."""
-    vehicle = VehicleConfig.model_validate_json(task.vehicle, strict=True)
-    flight = Flight(scenario_of(task), vehicle, task.seed, config_root() / "logs", stopwatch=lambda: 0)
-    flight.run()
-    summary = summarise(flight.outcome, Cost(0.0, 0.0), None)
-    result: dict[str, Any] = {key: value for key, value in summary.items() if key not in WALL_FIELDS}
-    if task.seed == TRACED:
-        result["trace"] = _trace(flight)
-    return result
+    outcome, summary = measured(prepared(task), task.seed)
+    return {**summary, "trace": _trace(outcome)} if task.seed == TRACED else dict(summary)
 
 
-def _trace(flight: Flight) -> dict[str, Any]:
+def _trace(outcome: Outcome) -> dict[str, Any]:
     """Times (T,) s after the goal event; positions (T, K, 3) m; ‖∇J‖ (T, vehicles) of the plan before each
     time; where the target is at the end. Rounded to mm: it goes into a journal."""
-    outcome = flight.outcome
     start = outcome.clock_start or 0
     samples = outcome.truth.samples(start, outcome.clock_end)
     time = samples.time[::_EVERY]

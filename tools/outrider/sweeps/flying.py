@@ -17,7 +17,12 @@ RUN = f"{__name__}:fly"
 
 def fly(task: Task) -> dict[str, Value]:
     """Fly it without files. The same task gives the same summary."""
-    return measure(Prepared(_scenario(task), _vehicle(task.vehicle)), task.seed)
+    return measure(prepared(task), task.seed)
+
+
+def prepared(task: Task) -> Prepared:
+    """What the task flies."""
+    return Prepared(_scenario(task), _vehicle(task.vehicle))
 
 
 def _scenario(task: Task) -> Scenario:
