@@ -150,6 +150,10 @@ class TrackConfig(Settings):
     sigma_position: Positive = Field(0.02, description="m")
     sigma_velocity: Positive = Field(0.05, description="m/s")
     sigma_acceleration: Positive = Field(2.0, description="m/s², of the constant-velocity model")
+    sigma_turn: float = Field(
+        0.0, ge=0.0, le=10.0, description="rad/s, of the rates at which its course turns; 0: it goes straight"
+    )
+    turn_memory_us: Micros = Field(3_000_000, description="so long a turn lasts")
     delay_us: int = Field(
         20_000, ge=0, le=2_000_000, description="least age of a message when it arrives; jitter adds to it"
     )
@@ -221,7 +225,7 @@ class CompanionConfig(Settings):
     own: TrackConfig = TrackConfig(delay_us=5_000, sigma_acceleration=10.0)
     neighbour: TrackConfig = TrackConfig()
     target: TrackConfig = TrackConfig(
-        sigma_position=1.0, sigma_velocity=0.3, sigma_acceleration=1.0, jump=8.0
+        sigma_position=1.0, sigma_velocity=0.3, sigma_acceleration=1.0, sigma_turn=0.5, jump=8.0
     )
     target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
     target_d_safe: float | None = Field(None, gt=0.0, le=100.0)

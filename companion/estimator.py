@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from companion.config import TrackConfig
 from companion.gains import Noise, Square, gain, prepared
+from companion.turning import Turn, TurnFilter
 
 Six = tuple[float, float, float, float, float, float]
 """Position (m) and velocity (m/s), fleet-local ENU. Floats, not arrays: numpy would take longer over six of
@@ -30,7 +31,8 @@ class Doubt(NamedTuple):
 
 
 class Belief(NamedTuple):
-    """What is known of one sender: the state, and the covariance P (2, 2) of each axis, row by row.
+    """What is known of one sender: the state, the covariance P (2, 2) of each axis, row by row, and how fast
+    it turns.
 
     ``time``: when the last accepted measurement was true, µs; ``refused``: how many were not accepted.
     """
@@ -38,6 +40,7 @@ class Belief(NamedTuple):
     time: int
     x: Six
     P: Square
+    turn: Turn
     doubts: tuple[Doubt, ...]
     refused: int
 
@@ -49,6 +52,7 @@ class Estimator:
         self._noise = Noise(config.sigma_position, config.sigma_velocity, config.sigma_acceleration)
         prepared(self._noise)
         self._first: Square = (config.sigma_position**2, 0.0, 0.0, config.sigma_velocity**2)
+        self._turning = TurnFilter(config.sigma_turn, 1e-6 * config.turn_memory_us, config.sigma_velocity)
         self._gate = config.gate
         self._jump = config.jump
         self._witnesses = config.witnesses
@@ -63,7 +67,7 @@ class Estimator:
         manoeuvres harder than the model thinks would be locked out.
         """
         if belief is None:
-            return Belief(time, z, self._first, (), 0)
+            return Belief(time, z, self._first, self._turning.unknown, (), 0)
         elapsed = time - belief.time
         (s, t, u), (j, k, m, n), P = gain(self._noise, belief.P, elapsed)
         # x = F x and y = z − x, then x + K y: per axis the position, then the velocity.
@@ -83,7 +87,8 @@ class Estimator:
             e + m * yb + n * ye,
             f + m * yc + n * yf,
         )
-        return Belief(time, x, P, (), belief.refused)
+        turn = self._turning.after(belief.turn, dt, (d, e), (x[3], x[4]))
+        return Belief(time, x, P, turn, (), belief.refused)
 
     def _doubt(self, belief: Belief, time: int, z: Six) -> Belief:
         doubts = list(belief.doubts)
@@ -96,7 +101,7 @@ class Estimator:
                 del doubts[index]
                 break
         if witnesses >= self._witnesses:
-            return Belief(time, z, self._first, (), belief.refused)
+            return Belief(time, z, self._first, self._turning.unknown, (), belief.refused)
         doubts.append(Doubt(time, z, witnesses))
         return belief._replace(doubts=tuple(doubts[-_DOUBTS:]), refused=belief.refused + 1)
 

@@ -17,7 +17,7 @@ from companion.heading import Heading
 from companion.horizon import Array, Horizon, Motion
 from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
 from companion.plan_log import PlanLog
-from companion.planner import Aim, Plan, Planner
+from companion.planner import Aim, Plan, Planner, standing
 from companion.reception import LINKS, accepts
 from companion.setpoint import setpoint
 from companion.settling import Settling
@@ -234,9 +234,8 @@ class Companion:
         """Plan the yaw along the horizon; a companion that plans nothing keeps its yaw."""
         if view.target is None:
             return
-        ahead = 1e-6 * horizon.dt * np.arange(1, len(horizon.knots))
-        targets = view.target.position + ahead[:, None] * view.target.velocity
-        self._heading.plan(now, horizon.knots[1:, 0:3], targets)
+        ahead: Array = 1e-6 * horizon.dt * np.arange(1.0, len(horizon.knots))
+        self._heading.plan(now, horizon.knots[1:, 0:3], view.target.ahead(ahead).positions)
 
     def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to: the own goal, or the surface around the target where it will be at the end of the
@@ -246,20 +245,20 @@ class Companion:
             rest = self._settling.rest(measured, self._obstacles)
             if self._settling.clear:
                 self.pilot.settled()
-            return Aim(rest, _ZERO, rest if target is None else target.position)
+            return standing(rest, None if target is None else target.position)
         if config.task == "goto":
             goal = measured.position if self._goal is None else self._goal
-            return Aim(goal, _ZERO, goal if target is None else target.position)
+            return standing(goal, None if target is None else target.position)
         if target is None:
             return None
         ahead = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
-        surface, velocity = self._surface, target.velocity
+        (end,), (velocity,) = target.ahead(np.array([ahead]))
+        surface = self._surface
         offset = surface.nearest(measured.position - target.position)
         if config.turn_rate:
             offset = surface.nearest(turned(offset, config.turn_rate * ahead))
             velocity = velocity + config.turn_rate * np.array([-offset[1], offset[0], 0.0])
-        destination = target.position + ahead * target.velocity + offset
-        return Aim(destination, velocity, target.position, surface)
+        return Aim(end + offset, velocity, target.position, end, surface)
 
     def _setpoints(self, now: int, view: View) -> list[Message]:
         if now < self._next_setpoint:

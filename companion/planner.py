@@ -20,13 +20,20 @@ from companion.surfaces import Surface
 
 
 class Aim(NamedTuple):
-    """Where to: destination x̌ (3,), terminal velocity (3,), the target to face (3,), fleet-local ENU; and the
-    surface that x̌ lies on, None for a goal."""
+    """Where to: destination x̌ (3,) and terminal velocity (3,) at the end of the horizon, the target now (3,)
+    and then (3,), fleet-local ENU; and the surface that x̌ lies on, None for a goal."""
 
     destination: Array
     velocity: Array
     target: Array
+    target_end: Array
     surface: Surface | None = None
+
+
+def standing(goal: Array, target: Array | None = None) -> Aim:
+    """To come to rest at ``goal`` (3,), and face ``target`` (3,)."""
+    seen = goal if target is None else target
+    return Aim(goal, np.zeros(3), seen, seen)
 
 
 class Plan(NamedTuple):
@@ -59,8 +66,7 @@ class Planner:
 
         SolverError when there is no solution: the caller holds what it has.
         """
-        travel = self.dqmpc.seconds * aim.velocity
-        to_go = aim.destination - travel - position
+        to_go = aim.destination - (aim.target_end - aim.target) - position
         scene = Scene(
             position,
             velocity,
@@ -71,7 +77,7 @@ class Planner:
             aim.target,
             obstacles,
             self._gradient,
-            aim.target + travel,
+            aim.target_end,
             aim.surface,
         )
         influence = self._influence(now, scene)

@@ -17,6 +17,7 @@ from companion.gains import model
 from companion.horizon import Array
 from companion.rewind import Rewind
 from companion.timing import SenderClock
+from companion.turning import Path, carried
 
 _FAR, _FAST = 1e5, 100.0
 """m and m/s; beyond these a state is garbage, soundly framed though it may be."""
@@ -26,13 +27,18 @@ class State(NamedTuple):
     """Position (3,), velocity (3,), fleet-local ENU; ``age`` µs since the last accepted measurement was true.
 
     ``sigma``: standard deviation of the position on each axis, m. It grows with the age without bound, and is
-    infinite where nobody says.
+    infinite where nobody says. ``turn_rate``: how fast its course turns, rad/s, counter-clockwise from above.
     """
 
     position: Array
     velocity: Array
     age: int
     sigma: float = math.inf
+    turn_rate: float = 0.0
+
+    def ahead(self, seconds: Array) -> Path:
+        """Where it will be, and how fast, at each of ``seconds`` (n,) from then if it goes on so."""
+        return carried(self.position, self.velocity, self.turn_rate, seconds)
 
 
 class Track:
@@ -91,9 +97,15 @@ class Track:
         most = self._config.extrapolate_us
         dt = 1e-6 * min(max(age, 0), most)
         a, b, c, d, e, f = belief.x
-        position = np.array((a + dt * d, b + dt * e, c + dt * f))
-        velocity = np.array((d, e, f)) if age <= most else np.zeros(3)
-        return State(position, velocity, age, self._sigma(belief, age))
+        rate, sigma = belief.turn.rate, self._sigma(belief, age)
+        if rate == 0.0:
+            position, velocity = np.array((a + dt * d, b + dt * e, c + dt * f)), np.array((d, e, f))
+        else:
+            path = carried(np.array((a, b, c)), np.array((d, e, f)), rate, np.array((dt,)))
+            position, velocity = path.positions[0], path.velocities[0]
+        if age > most:
+            return State(position, np.zeros(3), age, sigma)
+        return State(position, velocity, age, sigma, rate)
 
     @property
     def last(self) -> Array:

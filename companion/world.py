@@ -89,8 +89,8 @@ class World:
         obstacles = self.neighbours.obstacles(now)
         config = self.config
         if view.target is not None and config.target_d_min is not None and config.target_d_safe is not None:
-            ahead = 1e-6 * config.horizon.dt_us * np.arange(config.horizon.steps + 1)
-            moving = view.target.position + ahead[:, None] * view.target.velocity
+            ahead: Array = 1e-6 * config.horizon.dt_us * np.arange(config.horizon.steps + 1.0)
+            moving = view.target.ahead(ahead).positions
             margin = np.array([config.field.margin(2)])
             obstacles = obstacles.joined(
                 Obstacles(

@@ -4,13 +4,14 @@ lowered.
 F_tang(0) = k_tang ‖∇J‖ α̂,  α̂ ⊥ α, the same for the whole horizon.
 
 Settled against the text. The gradient is its norm divided by Ω_t. The band reaches from the obstacle to
-d_safe + d_band and further for one that comes fast (``reach_s`` times the closing speed): turning aside takes
-time, not distance. The force grows from zero at the band's edge, quickly up to u_max − the input cancels so
-much of it − and then up to ``force_max`` at ``d_full``. It acts only about obstacles that stand in the way:
-ahead, fading out from 60° off the bow to abeam, so that the band is left once the obstacle is passed; and not
-beyond the destination, fading out over d_safe. The sense is latched per obstacle for as long as the encounter
-lasts, otherwise it chatters when the bearing crosses zero. Obstacles with no way between them (``gap``) are
-passed as one, with one sense: about each with its own, a vehicle before a U would be sent between its ends.
+d_safe + d_band and further for one that comes fast (``reach_s`` times the closing speed): turning aside
+takes time, not distance. The force grows from zero at the band's edge, quickly up to u_max − the input
+cancels so much of it − and then up to ``force_max`` at ``d_full``. It acts only about obstacles that stand
+in the way: ahead, fading out from 60° off the bow to abeam, so that the band is left once the obstacle is
+passed; and not beyond the destination, fading out over d_safe; and not when the vehicle has all but
+arrived. The sense is latched per obstacle for as long as the encounter lasts, otherwise it chatters when
+the bearing crosses zero. Obstacles with no way between them (``gap``) are passed as one, with one sense:
+about each with its own, a vehicle before a U would be sent between its ends.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ _ABEAM = 0.5
 _QUICK = 10.0
 """How much faster the force grows up to u_max than beyond."""
 _NEAR = 1e-6
+_THERE, _ON_THE_WAY = 0.5, 1.5
+"""m to go: who has less than the first goes round nobody, from the second on the force is whole. In a moving
+formation the way to go is tenths of a metre in any direction, and a force across it flings a vehicle out."""
 _SLOW, _SOON = 0.5, 3.0
 """m/s and s: slower than that nobody is on the way; what happens later does not count."""
 _RIGHT: Array = np.array([1.0])
@@ -69,9 +73,11 @@ class Tangential:
             u_max * min(1.0, _QUICK * whole) + (config.force_max - u_max) * whole,
         )
         direction = total / norm
-        # Who is under way sideways already is not made faster still, or it is flung out.
-        sideways = float(scene.velocity @ direction)
-        strength *= min(max(2.0 * (1.0 - sideways / config.pass_speed), 0.0), 1.0)
+        # Who is under way sideways already is not made faster still, or it is flung out: no faster than half
+        # of u_max stops within what there is to go.
+        sideways = float((scene.velocity - scene.destination_velocity) @ direction)
+        most = min(config.pass_speed, sqrt(u_max * sqrt(scene.to_go @ scene.to_go)) + _NEAR)
+        strength *= min(max(2.0 * (1.0 - sideways / most), 0.0), 1.0)
         return influence._replace(
             force=influence.force + direction * strength, omega_scale=config.omega_scale
         )
@@ -88,6 +94,7 @@ class Tangential:
         along = -(away @ to_go) / length
         ahead = _share(along / (_ABEAM * distance))
         before = _share(1.0 + (length - along) / obstacles.d_safe)
+        before *= min(max((length - _THERE) / (_ON_THE_WAY - _THERE), 0.0), 1.0)
         weights: Array = depth * ahead * before * self._meeting(obstacles, away, moving - scene.velocity)
         return weights
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
 from companion.horizon import Array, Horizon
-from companion.planner import Aim, Plan, Planner
+from companion.planner import Plan, Planner, standing
 
 LAWS = settings(deadline=None, max_examples=60)
 QUICK = settings(deadline=None, max_examples=25)
@@ -102,7 +102,7 @@ def fly(
                 np.full(count - 1, field.d_safe),
             )
             motion = horizons[k].at(now)
-            aim = Aim(goals[k], ZERO, ZERO)
+            aim = standing(goals[k], ZERO)
             plan = planners[k].plan(now, motion.position, motion.velocity, predictions[k], aim, seen)
             fresh.append(plan.horizon)
             yield Sighting(now, k, planners[k], motion.position, motion.velocity, plan)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
-from companion.planner import Aim, Planner
+from companion.planner import Aim, Planner, standing
 
 CONFIG = CompanionConfig()
 START = 1_767_225_600_000_000
@@ -33,11 +33,8 @@ def encounter(seed, config, matrix=None, epoch=START, count=12):
     random = np.random.default_rng(seed)
     x = np.append(random.uniform(-6, 6, 2), 6.0)
     v = random.uniform(-2, 2, 3) * [1.0, 1.0, 0.3]
-    aim = Aim(
-        M @ np.append(random.uniform(-8, 8, 2), 6.5),
-        M @ random.uniform(-1, 1, 3),
-        M @ random.uniform(-3, 3, 3),
-    )
+    goal, speed, target = random.uniform(-8, 8, 2), random.uniform(-1, 1, 3), random.uniform(-3, 3, 3)
+    aim = Aim(M @ np.append(goal, 6.5), M @ speed, M @ target, M @ (target + 1.6 * speed))
     places, speeds = x + random.uniform(-4, 4, (3, 3)), random.uniform(-2, 2, (3, 3))
     planner, plans, horizon = Planner(config), [], None
     for k in range(count):
@@ -137,7 +134,7 @@ def test_planar_forces_are_level():
 
 def test_at_its_destination_a_vehicle_rests():
     planner, here = Planner(CONFIG), np.array([3.0, -2.0, 5.0])
-    plan = planner.plan(START, here, ZERO, np.tile(here, (16, 1)), Aim(here, ZERO, ZERO), obstacles([]))
+    plan = planner.plan(START, here, ZERO, np.tile(here, (16, 1)), standing(here, ZERO), obstacles([]))
     np.testing.assert_allclose(plan.horizon.knots[:, 0:3], np.tile(here, (17, 1)), atol=1e-6)
     np.testing.assert_allclose(plan.gradient, ZERO, atol=1e-6)
 

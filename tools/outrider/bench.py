@@ -16,7 +16,7 @@ from companion.bearings import bearing
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
 from companion.heading import Heading
-from companion.planner import Aim, Planner
+from companion.planner import Aim, Planner, standing
 from companion.setpoint import setpoint
 from companion.world import World
 from mavlink_bridge.codec import Codec
@@ -215,7 +215,7 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
     angle = random.uniform(0.0, 2.0 * np.pi)
     goal = position + 8.0 * np.array([np.cos(angle), np.sin(angle), 0.0])
     velocity = 1.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
-    return Scene(world, position, velocity, Aim(goal, np.zeros(3), np.array([2.0, 2.0, 0.0])))
+    return Scene(world, position, velocity, standing(goal, np.array([2.0, 2.0, 0.0])))
 
 
 def _all_act(obstacles: Obstacles) -> None:
