@@ -15,8 +15,8 @@ import numpy as np
 
 from companion.horizon import Array
 
-_SLOW = 1e-3
-"""m/s; below it there is no course."""
+_NEAR = 1e-3
+"""m; who has gone less than this has no course."""
 
 
 class Turn(NamedTuple):
@@ -49,7 +49,7 @@ class TurnFilter:
         kept = exp(-dt / self._memory)
         rate, variance = kept * turn.rate, kept**2 * turn.variance + (1.0 - kept**2) * self._variance
         speed = min(hypot(*before), hypot(*now))
-        if speed < _SLOW:
+        if speed * dt < _NEAR:
             return Turn(rate, variance)
         seen = remainder(atan2(now[1], now[0]) - atan2(before[1], before[0]), tau) / dt
         share = variance / (variance + 2.0 * self._noise / (speed * dt) ** 2)

@@ -15,7 +15,7 @@ from companion.rewind import Rewind
 from companion.timing import Dated
 from companion.tracks import Track
 
-CONFIG = TrackConfig()
+CONFIG = TrackConfig(sigma_turn=0.5)
 WINDOW = CONFIG.rewind_us
 BOOT = 3_000_000_000
 """µs; what the sender's clock says less than ours."""
@@ -57,6 +57,7 @@ def assert_same(one, other):
     np.testing.assert_array_equal(one.last, other.last)
     np.testing.assert_array_equal(one.covariance(), other.covariance())
     assert one.rejected == other.rejected
+    assert one.at(one.time).turn_rate == other.at(other.time).turn_rate
 
 
 @LAWS

@@ -52,7 +52,9 @@ SCENES = st.builds(
     clear=st.floats(0.0, 3.5),
     gap=st.floats(0.0, 3.0),
     spheres=st.none() | st.fixed_dictionaries({"per_vehicle": dial(0.0, 1.0), "radius": spans(0.1, 2.0)}),
-    posts=st.none() | st.fixed_dictionaries({"per_vehicle": dial(0.0, 1.0), "radius": spans(0.1, 1.0)}),
+    posts=st.none()
+    | st.fixed_dictionaries({"per_vehicle": dial(0.0, 1.0), "radius": spans(0.1, 1.0)})
+    | st.fixed_dictionaries({"count": st.tuples(st.integers(0, 6), st.integers(0, 6)).map(sorted)}),
 )
 
 
@@ -118,7 +120,7 @@ def test_an_escort_s_circles_are_clear_and_its_jumps_as_long_as_it_says(
     which = scene("chase", vehicles=[count, count], difficulty=difficulty)
     flown = drawn(which, seed)
     assert isinstance(flown.target, FixedTarget)
-    wanted = dials(which, count)
+    wanted = dials(which, count, seed)
     places = np.array([flown.target.at, *(jump.to for jump in flown.target.jumps)])
     assert len(flown.target.jumps) == wanted.jumps
     np.testing.assert_allclose(np.linalg.norm(np.diff(places, axis=0), axis=1), wanted.length, atol=2e-3)
@@ -141,10 +143,10 @@ def test_a_seed_is_one_scenario_and_another_seed_another(name: str, seed: int) -
     assert draw(which, seed) != draw(which, seed + 1)
 
 
-@given(SCENES, st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.integers(2, 200))
-def test_the_dial_turns_one_way(which: Scene, one: float, other: float, count: int) -> None:
+@given(SCENES, st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.integers(2, 200), SEEDS)
+def test_the_dial_turns_one_way(which: Scene, one: float, other: float, count: int, seed: int) -> None:
     easy, hard = (
-        dials(which.model_copy(update={"difficulty": difficulty}), count)
+        dials(which.model_copy(update={"difficulty": difficulty}), count, seed)
         for difficulty in sorted((one, other))
     )
     assert hard.half <= easy.half
@@ -156,6 +158,16 @@ def test_the_dial_turns_one_way(which: Scene, one: float, other: float, count: i
     assert hard.every_s <= easy.every_s
 
 
+def test_numbers_in_all_are_drawn_evenly_whatever_the_dial() -> None:
+    found = [
+        [dials(scene("posts", difficulty=difficulty), count, seed).posts for seed in range(700)]
+        for difficulty, count in ((0.0, 3), (1.0, 10))
+    ]
+    assert found[0] == found[1]
+    # Each of seven numbers a hundred times, with a standard deviation of nine.
+    assert all(55 <= found[0].count(number) <= 145 for number in range(7))
+
+
 @settings(max_examples=30)
 @given(st.floats(0.0, 1.0), SEEDS)
 def test_the_dial_does_not_change_who_flies(difficulty: float, seed: int) -> None:
@@ -164,7 +176,7 @@ def test_the_dial_does_not_change_who_flies(difficulty: float, seed: int) -> Non
 
 def test_the_ends_of_the_dial_are_those_of_the_file() -> None:
     which = scene("chase")
-    easy, hard = (dials(which.model_copy(update={"difficulty": d}), 8) for d in (0.0, 1.0))
+    easy, hard = (dials(which.model_copy(update={"difficulty": d}), 8, 1) for d in (0.0, 1.0))
     assert which.jumps is not None
     assert 100 * 8 / (2 * easy.half) ** 2 == pytest.approx(which.density.easy)
     assert 100 * 8 / (2 * hard.half) ** 2 == pytest.approx(which.density.hard)
@@ -231,6 +243,9 @@ def test_what_cannot_be_placed_is_refused_with_a_sentence(changes: dict[str, Any
         ("task: escort\n", "needs them"),
         ("posts: {per_vehicle: {easy: 0.0, hard: 1.0}, raidus: [1.0, 1.0]}\n", "did you mean 'radius'?"),
         ("posts: {per_vehicle: {easy: 0.0, hard: 1.0}, radius: [2.0, 1.0]}\n", "posts.radius: the second"),
+        ("posts: {count: [2, 1]}\n", "posts.count: the second"),
+        ("posts: {radius: [0.2, 0.6]}\n", "per_vehicle or count"),
+        ("posts: {count: [0, 1], per_vehicle: {easy: 0.0, hard: 1.0}}\n", "per_vehicle or count"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_said(change: str, said: str) -> None:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shipped import scenario
 
-from outrider.scenario import Scenario
+from outrider.scenario import Ring, Scenario
 from outrider.starts import starts
 
 SEEDS = st.integers(0, 2**63)
@@ -55,6 +55,21 @@ def test_the_seed_alone_decides(seed: int, count: int, planar: bool) -> None:
     assert first.goals is not None
     assert other.goals is not None
     assert np.array_equal(first.goals, other.goals)
+
+
+@settings(deadline=None)
+@given(SEEDS, st.integers(2, 60), st.floats(0.0, 1.0), st.floats(0.5, 8.0))
+def test_a_ring_has_room_for_all(seed: int, count: int, jitter: float, apart: float) -> None:
+    of = ring(count, jitter, radius=8.0, apart=apart)
+    places = starts(of, seed, False).positions
+    off = np.linalg.norm(places[:, None] - places[None], axis=-1) + 1e9 * np.eye(count)
+    assert off.min() >= apart - 1e-9
+    # No larger than it must be, and never smaller than it is said to be.
+    assert isinstance(of.starts, Ring)
+    radius = of.starts.radius_of(count)
+    assert np.abs(np.linalg.norm(places[:, :2], axis=1) - radius).max() <= jitter + 1e-9
+    needed = (apart + 2.0 * jitter) / (2.0 * np.sin(np.pi / count))
+    assert radius == pytest.approx(max(8.0, needed))
 
 
 def test_jitter_fills_the_ball_evenly() -> None:

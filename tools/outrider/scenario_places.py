@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi, sin
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -24,11 +25,20 @@ class Ring(Part):
     kind: Literal["ring"]
     centre: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     radius: Length
+    apart: Length | None = Field(
+        None, description="m, of neighbours; the radius grows until there is room for all of them"
+    )
     height: float = Field(
         5.0, ge=0.5, le=100.0, description="m above ground, where the vehicles hover at first"
     )
     jitter: float = Field(0.0, ge=0.0, le=2.0, description="m, radius of the ball around each start")
     first_deg: float = Field(0.0, ge=-360.0, le=360.0, description="bearing of the first vehicle, ENU")
+
+    def radius_of(self, count: int) -> float:
+        """m, with ``count`` vehicles on it. However they are jittered, neighbours are ``apart``."""
+        if self.apart is None or count < 2:
+            return self.radius
+        return max(self.radius, 0.5 * (self.apart + 2.0 * self.jitter) / sin(pi / count))
 
 
 class Points(Part):

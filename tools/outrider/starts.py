@@ -59,11 +59,12 @@ def _slots(scenario: Scenario) -> tuple[Array, Array | None]:
 
 
 def _on_ring(ring: Ring, count: int) -> Array:
+    radius = ring.radius_of(count)
     angles = math.radians(ring.first_deg) + 2.0 * math.pi * np.arange(count) / count
     return np.column_stack(
         [
-            ring.centre[0] + ring.radius * np.cos(angles),
-            ring.centre[1] + ring.radius * np.sin(angles),
+            ring.centre[0] + radius * np.cos(angles),
+            ring.centre[1] + radius * np.sin(angles),
             np.full(count, ring.height),
         ]
     )

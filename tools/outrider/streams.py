@@ -23,6 +23,7 @@ class Stream(IntEnum):
     SCENE_FLEET = 5
     SCENE_STARTS = 6
     SCENE_GOALS = 7
+    SCENE_COUNTS = 8
 
 
 def stream(seed: int, of: Stream, number: int = 0) -> np.random.Generator:

@@ -15,7 +15,7 @@ from pydantic import JsonValue
 from outrider.streams import Stream, stream
 from outrider.sweeps.grid import leaves, overlay
 from outrider.sweeps.places import Array, Circles, obstacles, scatter, walk
-from outrider.sweeps.scenes import Scene
+from outrider.sweeps.scenes import Scene, Things
 
 _MARGIN = 10.0
 """m around all places within which the planner may move."""
@@ -41,21 +41,28 @@ def vehicles(scene: Scene, seed: int) -> int:
     return int(stream(seed, Stream.SCENE_FLEET).integers(scene.vehicles[0], scene.vehicles[1] + 1))
 
 
-def dials(scene: Scene, count: int) -> Dials:
-    """Every dial at the scene's difficulty, for ``count`` vehicles."""
+def dials(scene: Scene, count: int, seed: int) -> Dials:
+    """Every dial at the scene's difficulty, for ``count`` vehicles; numbers in all are drawn by the seed."""
+    random = stream(seed, Stream.SCENE_COUNTS)
 
     def at(easy: float, hard: float) -> float:
         return easy + scene.difficulty * (hard - easy)
 
+    def many(kind: Things | None) -> int:
+        if kind is None:
+            return 0
+        if kind.per_vehicle is not None:
+            return round(count * at(kind.per_vehicle.easy, kind.per_vehicle.hard))
+        least, most = kind.count or (0, 0)
+        return int(random.integers(least, most + 1))
+
     density = at(scene.density.easy, scene.density.hard)
-    spheres, posts, jumps = scene.spheres, scene.posts, scene.jumps
+    jumps = scene.jumps
     return Dials(
         half=math.sqrt(100.0 * count / density) / 2.0,
         speed=round(at(scene.speed.easy, scene.speed.hard), 3),
-        spheres=0
-        if spheres is None
-        else round(count * at(spheres.per_vehicle.easy, spheres.per_vehicle.hard)),
-        posts=0 if posts is None else round(count * at(posts.per_vehicle.easy, posts.per_vehicle.hard)),
+        spheres=many(scene.spheres),
+        posts=many(scene.posts),
         jumps=0 if jumps is None else max(1, round(at(jumps.count.easy, jumps.count.hard))),
         length=0.0 if jumps is None else at(jumps.length.easy, jumps.length.hard),
         every_s=0.0 if jumps is None else round(at(jumps.every_s.easy, jumps.every_s.hard), 3),
@@ -66,7 +73,7 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
     """The scenario of ``seed``, as a document that stands for a scenario file. InputError if it has no room
     for what it shall hold."""
     count = vehicles(scene, seed)
-    dial = dials(scene, count)
+    dial = dials(scene, count, seed)
     where = f"scene {scene.name!r}, seed {seed}"
     starts = scatter(stream(seed, Stream.SCENE_STARTS), scene, count, dial.half, f"{where}: start")
     document: dict[str, JsonValue] = {

@@ -3,7 +3,7 @@ once, from its easy end to its hard end."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, JsonValue, model_validator
 
@@ -13,6 +13,7 @@ from outrider.sweeps.grid import leaves
 Metres = Annotated[float, Field(gt=0.0, le=200.0)]
 Span = tuple[Metres, Metres]
 """Drawn evenly between the two."""
+Number = Annotated[int, Field(ge=0, le=500)]
 Amount = Annotated[float, Field(ge=0.0, le=50.0)]
 
 DECIDED = (
@@ -71,18 +72,31 @@ class Interval(Part):
     hard: float = Field(gt=0.0, le=600.0)
 
 
-class Balls(Part):
+class Things(Part):
+    """Obstacles of a kind: so many for each vehicle, or so many in all."""
+
+    per_vehicle: PerVehicle | None = None
+    count: tuple[Number, Number] | None = Field(
+        None, description="least and most, whatever the vehicles; drawn evenly"
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.per_vehicle is None) == (self.count is None):
+            raise ValueError("per_vehicle or count: one of them")
+        return self
+
+
+class Balls(Things):
     """Spheres in the air."""
 
-    per_vehicle: PerVehicle
     radius: Span = (0.5, 1.5)
     height: Span = Field((3.0, 8.0), description="m above ground, of the centres")
 
 
-class Poles(Part):
+class Poles(Things):
     """Posts on the ground."""
 
-    per_vehicle: PerVehicle
     radius: Span = (0.2, 0.6)
     height: Span = Field((8.0, 20.0), description="m above ground, of the tops")
 
@@ -130,7 +144,10 @@ class Scene(Part):
         spans: list[tuple[str, tuple[float, float]]] = [("vehicles", self.vehicles), ("height", self.height)]
         for name, kind in (("spheres", self.spheres), ("posts", self.posts)):
             if kind is not None:
-                dials.append((f"{name}.per_vehicle", kind.per_vehicle))
+                if kind.per_vehicle is not None:
+                    dials.append((f"{name}.per_vehicle", kind.per_vehicle))
+                if kind.count is not None:
+                    spans.append((f"{name}.count", kind.count))
                 spans += [(f"{name}.radius", kind.radius), (f"{name}.height", kind.height)]
         if self.jumps is not None:
             dials += [("jumps.count", self.jumps.count), ("jumps.length", self.jumps.length)]
