@@ -50,6 +50,26 @@ def test_a_shipped_sweep_can_be_flown(path: Path) -> None:
         assert scenario_of(task(cell, spec.first_seed)).airborne
 
 
+@given(
+    st.dictionaries(
+        KEYS.map(lambda k: f"x.{k}"), st.lists(st.integers(), min_size=1, max_size=3), max_size=2
+    ),
+    st.dictionaries(
+        KEYS.map(lambda k: f"y.{k}"), st.lists(st.integers(), min_size=1, max_size=3), max_size=3
+    ),
+)
+def test_what_varies_is_one_thing_at_a_time(grid: dict[str, list[int]], vary: dict[str, list[int]]) -> None:
+    found = [point.changes for point in points(sweep(grid=grid, vary=vary, set={"z": 1}))]
+    bases = [point.changes for point in points(sweep(grid=grid, set={"z": 1}))]
+    assert len(found) == len(bases) * (1 + sum(len(values) for values in vary.values()))
+    assert [changes for changes in found if not any(key in vary for key in changes)] == bases
+    for changes in found:
+        aside = {key: value for key, value in changes.items() if key in vary}
+        assert len(aside) <= 1
+        assert {key: value for key, value in changes.items() if key not in vary} in bases
+        assert all(value in vary[key] for key, value in aside.items())
+
+
 def test_the_bar_s_sweep_is_a_thousand_seeds_at_20_hz() -> None:
     spec = load(config_root() / "sweeps" / "antipodal-8.yaml", Sweep)
     (cell,) = cells(spec.model_copy(update={"runs": 1}), "x")
@@ -74,6 +94,8 @@ def test_the_bar_s_sweep_is_a_thousand_seeds_at_20_hz() -> None:
         ("name: a\nscenarios: [x]\nset: {a.b: 1}\ngrid: {a.b: [1]}\n", "a.b: set in two places"),
         ("name: a\nscenarios: [x]\ngrid: {a.b: [1], a: [{}]}\n", "a.b: set in two places"),
         ("name: a\nscenarios: [x]\ngrid: {a + b: [1], b: [1]}\n", "b: set in two places"),
+        ("name: a\nscenarios: [x]\nset: {a: 1}\nvary: {a: [1]}\n", "a: set in two places"),
+        ("name: a\nscenarios: [x]\ngrid: {a: [1]}\nvary: {a.b: [1]}\n", "a.b: set in two places"),
         ("name: a/b\nscenarios: [x]\n", "a.yaml:1:7"),
     ],
 )

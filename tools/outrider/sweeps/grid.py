@@ -18,11 +18,13 @@ Axis = Annotated[
     str,
     Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*( [+] [A-Za-z_][A-Za-z0-9_.]*)*$"),
 ]
+Values = Annotated[tuple[JsonValue, ...], Field(min_length=1, max_length=1000)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class Sweep(Part):
-    """One sweep. Every scenario (or scene) is flown with every combination of the grid's values."""
+    """One sweep. Every scenario (or scene) is flown with every combination of the grid's values, and each of
+    these as it is and with each of the values to vary."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     description: str = ""
@@ -33,15 +35,18 @@ class Sweep(Part):
     set: dict[Key, JsonValue] = Field(
         {}, description="values for all cells by dotted key: companion.planar: true"
     )
-    grid: dict[Axis, Annotated[tuple[JsonValue, ...], Field(min_length=1, max_length=1000)]] = Field(
+    grid: dict[Axis, Values] = Field(
         {}, description="values to combine, by dotted key; 'a.b + c.d' gives both keys the same value"
+    )
+    vary: dict[Axis, Values] = Field(
+        {}, description="values to try one at a time, all else as it is; by dotted key as in grid"
     )
 
     @model_validator(mode="after")
     def _consistent(self) -> Sweep:
         if bool(self.scenarios) == bool(self.scenes):
             raise ValueError("needs either scenarios or scenes")
-        keys = [key for axis in self.grid for key in axis_keys(axis)]
+        keys = [key for axis in (*self.grid, *self.vary) for key in axis_keys(axis)]
         keys += self.set
         twice = {a for i, a in enumerate(keys) for j, b in enumerate(keys) if i != j and _within(a, b)}
         if twice:
@@ -49,6 +54,7 @@ class Sweep(Part):
         count = len(self.sources)
         for values in self.grid.values():
             count *= len(values)
+        count *= 1 + sum(len(values) for values in self.vary.values())
         if count > MOST_CELLS:
             raise ValueError(f"the grid has {count} cells; allowed are {MOST_CELLS}")
         return self
@@ -74,16 +80,20 @@ class Point(NamedTuple):
 
 
 def points(sweep: Sweep) -> Iterator[Point]:
-    """Every combination, the last key of the grid running fastest."""
-    names = _short([axis_keys(axis)[0] for axis in sweep.grid])
+    """Every combination, the last key of the grid running fastest, each followed by what varies from it."""
+    axes = [*sweep.grid, *sweep.vary]
+    names = dict(zip(axes, _short([axis_keys(axis)[0] for axis in axes]), strict=True))
+    varied = [(axis, value) for axis, values in sweep.vary.items() for value in values]
     for source in sweep.sources:
         for values in product(*sweep.grid.values()):
-            changes = dict(sweep.set)
-            words = [source] if len(sweep.sources) > 1 or not sweep.grid else []
-            for axis, name, value in zip(sweep.grid, names, values, strict=True):
-                changes.update(dict.fromkeys(axis_keys(axis), value))
-                words.append(f"{name}={_word(value)}")
-            yield Point(source, " ".join(words), changes)
+            combined = list(zip(sweep.grid, values, strict=True))
+            for chosen in (combined, *([*combined, one] for one in varied)):
+                changes = dict(sweep.set)
+                words = [source] if len(sweep.sources) > 1 or not chosen else []
+                for axis, value in chosen:
+                    changes.update(dict.fromkeys(axis_keys(axis), value))
+                    words.append(f"{names[axis]}={_word(value)}")
+                yield Point(source, " ".join(words), changes)
 
 
 def axis_keys(axis: str) -> list[str]:
