@@ -8,7 +8,7 @@ here. A scenario file may say otherwise.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -65,7 +65,21 @@ class LimitsConfig(Settings):
         return self
 
 
-class FieldConfig(Settings):
+class Potential(Settings):
+    """What F_hyp of eq. (8) needs."""
+
+    gain: Positive
+    d_min: Positive
+    d_safe: Positive
+
+    @model_validator(mode="after")
+    def _order(self) -> Self:
+        if self.d_safe <= self.d_min:
+            raise ValueError("d_safe must be larger than d_min")
+        return self
+
+
+class FieldConfig(Potential):
     """The repulsive field, eq. (8)."""
 
     gain: Positive = Field(10.0, description="K; the paper gives none")
@@ -91,12 +105,6 @@ class FieldConfig(Settings):
         n = 2 between vehicles, 1 to what stands."""
         return self.margin_sigmas * self.position_sigma * math.sqrt(estimates)
 
-    @model_validator(mode="after")
-    def _order(self) -> FieldConfig:
-        if self.d_safe <= self.d_min:
-            raise ValueError("d_safe must be larger than d_min")
-        return self
-
 
 class TangentialConfig(Settings):
     """The tangential band, Sec. III-C.3."""
@@ -120,7 +128,7 @@ class SwivelConfig(Settings):
     arrived: Positive = Field(0.3, description="‖∇J‖ below which the vehicle is there and its sense is free")
 
 
-class ApproachAngleConfig(Settings):
+class ApproachAngleConfig(Potential):
     """The field of approach angles, Sec. III-C.2. Its distances are squares of angles, rad²."""
 
     gain: Positive = Field(2.0, description="K of the angles")
@@ -129,12 +137,6 @@ class ApproachAngleConfig(Settings):
     force_max: Positive = Field(4.0, description="m/s²; above u_max, or the input cancels it")
     pass_speed: Positive = Field(3.0, description="m/s across at which the force is gone; whole up to half")
     reach: Positive = Field(6.0, description="m: who is further off is not met yet")
-
-    @model_validator(mode="after")
-    def _order(self) -> ApproachAngleConfig:
-        if self.d_safe <= self.d_min:
-            raise ValueError("d_safe must be larger than d_min")
-        return self
 
 
 class OwnSurface(Settings):
