@@ -32,7 +32,7 @@ ROWS = (
     Row("antipodal-8, tangential", "antipodal-8", within_s=20.0, slow=True),
     Row("scenario I", "scenario-1", within_s=40.0, slow=True),
     Row("walk, 20 s", "walk", {"cap_s": 20.0}, standoff_p95_m=0.5, slow=True),
-    # Carried on straight its target would be 1.6 m beside its bend at the end of the horizon, and this 3 to 12 m.
+    # Carried on straight, its target would be 1.6 m beside its bend after a horizon, and this 3 to 12 m.
     Row("run, 20 s", "run", {"cap_s": 20.0}, standoff_p95_m=1.0, slow=True),
     Row("antipodal for ten", "antipodal", {"vehicles": 10}, within_s=25.0, slow=True),
     Row("escort, 10 s", "escort", {"target": {"duration_s": 10.0}}, standoff_p95_m=2.0),
