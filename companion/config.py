@@ -12,6 +12,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from companion.moving import Moving, MovingPost, MovingSphere
 from companion.obstacles import Obstacle, Post, Sphere
 from companion.settings import Settings
 from companion.surfaces import Circle, Surface, SurfaceConfig
@@ -28,7 +29,16 @@ Bounds = tuple[
 ]
 
 
-__all__ = ["CompanionConfig", "Obstacle", "Post", "Settings", "Sphere"]
+__all__ = [
+    "CompanionConfig",
+    "Moving",
+    "MovingPost",
+    "MovingSphere",
+    "Obstacle",
+    "Post",
+    "Settings",
+    "Sphere",
+]
 
 
 class HorizonConfig(Settings):
@@ -232,6 +242,9 @@ class CompanionConfig(Settings):
     target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
     target_d_safe: float | None = Field(None, gt=0.0, le=100.0)
     obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed; the field is about them")
+    moving: tuple[Moving, ...] = Field(
+        (), max_length=100, description="who of those heard on the swarm link is an obstacle, and how large"
+    )
     horizon: HorizonConfig = HorizonConfig()
     cost: CostConfig = CostConfig()
     limits: LimitsConfig = LimitsConfig()
@@ -265,6 +278,10 @@ class CompanionConfig(Settings):
                 raise ValueError(f"{name}.force_max must exceed u_max, or the input cancels it")
         if len(set(self.methods)) != len(self.methods):
             raise ValueError("methods: a method is there twice; allowed: once")
+        systems = [one.system for one in self.moving]
+        for system in systems:
+            if systems.count(system) > 1:
+                raise ValueError(f"moving: system {system} is there twice; allowed: once")
         if (self.target_d_min is None) != (self.target_d_safe is None):
             raise ValueError("target_d_min and target_d_safe come together")
         nearest = self.field.d_safe

@@ -1,4 +1,5 @@
-"""The other vehicles as the swarm link tells of them: a track each, and the horizon each has shared.
+"""The other vehicles, and obstacles that move, as the swarm link tells of them: a track each, and the horizon
+each has shared.
 
 A neighbour that shares no horizon, or whose horizon is old or no longer where the neighbour is, is taken at
 its n = 0 position for the whole horizon (Sec. IV-A), or carried on at constant velocity if so configured.

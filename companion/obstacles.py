@@ -10,13 +10,14 @@ from __future__ import annotations
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from companion.horizon import Array
 from companion.settings import Settings
 
 _Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
-_Size = Annotated[float, Field(gt=0.0, le=1000.0)]
+Size = Annotated[float, Field(gt=0.0, le=1000.0)]
 
 FIRST_ID = 1000
 """Ids of fixed obstacles begin here: above every system id."""
@@ -27,7 +28,7 @@ class Sphere(Settings):
 
     kind: Literal["sphere"]
     at: tuple[_Coordinate, _Coordinate, _Coordinate] = Field(description="centre, m, fleet-local ENU")
-    radius: _Size = Field(description="m")
+    radius: Size = Field(description="m")
 
 
 class Post(Settings):
@@ -35,8 +36,8 @@ class Post(Settings):
 
     kind: Literal["post"]
     at: tuple[_Coordinate, _Coordinate] = Field(description="axis, m east and north of the fleet origin")
-    radius: _Size = Field(description="m")
-    height: _Size = Field(100.0, description="m above the fleet origin")
+    radius: Size = Field(description="m")
+    height: Size = Field(100.0, description="m above the fleet origin")
 
 
 Obstacle = Annotated[Sphere | Post, Field(discriminator="kind")]
@@ -77,14 +78,21 @@ class FixedObstacles:
         return Axes(tuple(self._ids[near].tolist()), positions, self._radius[near])
 
     def distance(self, positions: Array) -> Array:
-        """From points (…, 3) to every surface (…, M), m; negative inside. A post has a flat top."""
+        """From points (…, 3) to every surface (…, M), m; negative inside."""
         off = positions[..., None, :2] - self._xy
-        across = np.sqrt(np.vecdot(off, off))
-        height = positions[..., 2, None]
-        up = height - self._high
-        ball = np.sqrt(across**2 + (height - np.where(self._ball, self._high, 0.0)) ** 2) - self._radius
-        beside = across - self._radius
-        outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(up, 0.0) ** 2)
-        post = np.where((beside < 0.0) & (up < 0.0), np.maximum(beside, up), outside)
-        result: Array = np.where(self._ball, ball, post)
-        return result
+        above = positions[..., 2, None] - self._high
+        return to_surface(np.sqrt(np.vecdot(off, off)), above, self._ball, self._radius)
+
+
+def to_surface(across: Array, above: Array, ball: NDArray[np.bool_], radius: Array) -> Array:
+    """Distances (…, M) of points from the surfaces of spheres (where ``ball`` (M,)) and posts of ``radius``
+    (M,), m; negative inside.
+
+    The points are ``across`` (…, M) from the axes and ``above`` (…, M) a sphere's centre or a post's top,
+    which is flat.
+    """
+    beside = across - radius
+    outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(above, 0.0) ** 2)
+    post = np.where((beside < 0.0) & (above < 0.0), np.maximum(beside, above), outside)
+    result: Array = np.where(ball, np.sqrt(across**2 + above**2) - radius, post)
+    return result

@@ -57,7 +57,7 @@ class Sharing:
         if self._passes(1, now, rates.state_us) and fresh:
             shared.swarm.append(self._position(now - self._boot, view))
         if self._passes(2, now, rates.plan_us) and horizon is not None and self._config.shares_plan:
-            plan = self._plan(horizon)
+            plan = plan_message(horizon, self._own, self._fleet)
             if plan is not None:
                 shared.swarm.append(plan)
         return shared
@@ -85,18 +85,15 @@ class Sharing:
             yaw,
         )
 
-    def _plan(self, horizon: Horizon) -> Tunnel | None:
-        """None for a horizon that does not fit the wire: neighbours then see the position alone."""
-        knots = horizon.knots
-        try:
-            plan = quantise(
-                horizon.epoch,
-                horizon.dt,
-                knots[0, 0:3],
-                knots[0, 3:6],
-                knots[:-1, 6:9],
-                self._fleet.fingerprint,
-            )
-        except PlanWireError:
-            return None
-        return Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan))
+
+def plan_message(horizon: Horizon, source: Source, fleet: FleetFrame) -> Tunnel | None:
+    """A horizon as ``source`` tells it; None for one that does not fit the wire: neighbours then see the
+    position alone."""
+    knots = horizon.knots
+    try:
+        plan = quantise(
+            horizon.epoch, horizon.dt, knots[0, 0:3], knots[0, 3:6], knots[:-1, 6:9], fleet.fingerprint
+        )
+    except PlanWireError:
+        return None
+    return Tunnel(source, 0, 0, PAYLOAD_TYPE, pack(plan))

@@ -10,6 +10,7 @@ import numpy as np
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
 from companion.horizon import Array
+from companion.moving import MovingObstacles
 from companion.neighbours import Neighbours
 from companion.obstacles import FixedObstacles
 from companion.tracks import State, Track
@@ -56,6 +57,7 @@ class World:
         self._own = Track(config.own)
         self._target = Track(config.target)
         self._fixed = FixedObstacles(config.obstacles)
+        self._moving = MovingObstacles(config.moving)
         self._reach = reach(config)
         self._local: LocalFrame | None = None
         self._origin: tuple[float, float, float] | None = None
@@ -84,14 +86,16 @@ class World:
         return View(self._own.at(now), yaw, target, self._local)
 
     def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
-        """Neighbours, the target where it is one, and what stands near the own ``prediction`` (N + 1, 3),
-        aligned with ``now + n·dt``."""
+        """Neighbours and what else moves, the target where it is one, and what stands near the own
+        ``prediction`` (N + 1, 3), aligned with ``now + n·dt``."""
         obstacles = self.neighbours.obstacles(now)
-        config = self.config
+        config, field = self.config, self.config.field
+        if len(self._moving):
+            obstacles = self._moving.among(obstacles, prediction, field.d_min, field.d_safe, field.margin(1))
         if view.target is not None and config.target_d_min is not None and config.target_d_safe is not None:
             ahead: Array = 1e-6 * config.horizon.dt_us * np.arange(config.horizon.steps + 1.0)
             moving = view.target.ahead(ahead).positions
-            margin = np.array([config.field.margin(2)])
+            margin = np.array([field.margin(2)])
             obstacles = obstacles.joined(
                 Obstacles(
                     (self._target_system,),
@@ -103,7 +107,6 @@ class World:
             )
         if len(self._fixed):
             ids, positions, radius = self._fixed.around(prediction, self._reach)
-            field = config.field
             radius = radius + field.margin(1)
             obstacles = obstacles.joined(
                 Obstacles(ids, positions, field.d_min + radius, field.d_safe + radius, radius)

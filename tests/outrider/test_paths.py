@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ways import bent_ring
 
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
@@ -19,13 +20,6 @@ from outrider.targets import Walking
 FLEET = FleetFrame(47.4, 8.5, 488.0)
 LAWS = settings(deadline=None, max_examples=40)
 PLACES = st.integers(3, 9).flatmap(lambda n: st.integers(0, 2**32 - 1).map(lambda seed: bent_ring(n, seed)))
-
-
-def bent_ring(count: int, seed: int) -> np.ndarray:
-    """Places on a ring of 10 m, each moved by decimetres: no two coincide."""
-    angle = 2.0 * np.pi * np.arange(count) / count
-    ring = np.column_stack([10.0 * np.cos(angle), 10.0 * np.sin(angle), np.full(count, 1.0)])
-    return ring + np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 3))
 
 
 @LAWS

@@ -55,7 +55,8 @@ def hovering(count: int, vehicles: int = 2) -> Samples:
     """Still, everything zero, a sample every 20 ms."""
     flat, deep = np.zeros((count, vehicles)), np.zeros((count, vehicles, 3))
     time = np.arange(count, dtype=np.int64) * 20_000
-    return Samples(time, deep, deep, deep, deep, deep, flat, flat, np.zeros((count, 3)), np.full(count, 4.0))
+    target, still = np.zeros((count, 3)), np.empty((count, 0, 3))
+    return Samples(time, deep, deep, deep, deep, deep, flat, flat, target, np.full(count, 4.0), still)
 
 
 @dataclass

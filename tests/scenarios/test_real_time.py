@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from lockstep_flights import FIREFLY, scenario, setpoints
 
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.messages import GlobalPosition, Tunnel
 from mavlink_bridge.tlog import read_tlog
 from outrider.conductor import Stage
 from outrider.realtime.flight import RealTimeFlight
@@ -33,10 +35,25 @@ SMALL: dict[str, Any] = {
 }
 HANGS = {"faults": [{"kind": "freeze", "vehicle": 12, "at_s": 0.5, "for_s": 1.0}]}
 CUT = {"partitions": [{"at_s": 0.2, "for_s": 1.0, "members": [11]}]}
+COMES: dict[str, Any] = {
+    "kind": "post",
+    "radius": 0.5,
+    "speed": 1.5,
+    "shares_plan": True,
+    "through": [[6.0, 4.0], [9.0, 1.0], [9.0, -5.0], [6.0, -2.0]],
+}
+
+
+def said(log: Path, by: int) -> set[type]:
+    """The messages of system ``by`` in a log."""
+    codec = Codec(lambda _identifier, system, _component: system == by)
+    return {type(message) for record in read_tlog(log) for message in codec.feed(record.frame)}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("changes", [{}, {**HANGS, **CUT}], ids=["calm", "frozen and cut off"])
+@pytest.mark.parametrize(
+    "changes", [{}, {**HANGS, **CUT, "moving": [COMES]}], ids=["calm", "frozen, cut off, and a post"]
+)
 def test_a_flight_in_real_time(changes: dict[str, Any], tmp_path: Path) -> None:
     of = scenario("antipodal-8", SMALL, changes)
     flight = RealTimeFlight(of, FIREFLY, 1, LOGS, tmp_path)
@@ -48,6 +65,12 @@ def test_a_flight_in_real_time(changes: dict[str, Any], tmp_path: Path) -> None:
     assert np.isfinite(samples.position).all()
     assert (np.diff(samples.time) == 20_000).all()
     assert outcome.truth.vehicles.minimum > 2.0
+    # A post that moves is where it should be, and was heard of.
+    assert samples.moving.shape == (len(samples.time), len(of.moving), 3)
+    assert (outcome.truth.obstacles.minimum < 10.0) == bool(of.moving)
+    if of.moving:
+        assert np.linalg.norm(samples.moving[-1, 0] - (6.0, 4.0, 0.0)) > 2.0
+        assert all(said(log, 190) == {GlobalPosition, Tunnel} for log in tmp_path.glob("*.tlog"))
     # On their way, or there: nobody was left hanging.
     assert (samples.position[-1, :, 1] > 1.0).all()
     summary = summarise(outcome, Cost(1.0, 1.0), tmp_path)

@@ -52,7 +52,8 @@ def _headline(flight: Outcome, summary: dict[str, Value]) -> str:
 
 
 def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
-    """From above, with obstacles and the surface around the target's last place."""
+    """From above, with obstacles, the ways of those that move, and the surface around the target's last
+    place."""
     from matplotlib.patches import Circle
 
     for k, system in enumerate(flight.systems):
@@ -61,6 +62,10 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
         axes.plot(*samples.position[-1, k, :2], "o", ms=5, color=line.get_color())
     for obstacle in flight.scenario.obstacles:
         axes.add_patch(Circle(obstacle.at[:2], obstacle.radius, color="0.6", lw=0.0))
+    for j, moving in enumerate(flight.scenario.moving):
+        way = samples.moving[:, j, :2]
+        axes.plot(way[:, 0], way[:, 1], color="0.6", lw=1.0)
+        axes.add_patch(Circle(way[-1], moving.radius, fc="0.8", ec="0.6", lw=1.0))
     there = samples.target[np.isfinite(samples.target).all(axis=1)]
     if len(there):
         axes.plot(there[:, 0], there[:, 1], color=_TARGET, lw=1.6, ls=":")

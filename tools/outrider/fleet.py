@@ -17,6 +17,7 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.node_clock import NodeClock
 from outrider import names
 from outrider.bystander import Bystander
+from outrider.moving import MovingObstacle
 from outrider.operator import Operator
 from outrider.scenario import FixedTarget, PathTarget, Scenario
 from outrider.scenario_faults import ClockFault
@@ -61,9 +62,10 @@ class Fleet:
         sensor profile is, unless the settings say more."""
         companion, profile = self.scenario.companion, PROFILES[self.scenario.sensors]
         known = (*companion.obstacles, *self.scenario.obstacles)
+        moving = (*companion.moving, *self.scenario.moving_known)
         sigma = max(companion.field.position_sigma, profile.worst_axis)
         field = companion.field.model_copy(update={"position_sigma": sigma})
-        return companion.model_copy(update={"obstacles": known, "field": field})
+        return companion.model_copy(update={"obstacles": known, "moving": moving, "field": field})
 
     def companion_config_of(self, k: int) -> CompanionConfig:
         """Those of vehicle ``k``: a bystander flies to goals, shares no plan and knows of no obstacle."""
@@ -77,6 +79,7 @@ class Fleet:
             "target_d_min": None,
             "target_d_safe": None,
             "obstacles": (),
+            "moving": (),
         }
         speed = self.scenario.bystanders[k - self.scenario.vehicles].speed
         if speed is not None:
@@ -91,6 +94,12 @@ class Fleet:
         if isinstance(config, PathTarget):
             return Walking(config, self.frame)
         return Recorded(config, self._logs / config.log, self.frame)
+
+    def moving(self) -> list[MovingObstacle]:
+        """The nodes of the moving obstacles."""
+        scenario = self.scenario
+        pairs = zip(scenario.moving, scenario.moving_systems, strict=True)
+        return [MovingObstacle(config, system, self.frame) for config, system in pairs]
 
     def operator(self) -> Operator:
         """The operator's node."""
@@ -151,9 +160,9 @@ class Fleet:
             for link, other in ends.items():
                 pair = [End(name, link, words), other]
                 channels.append(_channel(f"{link}-{name}", pair, getattr(links, link)))
-        channels.append(
-            _channel("swarm", [End(name, "swarm", words) for name, words in companions], links.swarm)
-        )
+        swarm = [End(name, "swarm", words) for name, words in companions]
+        swarm += [End(names.moving(s), "swarm", ("moving", s)) for s in self.scenario.moving_systems]
+        channels.append(_channel("swarm", swarm, links.swarm))
         return channels
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
+from companion.moving import MovingObstacles
 from companion.node import Tally
 from companion.obstacles import FixedObstacles
 from companion.pilot import Phase
@@ -57,13 +58,14 @@ class Flight:
         self.fleet = fleet = Fleet(scenario, vehicle, seed, logs)
         self.systems = fleet.systems
         self.target = fleet.target()
+        self.moving = fleet.moving()
         self.autopilots = [fleet.autopilot(k) for k in range(scenario.size)]
         self.companions = [fleet.companion(k, stopwatch) for k in range(scenario.size)]
         self.operator = fleet.operator()
-        self.truth = Truth(scenario.size, limits(scenario), FixedObstacles(scenario.obstacles))
+        self.truth = truth_of(scenario)
         self.ether = Ether(fleet.channels(), seed, scenario.timing.base_tick_us)
         self.conductor = Conductor(scenario, fleet.starts, self.operator, EPOCH)
-        self._witness = Witness(self.autopilots, self.target, self.truth)
+        self._witness = Witness(self.autopilots, self.target, self.truth, self.moving)
         self._progress = progress
         self._reverse = reverse_nodes
         self._directory = run_directory
@@ -111,6 +113,7 @@ class Flight:
             clock = self.fleet.clock(k, EPOCH)
             nodes.append(Scheduled(companion, timing.companion_us, EPOCH + phase, clock))
         nodes.append(Scheduled(self.target, timing.companion_us, EPOCH))
+        nodes += [Scheduled(moving, timing.companion_us, EPOCH) for moving in self.moving]
         nodes.append(Scheduled(self.operator, timing.companion_us, EPOCH))
         return nodes[::-1] if self._reverse else nodes
 
@@ -135,6 +138,8 @@ class Flight:
         """The goal event."""
         self._tally_at_start = [c.tally for c in self.companions]
         self.target.begin(now)
+        for moving in self.moving:
+            moving.begin(now)
         for autopilot in self.autopilots:
             autopilot.begin(now)
 
@@ -181,6 +186,11 @@ class _Computers:
         self._ether.heal("swarm", map(names.companion, systems))
 
 
-def limits(scenario: Scenario) -> Limits:
-    """What counts as too near."""
-    return Limits(scenario.d_min, scenario.d_min_target, scenario.d_min_obstacle)
+def truth_of(scenario: Scenario) -> Truth:
+    """What collects the true motions of its flight, and knows what counts as too near."""
+    return Truth(
+        scenario.size,
+        Limits(scenario.d_min, scenario.d_min_target, scenario.d_min_obstacle),
+        FixedObstacles(scenario.obstacles),
+        MovingObstacles(scenario.moving_known),
+    )

@@ -17,6 +17,11 @@ def autopilot(system: int) -> str:
     return f"sitl-{system}"
 
 
+def moving(system: int) -> str:
+    """The moving obstacle with this system id."""
+    return f"moving-{system}"
+
+
 def log(system: int) -> str:
     """The file of its tlog."""
     return f"vehicle-{system}.tlog"

@@ -1,4 +1,4 @@
-"""Smooth closed paths through given places, flown along at a constant speed."""
+"""Smooth closed paths through given places, and who goes along one at a constant speed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 _FINE = 4096
 """Pieces that the path is measured in."""
+_STILL = 1e-9
+"""m; shorter than that is no path but a place."""
 
 
 class Motion(NamedTuple):
@@ -40,9 +42,19 @@ class ClosedPath:
 
     def at(self, distance: float, speed: float) -> Motion:
         """After ``distance`` m along it (round and round), at ``speed`` m/s."""
-        parameter = np.interp(distance % self.length, self._lengths, self._parameters)
-        along = self._at(np.array([parameter]), 1)[0]
-        return Motion(self._at(np.array([parameter]), 0)[0], speed * along / np.linalg.norm(along))
+        parameter = self._parameter(np.array([distance]))
+        along = self._at(parameter, 1)[0]
+        # Where a path that is bent to a line turns back, for an instant there is no direction.
+        length = max(float(np.linalg.norm(along)), _STILL)
+        return Motion(self._at(parameter, 0)[0], speed * along / length)
+
+    def places(self, distances: Array) -> Array:
+        """Positions (n, 3) m after ``distances`` (n,) m."""
+        return self._at(self._parameter(distances), 0)
+
+    def _parameter(self, distances: Array) -> Array:
+        within = distances % max(self.length, _STILL)
+        return np.asarray(np.interp(within, self._lengths, self._parameters))
 
     @property
     def sharpest(self) -> float:
@@ -56,3 +68,33 @@ class ClosedPath:
         turning = (1j * self._harmonics) ** derivative * np.exp(1j * np.outer(parameters, self._harmonics))
         result: Array = np.real(turning @ self._coefficients)
         return result
+
+
+class Walk:
+    """One who goes along ``path``: stands at its beginning, then sets out with ``setting_out`` m/s² until
+    ``speed`` m/s, and goes round and round. Times are µs."""
+
+    def __init__(self, path: ClosedPath, speed: float, setting_out: float) -> None:
+        self.path = path
+        self._speed, self._setting_out = speed, setting_out
+        self._start: int | None = None
+
+    def begin(self, now: int) -> None:
+        """Set out."""
+        self._start = now
+
+    def motion(self, now: int) -> Motion:
+        """Position and velocity at ``now``."""
+        (distance,), (speed,) = self._gone(np.array([now]))
+        return self.path.at(distance, speed)
+
+    def places(self, times: NDArray[np.int64]) -> Array:
+        """Positions (n, 3) at ``times`` (n,)."""
+        return self.path.places(self._gone(times)[0])
+
+    def _gone(self, times: NDArray[np.int64]) -> tuple[Array, Array]:
+        """How far it has come (n,), m, and how fast it is (n,), m/s."""
+        since = np.zeros(len(times)) if self._start is None else np.maximum(times - self._start, 0) * 1e-6
+        ramp = self._speed / self._setting_out
+        speed = self._setting_out * np.minimum(since, ramp)
+        return 0.5 * speed * np.minimum(since, ramp) + self._speed * np.maximum(since - ramp, 0.0), speed

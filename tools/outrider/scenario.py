@@ -7,11 +7,12 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from companion.config import CompanionConfig, Obstacle
+from companion.config import CompanionConfig, Moving, Obstacle
 from outrider.scenario_faults import Clocks, FaultPart
 from outrider.scenario_links import ROLES, AllLinks, PartitionPart
+from outrider.scenario_moving import MovingPart, clashes
 from outrider.scenario_overlaps import overlaps
-from outrider.scenario_part import FIRST_SYSTEM, TARGET_SYSTEM, Length, Part, Period
+from outrider.scenario_part import FIRST_MOVING, FIRST_SYSTEM, TARGET_SYSTEM, Length, Part, Period
 from outrider.scenario_places import (
     Bystander,
     FixedTarget,
@@ -69,6 +70,9 @@ class Scenario(Part):
     )
     target: Target
     obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed, known to all companions")
+    moving: tuple[MovingPart, ...] = Field(
+        (), max_length=50, description="obstacles that move; their system ids are 190 and so on"
+    )
     sensors: Literal["truth", "rtk", "gnss"] = "truth"
     weather: WeatherConfig = WeatherConfig()
     d_min: Length = Field(0.5, description="m between centres of vehicles; below it is a violation")
@@ -104,6 +108,18 @@ class Scenario(Part):
     def size(self) -> int:
         """How many vehicles there are in all."""
         return self.vehicles + len(self.bystanders)
+
+    @property
+    def moving_systems(self) -> range:
+        """System ids of the moving obstacles."""
+        return range(FIRST_MOVING, FIRST_MOVING + len(self.moving))
+
+    @property
+    def moving_known(self) -> tuple[Moving, ...]:
+        """The moving obstacles as companions know them."""
+        return tuple(
+            one.known_as(system) for one, system in zip(self.moving, self.moving_systems, strict=True)
+        )
 
     @model_validator(mode="after")
     def _consistent(self) -> Scenario:
@@ -152,6 +168,8 @@ class Scenario(Part):
         allowed = f"{self.systems[0]} to {self.systems[-1]}"
         if isinstance(self.target, RecordedTarget) and self.target.system in self.systems:
             yield f"target.system = {self.target.system} is the id of a vehicle of the fleet"
+        target = self.target.system if isinstance(self.target, RecordedTarget) else TARGET_SYSTEM
+        yield from clashes(self.moving_known, self.systems, target, self.companion.moving)
         for index, fault in enumerate(self.faults):
             if fault.vehicle not in self.systems:
                 yield f"faults[{index}].vehicle = {fault.vehicle} is none of the fleet: {allowed} are allowed"
@@ -159,10 +177,11 @@ class Scenario(Part):
             for member in cut.members:
                 if member not in self.systems:
                     yield f"partitions[{index}].members: {member} is none of the fleet: {allowed} are allowed"
+        ends = (None, *ROLES, *self.systems, *self.moving_systems)
         for name in AllLinks.model_fields:
             for index, direction in enumerate(getattr(self.links, name).directions):
                 for end in (direction.sender, direction.receiver):
-                    if end is not None and end not in ROLES and end not in self.systems:
+                    if end not in ends:
                         yield (
                             f"links.{name}.directions[{index}]: {end!r} is neither a vehicle ({allowed}) "
                             f"nor one of {', '.join(ROLES)}"

@@ -13,15 +13,15 @@ from outrider.scenario_part import Duration, Milliseconds, Part, Seconds, Share,
 
 _WORDS = ("delay_ms", "jitter_ms", "loss", "duplication", "reordering", "burst")
 Burst = Annotated[float, Field(ge=0.0, le=10_000.0)]
-ROLES = ("companion", "autopilot", "target", "operator")
-_WITH_ID = ROLES[:2]
+ROLES = ("companion", "autopilot", "target", "operator", "moving")
+_WITH_ID = ("companion", "autopilot", "moving")
 
 
 class Direction(Part):
     """Faults of one direction in place of the link's own; what is null stays the link's.
 
-    ``sender`` and ``receiver`` are a role (companion, autopilot, target, operator), the system id of a
-    companion, or null for all.
+    ``sender`` and ``receiver`` are a role (companion, autopilot, target, operator, moving: an obstacle), the
+    system id of a companion or a moving obstacle, or null for all.
     """
 
     sender: str | System | None = None
@@ -98,7 +98,7 @@ class AllLinks(Part):
 
 
 class PartitionPart(Part):
-    """For a while nothing passes on the swarm link between ``members`` and the other companions."""
+    """For a while nothing passes on the swarm link between ``members`` and all others."""
 
     at_s: Seconds = Field(description="after the goal event")
     for_s: Duration

@@ -22,6 +22,9 @@ FIRST_SYSTEM = 11
 TARGET_SYSTEM = 10
 """System id of a target that is not recorded: below the fleet, so that no vehicle can have it."""
 
+FIRST_MOVING = 190
+"""System id of the first moving obstacle."""
+
 
 class Part(BaseModel):
     """Base of all parts: an unknown key is an error, nothing changes after load."""

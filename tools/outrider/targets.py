@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.frames import FleetFrame, enu_to_ned
-from mavlink_bridge.messages import GlobalPosition, Source
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import GlobalPosition
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog import read_tlog
+from outrider.beacon import Beacon
 from outrider.errors import InputError
-from outrider.paths import ClosedPath, Motion
+from outrider.paths import ClosedPath, Motion, Walk
 from outrider.scenario_part import TARGET_SYSTEM
 from outrider.scenario_places import FixedTarget, PathTarget, RecordedTarget
 
@@ -62,13 +63,9 @@ class Standing:
 
     def __init__(self, config: FixedTarget, fleet: FleetFrame) -> None:
         self._config = config
-        self._fleet = fleet
-        self._period = round(1e6 / config.rate_hz)
         self._place = np.array(config.at)
         self._jumps: deque[tuple[int, Array]] = deque()
-        self._next: int | None = None
-        self._boot = 0
-        self._codec = Codec()
+        self._beacon = Beacon(TARGET_SYSTEM, LINK, config.rate_hz, fleet)
 
     def begin(self, now: int) -> None:
         """Jump, and say so at once; what comes later counts from now."""
@@ -87,18 +84,15 @@ class Standing:
             self._jump(*self._jumps.popleft())
 
     def _jump(self, when: int, place: Array) -> None:
-        self._place, self._next = place, when
+        self._place = place
+        self._beacon.hasten(when)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Its position, at its rate."""
-        if self._next is None:
-            self._boot = self._next = now
         self._move(now)
-        if now < self._next:
+        if not self._beacon.due(now):
             return []
-        self._next += self._period
-        message = told(self._fleet, now - self._boot, Motion(self._place, np.zeros(3)))
-        return [Datagram(LINK, self._codec.encode(message))]
+        return self._beacon.say(now, Motion(self._place, np.zeros(3)))
 
 
 class Walking:
@@ -108,56 +102,26 @@ class Walking:
     system = TARGET_SYSTEM
 
     def __init__(self, config: PathTarget, fleet: FleetFrame) -> None:
-        self._config, self._fleet = config, fleet
-        self.path = ClosedPath(np.array(config.through))
-        self._period = round(1e6 / config.rate_hz)
-        self._start: int | None = None
-        self._next: int | None = None
-        self._boot = 0
-        self._codec = Codec()
+        self._walk = Walk(ClosedPath(np.array(config.through)), config.speed, config.setting_out)
+        self._beacon = Beacon(TARGET_SYSTEM, LINK, config.rate_hz, fleet)
 
     def begin(self, now: int) -> None:
         """Set out."""
-        self._start = now
+        self._walk.begin(now)
 
     def motion(self, now: int) -> Motion:
         """True position and velocity at ``now`` (µs)."""
-        since = 0.0 if self._start is None else max(now - self._start, 0) * 1e-6
-        config = self._config
-        ramp = config.speed / config.setting_out
-        speed = config.setting_out * min(since, ramp)
-        gone = 0.5 * speed * min(since, ramp) + config.speed * max(since - ramp, 0.0)
-        return self.path.at(gone, speed)
+        return self._walk.motion(now)
 
     def position(self, now: int) -> Array | None:
         """Where it is."""
-        return self.motion(now).position
+        return self._walk.motion(now).position
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Its position and velocity, at its rate."""
-        if self._next is None:
-            self._boot = self._next = now
-        if now < self._next:
+        if not self._beacon.due(now):
             return []
-        self._next += self._period
-        message = told(self._fleet, now - self._boot, self.motion(now))
-        return [Datagram(LINK, self._codec.encode(message))]
-
-
-def told(fleet: FleetFrame, since_boot: int, motion: Motion) -> GlobalPosition:
-    """What a target says of itself."""
-    latitude, longitude, altitude = fleet.to_geodetic(motion.position)
-    north, east, down = enu_to_ned(motion.velocity).tolist()
-    return GlobalPosition(
-        Source(TARGET_SYSTEM, 1),
-        since_boot,
-        latitude,
-        longitude,
-        altitude,
-        float(motion.position[2]),
-        (north, east, down),
-        None,
-    )
+        return self._beacon.say(now, self._walk.motion(now))
 
 
 class Recording(NamedTuple):

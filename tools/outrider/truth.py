@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.moving import MovingObstacles
 from companion.obstacles import FixedObstacles
 
 Array = NDArray[np.float64]
@@ -27,7 +28,7 @@ class Samples(NamedTuple):
 
     ``time`` (T,) µs; ``position``, ``velocity``, ``acceleration``, ``reference``, ``estimate_error``
     (estimated less true position) (T, K, 3); ``yaw``, ``tilt`` (T, K); ``target`` (T, 3); ``separation``
-    (T,): least distance between vehicles since the sample before.
+    (T,): least distance between vehicles since the sample before; ``moving`` (T, M, 3): moving obstacles.
     """
 
     time: NDArray[np.int64]
@@ -40,6 +41,7 @@ class Samples(NamedTuple):
     tilt: Array
     target: Array
     separation: Array
+    moving: Array
 
 
 class Limits(NamedTuple):
@@ -78,20 +80,29 @@ class Truth:
     """Collects the flight of ``vehicles``: every physics step and a sample now and then. Distances are worked
     out for many samples at once, when there are enough of them or when they are asked for."""
 
-    def __init__(self, vehicles: int, limits: Limits, obstacles: FixedObstacles | None = None) -> None:
+    def __init__(
+        self,
+        vehicles: int,
+        limits: Limits,
+        obstacles: FixedObstacles | None = None,
+        moving: MovingObstacles | None = None,
+    ) -> None:
         self._count = vehicles
         self._pairs = np.triu_indices(vehicles, 1)
         self._fixed = obstacles if obstacles is not None and len(obstacles) else None
         self._vehicles = Encounters(len(self._pairs[0]), limits.vehicles)
         self._target = Encounters(vehicles, 0.0 if limits.target is None else limits.target)
-        self._obstacles = Encounters(
-            vehicles * (0 if self._fixed is None else len(self._fixed)), limits.obstacles
-        )
+        self._moving = moving if moving is not None and len(moving) else None
+        self._moves = 0 if self._moving is None else len(self._moving)
+        stands = 0 if self._fixed is None else len(self._fixed)
+        self._obstacles = Encounters(vehicles * (stands + self._moves), limits.obstacles)
         self._target_counts = limits.target is not None
-        # What no distance has been worked out of yet: the tracks before each sample, and the target's.
+        # What no distance has been worked out of yet: the tracks before each sample, those of the target and
+        # of moving obstacles.
         self._tracks: list[Array] = []
         self._places: list[Array] = []
-        self._rows: list[tuple[int, Array, Array]] = []
+        self._moved: list[Array] = []
+        self._rows: list[tuple[int, Array, Array, Array]] = []
         self._least: list[float] = []
 
     @property
@@ -108,17 +119,18 @@ class Truth:
 
     @property
     def obstacles(self) -> Encounters:
-        """Of vehicles' centres with the surfaces of fixed obstacles."""
+        """Of vehicles' centres with the surfaces of obstacles, fixed and moving."""
         self._work_out()
         return self._obstacles
 
-    def take(self, now: int, track: Array, rows: Array, target: Array) -> None:
+    def take(self, now: int, track: Array, rows: Array, target: Array, moving: Array) -> None:
         """A sample at ``now`` (µs) with the ``rows`` (K, ROW), and at all physics steps since the one before
-        the positions ``track`` (n, K, 3), ENU, NaN on the ground, and those of the ``target`` (n, 3), NaN
-        where it is not there."""
-        self._rows.append((now, rows, target[-1]))
+        the positions ``track`` (n, K, 3), ENU, NaN on the ground, those of the ``target`` (n, 3), NaN where
+        it is not there, and of ``moving`` obstacles (n, M, 3)."""
+        self._rows.append((now, rows, target[-1], moving[-1]))
         self._tracks.append(track)
         self._places.append(target)
+        self._moved.append(moving)
         if len(self._tracks) * len(track) * (1 + len(self._pairs[0])) > _TOGETHER:
             self._work_out()
 
@@ -135,14 +147,18 @@ class Truth:
         if self._target_counts:
             off = track - np.concatenate(self._places)[:, None]
             self._target.see(np.sqrt(np.einsum("tki,tki->tk", off, off)))
-        if self._fixed is not None:
-            self._obstacles.see(self._fixed.distance(track).reshape(len(track), -1))
+        surfaces = [] if self._fixed is None else [self._fixed.distance(track)]
+        if self._moving is not None:
+            surfaces.append(self._moving.distance(track, np.concatenate(self._moved)))
+        if surfaces:
+            self._obstacles.see(np.concatenate(surfaces, axis=2).reshape(len(track), -1))
         self._tracks.clear()
         self._places.clear()
+        self._moved.clear()
 
     def latest(self) -> tuple[Array, Array, Array | None]:
         """Positions (K, 3), velocities (K, 3) of the last sample, and the target's place."""
-        _, rows, place = self._rows[-1]
+        _, rows, place, _ = self._rows[-1]
         return rows[:, 0:3], rows[:, 3:6], None if np.isnan(place).any() else place
 
     def samples(self, since: int = 0, until: int | None = None) -> Samples:
@@ -164,5 +180,6 @@ class Truth:
             rows[..., 15],
             rows[..., 16],
             np.array([row[2] for row in chosen]).reshape(-1, 3),
-            np.array([row[3] for row in chosen]),
+            np.array([row[4] for row in chosen]),
+            np.array([row[3] for row in chosen]) if chosen else np.empty((0, self._moves, 3)),
         )

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mavlink_bridge.frames import ned_to_enu, yaw_to_enu
+from outrider.moving import MovingObstacle
+from outrider.moving import places as moving_places
 from outrider.targets import Target
 from outrider.truth import NOWHERE, ROW, SAMPLE, Array, Truth
 from sitl.node import Autopilot
@@ -15,9 +17,16 @@ from sitl.node import Autopilot
 class Witness:
     """Watches the autopilots of a lock-step run; ``see`` is called after every tick."""
 
-    def __init__(self, autopilots: list[Autopilot], target: Target, truth: Truth) -> None:
+    def __init__(
+        self,
+        autopilots: list[Autopilot],
+        target: Target,
+        truth: Truth,
+        moving: Sequence[MovingObstacle] = (),
+    ) -> None:
         self._autopilots = autopilots
         self._target = target
+        self._moving = moving
         self._truth = truth
         self._last = -1
         self._next = 0
@@ -41,7 +50,8 @@ class Witness:
             return False
         self._next = now + SAMPLE
         track = ned_to_enu(np.stack([np.concatenate(pending) for pending in self._pending], axis=1))
-        self._truth.take(now, track, rows(self._autopilots), places(self._target, self._times))
+        moving = moving_places(self._moving, self._times)
+        self._truth.take(now, track, rows(self._autopilots), places(self._target, self._times), moving)
         for pending in self._pending:
             pending.clear()
         self._times.clear()

@@ -14,7 +14,6 @@ from types import FrameType
 import numpy as np
 
 from companion.node import Tally
-from companion.obstacles import FixedObstacles
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.histogram import Histogram
 from mavlink_bridge.node_clock import QUANTUM
@@ -25,7 +24,7 @@ from outrider.conductor import PREPARE_CAP, Conductor, Sight, Stage
 from outrider.disturbances import Event, events, strike_computer
 from outrider.errors import OutriderError
 from outrider.fleet import Fleet
-from outrider.flight import Progress, limits
+from outrider.flight import Progress, truth_of
 from outrider.outcome import Messages, Outcome, Punctuality
 from outrider.realtime.board import Board
 from outrider.realtime.crew import Crew
@@ -34,7 +33,7 @@ from outrider.realtime.traces import Trace, put_together
 from outrider.realtime.wiring import wire
 from outrider.realtime.workers import Remains
 from outrider.scenario import Scenario
-from outrider.truth import SAMPLE, Truth
+from outrider.truth import SAMPLE
 from sitl.config import VehicleConfig
 from sitl.vehicle import Vehicle
 
@@ -77,7 +76,7 @@ class RealTimeFlight:
         # Compiled before forking, so that not every process has to.
         Vehicle(self.fleet.vehicle, np.zeros(3)).advance(1, None)
         board = Board(self.scenario.size)
-        wiring = wire(self.scenario.size, self._clock)
+        wiring = wire(self.scenario.size, self._clock, len(self.scenario.moving))
         with TemporaryDirectory() as folder, self._interruptible():
             scratch = Path(folder)
             start = self._clock.now() + (_START_WITH_PRIORITY if self._priority else _START)
@@ -127,9 +126,9 @@ class RealTimeFlight:
         found_traces = [Trace.load(path) for path in traces]
         if not all(len(trace.times) for trace in found_traces):
             raise OutriderError(_nothing(conductor, "an autopilot never began"))
-        truth = Truth(scenario.size, limits(scenario), FixedObstacles(scenario.obstacles))
-        period, target = self.fleet.vehicle.physics_period, self.fleet.target()
-        put_together(found_traces, period, target, conductor.clock_start, truth)
+        truth = truth_of(scenario)
+        period, fleet = self.fleet.vehicle.physics_period, self.fleet
+        put_together(found_traces, period, fleet.target(), fleet.moving(), conductor.clock_start, truth)
         self.priority_told = next((found.priority for found in remains.values() if found.priority), "")
         companions = [remains[names.companion(system)] for system in systems]
         return Outcome(

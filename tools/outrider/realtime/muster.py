@@ -13,11 +13,13 @@ from mavlink_bridge.runtime import Scheduled
 from outrider import names
 from outrider.disturbances import events
 from outrider.fleet import Fleet
+from outrider.moving import MovingObstacle
 from outrider.realtime.board import Board
 from outrider.realtime.rough import Rough
 from outrider.realtime.wiring import Wiring
-from outrider.realtime.workers import AutopilotWorker, CompanionWorker, Seat, TargetWorker, Worker
+from outrider.realtime.workers import AutopilotWorker, CompanionWorker, PlayedWorker, Seat, Worker
 from outrider.scenario_links import PartitionPart
+from outrider.targets import Target
 
 
 def muster(
@@ -56,12 +58,12 @@ def muster(
                 k, companion, system, logs, Seat(behind, every, wiring.companions[k], clock, board), cuts
             )
         )
-    target = fleet.target()
-    behind = rough(fleet, target, {})
-    every = Scheduled(
-        behind, timing.companion_us, start + staggered(2 * count - 1, 2 * count, timing.companion_us)
-    )
-    workers.append(TargetWorker(target, Seat(behind, every, wiring.target, clock, board)))
+    phase = start + staggered(2 * count - 1, 2 * count, timing.companion_us)
+    played: list[Target | MovingObstacle] = [fleet.target(), *fleet.moving()]
+    for node, links in zip(played, [wiring.target, *wiring.moving], strict=True):
+        behind = rough(fleet, node, {})
+        every = Scheduled(behind, timing.companion_us, phase)
+        workers.append(PlayedWorker(node, Seat(behind, every, links, clock, board)))
     return workers
 
 

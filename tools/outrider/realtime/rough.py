@@ -36,10 +36,16 @@ class Rough:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """As the node, with what has come through the ether by ``now``."""
         for datagram in inbox:
-            sender = self._senders.get(datagram.link) or names.companion(sending_system(datagram.data))
+            sender = self._senders.get(datagram.link) or self._speaker(datagram)
             if (sender, datagram.link) in self._known:
                 self.ether.send(now, sender, [datagram])
         return self.node.step(now, self.ether.receive(now, self.node.name))
+
+    def _speaker(self, datagram: Datagram) -> str:
+        """The node that has the system id in the header."""
+        system = sending_system(datagram.data)
+        moving = names.moving(system)
+        return moving if (moving, datagram.link) in self._known else names.companion(system)
 
     def cut(self, members: Iterable[str]) -> None:
         """Nothing passes on the swarm's channels between ``members`` and others."""

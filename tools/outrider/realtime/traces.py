@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -9,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavlink_bridge.frames import ned_to_enu
+from outrider.moving import MovingObstacle
+from outrider.moving import places as moving_places
 from outrider.targets import Target
 from outrider.truth import ROW, SAMPLE, Array, Truth
 from outrider.witness import places, rows
@@ -68,9 +71,16 @@ class TraceWriter:
             np.savez(file, **trace._asdict())
 
 
-def put_together(traces: list[Trace], period: int, target: Target, goal: int | None, truth: Truth) -> None:
+def put_together(
+    traces: list[Trace],
+    period: int,
+    target: Target,
+    moving: Sequence[MovingObstacle],
+    goal: int | None,
+    truth: Truth,
+) -> None:
     """Show ``truth`` the flight of all vehicles on one grid of physics steps (``period`` µs), from when the
-    last began to when the first ended. The ``target``'s clone begins at ``goal`` (µs)."""
+    last began to when the first ended. The clones of ``target`` and ``moving`` begin at ``goal`` (µs)."""
     begin = max(int(trace.times[0]) for trace in traces)
     end = min(int(trace.times[-1]) for trace in traces)
     begin += -begin % SAMPLE
@@ -78,11 +88,14 @@ def put_together(traces: list[Trace], period: int, target: Target, goal: int | N
     for now in range(begin + SAMPLE, end + 1, SAMPLE):
         if goal is not None and not begun and now >= goal:
             target.begin(goal)
+            for one in moving:
+                one.begin(goal)
             begun = True
         steps = np.arange(now - SAMPLE + period, now + 1, period)
         track = np.stack([_at(trace, steps) for trace in traces], axis=1)
         sampled = np.array([_sample(trace, now) for trace in traces])
-        truth.take(now, track, sampled, places(target, steps.tolist()))
+        times = steps.tolist()
+        truth.take(now, track, sampled, places(target, times), moving_places(moving, times))
 
 
 def _at(trace: Trace, steps: NDArray[np.int64]) -> Array:

@@ -16,24 +16,27 @@ _HOST = "127.0.0.1"
 
 
 class Wiring(NamedTuple):
-    """Open links by node: of each autopilot and companion by link name; of target and operator."""
+    """Open links by node: of each autopilot and companion by link name; of target, moving obstacles and
+    operator."""
 
     autopilots: list[dict[str, list[Link]]]
     companions: list[dict[str, list[Link]]]
     target: dict[str, list[Link]]
+    moving: list[dict[str, list[Link]]]
     operator: dict[str, list[Link]]
 
     def close_others(self, own: dict[str, list[Link]]) -> None:
         """Close every link but ``own``: a process keeps its node's alone."""
-        for node in (*self.autopilots, *self.companions, self.target, self.operator):
+        for node in (*self.autopilots, *self.companions, self.target, *self.moving, self.operator):
             if node is not own:
                 for links in node.values():
                     for link in links:
                         link.close()
 
 
-def wire(vehicles: int, clock: Clock) -> Wiring:
-    """Open all links, on ports that are free now. LinkError if one cannot be opened; then none stays open."""
+def wire(vehicles: int, clock: Clock, moving: int = 0) -> Wiring:
+    """Open all links, those of so many ``moving`` obstacles too, on ports that are free now. LinkError if one
+    cannot be opened; then none stays open."""
     with ExitStack() as opened:
 
         def opening(endpoint: str) -> Link:
@@ -59,7 +62,10 @@ def wire(vehicles: int, clock: Clock) -> Wiring:
                 }
             )
             operator.append(opening(f"udpout:{_HOST}:{_port(ground)}"))
-        wiring = Wiring(autopilots, companions, {"target": [opening(target)]}, {"ground": operator})
+        obstacles = [{"swarm": [opening(swarm)]} for _ in range(moving)]
+        wiring = Wiring(
+            autopilots, companions, {"target": [opening(target)]}, obstacles, {"ground": operator}
+        )
         opened.pop_all()
     return wiring
 

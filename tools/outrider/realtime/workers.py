@@ -26,6 +26,7 @@ from mavlink_bridge.realtime import RealTime
 from mavlink_bridge.runtime import Scheduled, Tap
 from outrider import names
 from outrider.disturbances import Event, strike_autopilot, strike_computer
+from outrider.moving import MovingObstacle
 from outrider.realtime.board import Board
 from outrider.realtime.rough import Rough
 from outrider.realtime.traces import TraceWriter
@@ -226,10 +227,10 @@ class CompanionWorker(Worker):
         return [Recorder(self._logs, [self._system], files)]
 
 
-class TargetWorker(Worker):
-    """The target."""
+class PlayedWorker(Worker):
+    """What the harness plays: the target, or a moving obstacle."""
 
-    def __init__(self, node: Target, seat: Seat) -> None:
+    def __init__(self, node: Target | MovingObstacle, seat: Seat) -> None:
         super().__init__(seat)
         self._node = node
 

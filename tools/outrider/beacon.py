@@ -1,0 +1,53 @@
+"""What says where it is: GLOBAL_POSITION_INT of one sender, at its rate, on one link."""
+
+from __future__ import annotations
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import FleetFrame, enu_to_ned
+from mavlink_bridge.messages import GlobalPosition, Source, Tunnel
+from mavlink_bridge.node import Datagram
+from outrider.paths import Motion
+
+
+class Beacon:
+    """Speaks as ``system`` on ``link``, ``rate_hz`` times a second. Times are µs."""
+
+    def __init__(self, system: int, link: str, rate_hz: float, fleet: FleetFrame) -> None:
+        self.source = Source(system, 1)
+        self._link, self._fleet = link, fleet
+        self._period = round(1e6 / rate_hz)
+        self._boot: int | None = None
+        self._next: int | None = None
+        self._codec = Codec()
+
+    def hasten(self, now: int) -> None:
+        """Speak at ``now`` already, and count the period from then."""
+        self._next = now
+
+    def due(self, now: int) -> bool:
+        """Whether to speak at ``now``; asked once, it is settled."""
+        if self._boot is None:
+            self._boot = now
+        if self._next is None:
+            self._next = now
+        if now < self._next:
+            return False
+        self._next += self._period
+        return True
+
+    def say(self, now: int, motion: Motion, plan: Tunnel | None = None) -> list[Datagram]:
+        """Position and velocity at ``now``, and a plan if there is one."""
+        latitude, longitude, altitude = self._fleet.to_geodetic(motion.position)
+        north, east, down = enu_to_ned(motion.velocity).tolist()
+        position = GlobalPosition(
+            self.source,
+            now - (now if self._boot is None else self._boot),
+            latitude,
+            longitude,
+            altitude,
+            float(motion.position[2]),
+            (north, east, down),
+            None,
+        )
+        data = self._codec.encode(position)
+        return [Datagram(self._link, data if plan is None else data + self._codec.encode(plan))]
