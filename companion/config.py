@@ -289,6 +289,6 @@ class CompanionConfig(Settings):
             if self.target_d_safe <= self.target_d_min:
                 raise ValueError("target_d_safe must be larger than target_d_min")
             nearest = min(nearest, self.target_d_safe)
-        if self.tangential.d_full >= nearest + self.tangential.d_band:
-            raise ValueError("tangential.d_full must lie inside the band, below d_safe + d_band")
+        if self.tangential.d_full >= nearest:
+            raise ValueError(f"tangential.d_full must be less than d_safe, here {nearest:g} m")
         return self

@@ -1,14 +1,16 @@
-"""Approach angle (Sec. III-C.2): a force across the way to the destination keeps vehicles from approaching
-the target at the same angle.
+"""Approach angle (Sec. III-C.2): a force around the target keeps vehicles from approaching it at the same
+angle.
 
-F_ang(n) = ‖∇J‖ F_hyp((θ_k(n) − θ_j(n))²) β̂,  β̂ ⊥ β = (x_R(n) − x̌)/‖x_R(n) − x̌‖,  horizontal.
+F_ang(n) = ‖∇J‖ F_hyp((θ_k(n) − θ_j(n))²) β̂,  β̂ ⊥ β = (x_R(n) − x_P)/‖x_R(n) − x_P‖,  horizontal.
 
 Settled against the text. The gradient is its norm divided by Ω_t. θ is the bearing from the target; a
 difference of two is wrapped before it is squared, and F_hyp has thresholds of its own in rad². β̂ points to
-where the difference grows; its sense is latched for as long as the encounter lasts, otherwise it chatters
-between two at one angle. Only others that may be met count: not those that are further off than ``reach``,
-nor those behind (further from the destination) by more than d_safe. The sum is clamped to ``force_max``,
-above u_max, or the input would cancel it; who is fast across already is not pushed further.
+where the difference grows, so β is taken from the target: taken from the destination, as printed, it turns
+round where the vehicle passes the circle, and inside it points to where the difference shrinks. The sense
+is latched for as long as the encounter lasts, otherwise it chatters between two at one angle. Only others
+that may be met count: not those that are further off than ``reach``, nor those behind (further from the
+destination) by more than d_safe. The sum is clamped to ``force_max``, above u_max, or the input would
+cancel it; who is fast across already is not pushed further.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from companion.methods import Influence, Scene
 
 _NEAR = 1e-6
 _FADING = 1.0
-"""m beyond ``reach`` over which the force fades out."""
+"""m over which the force fades out beyond ``reach``, behind, and towards the target, which has no bearing."""
 
 
 class ApproachAngle:
@@ -47,10 +49,11 @@ class ApproachAngle:
         square = aside * aside
         strength = magnitude(square, _of(config.d_min), _of(config.d_safe), config.gain, config.force_max)
         strength *= sqrt(scene.gradient @ scene.gradient) * self._met(scene)
-        senses = self._senses(obstacles, aside[:, 0], square[:, 0] < config.d_safe)
-        along = scene.prediction[:, :2] - influence.destination[:2]
-        beta = along / np.maximum(np.hypot(along[:, 0], along[:, 1]), _NEAR)[:, None]
-        total = senses @ strength
+        senses = self._senses(obstacles, aside, strength > 0.0)
+        out = scene.prediction[:, :2] - scene.target[:2]
+        reach = np.hypot(out[:, 0], out[:, 1])
+        beta = out / np.maximum(reach, _NEAR)[:, None]
+        total = (senses @ strength) * np.minimum(reach / _FADING, 1.0)
         # Who is under way across already is not made faster still, or it never comes round.
         across = scene.velocity[1] * beta[:, 0] - scene.velocity[0] * beta[:, 1]
         share = 2.0 * (1.0 - np.sign(total) * across / config.pass_speed)
@@ -71,22 +74,26 @@ class ApproachAngle:
         left = sqrt(scene.to_go @ scene.to_go)
         goal = scene.position + scene.to_go
         off = obstacles.positions[:, 0] - goal
-        ahead: Array = (np.sqrt(np.vecdot(off, off)) < left + obstacles.d_safe).astype(np.float64)
+        ahead: Array = np.clip(
+            1.0 + (left + obstacles.d_safe - np.sqrt(np.vecdot(off, off))) / _FADING, 0.0, 1.0
+        )
         here = obstacles.positions[:, 0] - scene.position
         room = self._config.reach - np.sqrt(np.vecdot(here, here))
         ahead *= np.clip(1.0 + room / _FADING, 0.0, 1.0)
         return ahead[:, None]
 
-    def _senses(self, obstacles: Obstacles, aside: Array, met: NDArray[np.bool_]) -> Array:
-        """Per obstacle +1: to a larger bearing from the target, −1: to a smaller one."""
+    def _senses(self, obstacles: Obstacles, aside: Array, acts: NDArray[np.bool_]) -> Array:
+        """Per obstacle +1: to a larger bearing from the target, −1: to a smaller one. ``acts`` (M, N + 1):
+        where there is a force to be turned one way or the other."""
         if self._turning != "own":
-            # β points back along the way, so that β̂ = ẑ × β is to the right of it.
+            # Who comes to the target has ẑ × β on its right.
             return np.full(len(obstacles.ids), 1.0 if self._turning == "right" else -1.0)
         latched = self._sense
+        met: NDArray[np.bool_] = np.asarray(acts.any(axis=1))
         for name in set(latched).difference(n for n, m in zip(obstacles.ids, met, strict=True) if m):
             del latched[name]
         for j in np.flatnonzero(met):
-            latched.setdefault(obstacles.ids[j], 1.0 if aside[j] >= 0.0 else -1.0)
+            latched.setdefault(obstacles.ids[j], 1.0 if aside[j, acts[j].argmax()] >= 0.0 else -1.0)
         # No force acts where nothing is latched: any sense will do.
         return np.array([latched.get(name, 1.0) for name in obstacles.ids])
 

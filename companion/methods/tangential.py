@@ -27,6 +27,8 @@ from companion.methods import Influence, Scene
 
 _ABEAM = 0.5
 """Cosine of the bearing off the bow at which the force is whole; it vanishes abeam."""
+_STEEP = 2.0
+"""One over the cosine of the elevation up to which the force is whole; it vanishes overhead."""
 _QUICK = 10.0
 """How much faster the force grows up to u_max than beyond."""
 _NEAR = 1e-6
@@ -58,7 +60,9 @@ class Tangential:
         away = scene.position - obstacles.positions[:, 0]
         square = away * away
         flat = np.sqrt(square[:, 0] + square[:, 1]) + _NEAR
-        weight = self._weights(scene, away, np.sqrt(square.sum(axis=1)) + _NEAR)
+        distance = np.sqrt(square.sum(axis=1)) + _NEAR
+        # What is right above or below can be passed on no side.
+        weight = self._weights(scene, away, distance) * _share(_STEEP * flat / distance)
         self._release(obstacles, weight)
         # α̂ = ± ẑ × α, horizontal: passing never costs height.
         share = weight * self._senses(obstacles, weight, away, scene.to_go) / flat
@@ -144,8 +148,10 @@ class Tangential:
             for j, name in zip(group, names, strict=True)
             if name in self._sense
         ]
-        if known:
-            sense = max(known)[1]
+        heaviest = max(known, default=(0.0, 0.0))[0]
+        senses = {sense for w, sense in known if w == heaviest}
+        if len(senses) == 1:
+            sense = senses.pop()
         else:
             # What is to the left of the course is left on the left.
             x, y = (weight[group, None] * away[group, :2]).sum(axis=0)

@@ -1,4 +1,4 @@
-"""The field of approach angles: across the way, apart, and only between those that may meet."""
+"""The field of approach angles: around the target, apart, and only between those that may meet."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ def force(seen, method=None):
 @given(
     place=vectors(12.0), others=st.lists(vectors(12.0), max_size=4), v=vectors(4.0), gradient=vectors(20.0)
 )
-def test_it_acts_level_across_the_way_and_is_bounded(place, others, v, gradient):
+def test_it_acts_level_around_the_target_and_is_bounded(place, others, v, gradient):
     seen = scene(place, obstacles(others), gradient, v)
     f = force(seen)
-    along = (seen.prediction - seen.destination)[:, :2]
+    along = (seen.prediction - seen.target)[:, :2]
     assert (f[:, 2] == 0.0).all()
     assert np.abs(np.sum(f[:, :2] * along, axis=1)).max() <= 1e-6 * (1.0 + np.abs(along).max())
     assert np.linalg.norm(f, axis=1).max() <= CONFIG.force_max + 1e-9
