@@ -45,12 +45,12 @@ class ApproachAngle:
         if not obstacles.ids:
             self._sense.clear()
             return influence
-        aside = self._aside(scene)
+        out = scene.prediction[:, :2] - scene.target[:2]
+        aside = _aside(out, scene)
         square = aside * aside
         strength = magnitude(square, _of(config.d_min), _of(config.d_safe), config.gain, config.force_max)
         strength *= sqrt(scene.gradient @ scene.gradient) * self._met(scene)
         senses = self._senses(obstacles, aside, strength > 0.0)
-        out = scene.prediction[:, :2] - scene.target[:2]
         reach = np.hypot(out[:, 0], out[:, 1])
         beta = out / np.maximum(reach, _NEAR)[:, None]
         total = (senses @ strength) * np.minimum(reach / _FADING, 1.0)
@@ -62,14 +62,8 @@ class ApproachAngle:
         force[:, 0], force[:, 1] = -total * beta[:, 1], total * beta[:, 0]
         return influence._replace(force=influence.force + limit(force, config.force_max))
 
-    def _aside(self, scene: Scene) -> Array:
-        """θ_k(n) − θ_j(n), (M, N + 1)."""
-        own = scene.prediction[:, :2] - scene.target[:2]
-        other = scene.obstacles.positions[:, :, :2] - scene.target[:2]
-        return wrapped(np.arctan2(own[:, 1], own[:, 0]) - np.arctan2(other[..., 1], other[..., 0]))
-
     def _met(self, scene: Scene) -> Array:
-        """1 for those that may still be met, 0 for those left behind, (M, 1)."""
+        """1 for those that may still be met, 0 for those left behind, fading between, (M, 1)."""
         obstacles = scene.obstacles
         left = sqrt(scene.to_go @ scene.to_go)
         goal = scene.position + scene.to_go
@@ -96,6 +90,12 @@ class ApproachAngle:
             latched.setdefault(obstacles.ids[j], 1.0 if aside[j, acts[j].argmax()] >= 0.0 else -1.0)
         # No force acts where nothing is latched: any sense will do.
         return np.array([latched.get(name, 1.0) for name in obstacles.ids])
+
+
+def _aside(out: Array, scene: Scene) -> Array:
+    """θ_k(n) − θ_j(n), (M, N + 1), with the own way ``out`` (N + 1, 2) from the target."""
+    other = scene.obstacles.positions[:, :, :2] - scene.target[:2]
+    return wrapped(np.arctan2(out[:, 1], out[:, 0]) - np.arctan2(other[..., 1], other[..., 0]))
 
 
 def _of(value: float) -> Array:
