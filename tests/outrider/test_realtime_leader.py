@@ -21,7 +21,7 @@ from outrider.fleet import Fleet
 from outrider.realtime import wiring as wirings
 from outrider.realtime.board import Board
 from outrider.realtime.flight import _Leader
-from outrider.realtime.muster import rough
+from outrider.realtime.muster import rough, turns
 from outrider.truth import SAMPLE
 
 OF = scenario("antipodal-8", vehicles=2, airborne=True)
@@ -172,3 +172,20 @@ def test_the_bar_has_no_thread_that_a_fork_could_tear(monkeypatch: pytest.Monkey
     with console.progress(10.0) as watch:
         watch(Stage.CLOCK, 1.0)
         assert threading.active_count() == before
+
+
+@given(seed=st.integers(0, 1000), vehicles=st.integers(1, 8), start=st.integers(1, 10**15))
+def test_no_two_are_due_at_one_instant_whatever_their_clocks_show(
+    seed: int, vehicles: int, start: int
+) -> None:
+    of = scenario("antipodal-8", vehicles=vehicles, clocks={"offset_ms": 500.0})
+    fleet, period, start = Fleet(of, FIREFLY, seed, LOGS), of.timing.companion_us, start // 4 * 4
+    due = []
+    for k in range(vehicles):
+        autopilot, companion, clock = turns(fleet, k, start)
+        assert start <= min(autopilot, companion)
+        assert max(autopilot, companion) < start + 2 * period
+        due += [autopilot % period, clock.instant(companion) % period]
+    due.sort()
+    gaps = np.diff([*due, due[0] + period])
+    assert (gaps >= period // (2 * vehicles + 1) - 20).all()

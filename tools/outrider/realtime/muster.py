@@ -8,7 +8,7 @@ from pathlib import Path
 from mavlink_bridge.channel import Channel
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.node import Node
-from mavlink_bridge.node_clock import QUANTUM
+from mavlink_bridge.node_clock import QUANTUM, NodeClock
 from mavlink_bridge.runtime import Scheduled
 from outrider import names
 from outrider.disturbances import events
@@ -34,12 +34,12 @@ def muster(
     timing, happening = fleet.scenario.timing, events(fleet.scenario)
     cuts = [event for event in happening if isinstance(event.what, PartitionPart)]
     workers: list[Worker] = []
-    count = len(fleet.systems)
     for k, system in enumerate(fleet.systems):
         autopilot, companion = fleet.autopilot(k), fleet.companion(k, time.thread_time_ns)
         own = [event for event in happening if getattr(event.what, "vehicle", None) == system]
         behind = rough(fleet, autopilot, {"autopilot": companion.name})
-        every = Scheduled(behind, timing.autopilot_us, start + staggered(k, count, timing.autopilot_us))
+        first, phase, its_clock = turns(fleet, k, start)
+        every = Scheduled(behind, timing.autopilot_us, first)
         trace = scratch / f"trace-{system}"
         workers.append(
             AutopilotWorker(k, autopilot, trace, Seat(behind, every, wiring.autopilots[k], clock, board), own)
@@ -51,20 +51,34 @@ def muster(
             "ground": names.OPERATOR,
         }
         behind = rough(fleet, companion, senders)
-        phase = start + staggered(k, count, timing.companion_us)
-        every = Scheduled(behind, timing.companion_us, phase, fleet.clock(k, start))
+        every = Scheduled(behind, timing.companion_us, phase, its_clock)
         workers.append(
             CompanionWorker(
                 k, companion, system, logs, Seat(behind, every, wiring.companions[k], clock, board), cuts
             )
         )
-    phase = start + staggered(2 * count - 1, 2 * count, timing.companion_us)
+    phase = start + staggered(_slots(fleet) - 1, _slots(fleet), timing.companion_us)
     played: list[Target | MovingObstacle] = [fleet.target(), *fleet.moving()]
     for node, links in zip(played, [wiring.target, *wiring.moving], strict=True):
         behind = rough(fleet, node, {})
         every = Scheduled(behind, timing.companion_us, phase)
         workers.append(PlayedWorker(node, Seat(behind, every, links, clock, board)))
     return workers
+
+
+def turns(fleet: Fleet, k: int, start: int) -> tuple[int, int, NodeClock]:
+    """Phases (µs) from ``start`` on of the autopilot ``k`` and of its companion, by the companion's own
+    clock; and that clock. In true time all are evenly spread, whatever the clocks show at the start: later
+    they drift."""
+    timing, slots, clock = fleet.scenario.timing, _slots(fleet), fleet.clock(k, start)
+    turn = start + staggered(2 * k, slots, timing.companion_us)
+    companion = turn + (clock.local(turn) - turn) % timing.companion_us
+    return start + staggered(2 * k + 1, slots, timing.autopilot_us), companion, clock
+
+
+def _slots(fleet: Fleet) -> int:
+    """One for each autopilot and companion, and one for what the harness plays."""
+    return 2 * len(fleet.systems) + 1
 
 
 def staggered(k: int, count: int, period: int) -> int:
