@@ -25,6 +25,7 @@ from companion.config import ApproachAngleConfig, TurningSense
 from companion.forces import Obstacles, limit, magnitude
 from companion.horizon import Array
 from companion.methods import Influence, Scene
+from companion.methods.fading import reserve, shares
 
 _NEAR = 1e-6
 _FADING = 1.0
@@ -56,8 +57,7 @@ class ApproachAngle:
         total = (senses @ strength) * np.minimum(reach / _FADING, 1.0)
         # Who is under way across already is not made faster still, or it never comes round.
         across = scene.velocity[1] * beta[:, 0] - scene.velocity[0] * beta[:, 1]
-        share = 2.0 * (1.0 - np.sign(total) * across / config.pass_speed)
-        total *= np.minimum(np.maximum(share, 0.0), 1.0)
+        total *= shares(reserve(np.sign(total) * across, config.pass_speed))
         force = np.zeros_like(influence.force)
         force[:, 0], force[:, 1] = -total * beta[:, 1], total * beta[:, 0]
         return influence._replace(force=influence.force + limit(force, config.force_max))
@@ -68,12 +68,10 @@ class ApproachAngle:
         left = sqrt(scene.to_go @ scene.to_go)
         goal = scene.position + scene.to_go
         off = obstacles.positions[:, 0] - goal
-        ahead: Array = np.clip(
-            1.0 + (left + obstacles.d_safe - np.sqrt(np.vecdot(off, off))) / _FADING, 0.0, 1.0
-        )
+        ahead = shares(1.0 + (left + obstacles.d_safe - np.sqrt(np.vecdot(off, off))) / _FADING)
         here = obstacles.positions[:, 0] - scene.position
         room = self._config.reach - np.sqrt(np.vecdot(here, here))
-        ahead *= np.clip(1.0 + room / _FADING, 0.0, 1.0)
+        ahead *= shares(1.0 + room / _FADING)
         return ahead[:, None]
 
     def _senses(self, obstacles: Obstacles, aside: Array, acts: NDArray[np.bool_]) -> Array:

@@ -24,6 +24,7 @@ from companion.config import TangentialConfig, TurningSense
 from companion.forces import Obstacles
 from companion.horizon import Array
 from companion.methods import Influence, Scene
+from companion.methods.fading import reserve, share, shares
 
 _ABEAM = 0.5
 """Cosine of the bearing off the bow at which the force is whole; it vanishes abeam."""
@@ -62,11 +63,11 @@ class Tangential:
         flat = np.sqrt(square[:, 0] + square[:, 1]) + _NEAR
         distance = np.sqrt(square.sum(axis=1)) + _NEAR
         # What is right above or below can be passed on no side.
-        weight = self._weights(scene, away, distance) * _share(_STEEP * flat / distance)
+        weight = self._weights(scene, away, distance) * shares(_STEEP * flat / distance)
         self._release(obstacles, weight)
         # α̂ = ± ẑ × α, horizontal: passing never costs height.
-        share = weight * self._senses(obstacles, weight, away, scene.to_go) / flat
-        total = np.array([-(share @ away[:, 1]), share @ away[:, 0], 0.0])
+        signed = weight * self._senses(obstacles, weight, away, scene.to_go) / flat
+        total = np.array([-(signed @ away[:, 1]), signed @ away[:, 0], 0.0])
         norm = sqrt(total @ total)
         if norm < _NEAR:
             return influence
@@ -81,7 +82,7 @@ class Tangential:
         # of u_max stops within what there is to go.
         sideways = float((scene.velocity - scene.destination_velocity) @ direction)
         most = min(config.pass_speed, sqrt(u_max * sqrt(scene.to_go @ scene.to_go)) + _NEAR)
-        strength *= min(max(2.0 * (1.0 - sideways / most), 0.0), 1.0)
+        strength *= share(reserve(sideways, most))
         return influence._replace(
             force=influence.force + direction * strength, omega_scale=config.omega_scale
         )
@@ -92,13 +93,13 @@ class Tangential:
         moving = (obstacles.positions[:, 1] - obstacles.positions[:, 0]) / self._dt
         closing = np.maximum(np.vecdot(away, moving - scene.velocity) / distance, 0.0)
         edge = obstacles.d_safe + config.d_band + config.reach_s * closing
-        depth = _share((edge - distance) / (edge - config.d_full - obstacles.radius))
+        depth = shares((edge - distance) / (edge - config.d_full - obstacles.radius))
         to_go = scene.to_go
         length = sqrt(to_go @ to_go) + _NEAR
         along = -(away @ to_go) / length
-        ahead = _share(along / (_ABEAM * distance))
-        before = _share(1.0 + (length - along) / obstacles.d_safe)
-        before *= min(max((length - _THERE) / (_ON_THE_WAY - _THERE), 0.0), 1.0)
+        ahead = shares(along / (_ABEAM * distance))
+        before = shares(1.0 + (length - along) / obstacles.d_safe)
+        before *= share((length - _THERE) / (_ON_THE_WAY - _THERE))
         weights: Array = depth * ahead * before * self._meeting(obstacles, away, moving - scene.velocity)
         return weights
 
@@ -110,7 +111,7 @@ class Tangential:
         time = np.minimum(np.maximum(np.vecdot(away, velocity) / square, 0.0), _SOON)
         miss = away - time[:, None] * velocity
         distance = np.sqrt(np.vecdot(miss, miss))
-        return _share((obstacles.d_safe - distance) / (obstacles.d_safe - config.d_full - obstacles.radius))
+        return shares((obstacles.d_safe - distance) / (obstacles.d_safe - config.d_full - obstacles.radius))
 
     def _release(self, obstacles: Obstacles, weight: Array) -> None:
         if not self._sense:
@@ -158,12 +159,6 @@ class Tangential:
             sense = 1.0 if to_go[1] * x - to_go[0] * y >= 0.0 else -1.0
         for name in names:
             self._sense.setdefault(name, sense)
-
-
-def _share(x: Array) -> Array:
-    """Clipped to 0…1; ``np.clip`` costs four times as much for arrays this small."""
-    result: Array = np.minimum(np.maximum(x, 0.0), 1.0)
-    return result
 
 
 def groups(places: Array, radius: Array, gap: float) -> list[list[int]]:

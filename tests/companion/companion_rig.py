@@ -1,4 +1,6 @@
-"""What the tests of the companion share: strategies, obstacles, and point masses that fly their own plans."""
+"""What the tests of the companion share: strategies, obstacles, scenes, and point masses that fly their own
+plans.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +14,21 @@ from hypothesis import strategies as st
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
 from companion.horizon import Array, Horizon
+from companion.methods import Scene
 from companion.planner import Plan, Planner, standing
+from companion.surfaces import Circle, Surface
 
 LAWS = settings(deadline=None, max_examples=60)
 QUICK = settings(deadline=None, max_examples=25)
 """Without a deadline: a machine under load must not fail a law."""
 
 ZERO = np.zeros(3)
+STRONG = np.array([10.0, 0.0, 0.0])
+TARGET = np.array([8.0, 0.0, 0.0])
+CIRCLE = Circle()
+
+_STEPS, _DT = 16, 0.1
+"""Predicted positions, and s from one to the next."""
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
@@ -46,7 +56,7 @@ def _rotation(q: Array) -> Array:
     )
 
 
-def obstacles(positions: Any, velocities: Any = None, *, steps: int = 16, dt: float = 0.1) -> Obstacles:
+def obstacles(positions: Any, velocities: Any = None, *, steps: int = _STEPS, dt: float = _DT) -> Obstacles:
     """Obstacles at ``positions`` (M, 3) now, at constant velocity, with the paper's distances."""
     here = np.asarray(positions, dtype=float).reshape(-1, 3)
     speed = np.zeros_like(here) if velocities is None else np.asarray(velocities, dtype=float).reshape(-1, 3)
@@ -57,6 +67,35 @@ def obstacles(positions: Any, velocities: Any = None, *, steps: int = 16, dt: fl
         here[:, None] + ahead * speed[:, None],
         np.full(count, 0.5),
         np.full(count, 3.0),
+    )
+
+
+def scene(
+    position: Array,
+    others: Obstacles,
+    gradient: Array = STRONG,
+    velocity: Array = ZERO,
+    *,
+    surface: Surface | None = CIRCLE,
+    target: Array = TARGET,
+    target_velocity: Array = ZERO,
+) -> Scene:
+    """On the way to the surface around a target; without a surface to a goal of its own, on the circle."""
+    prediction = position + _DT * np.arange(_STEPS)[:, None] * velocity
+    carried = _DT * _STEPS * target_velocity
+    place = target + (CIRCLE if surface is None else surface).nearest(position - target)
+    return Scene(
+        position,
+        velocity,
+        prediction,
+        place + carried,
+        target_velocity,
+        place - position,
+        target,
+        others,
+        gradient,
+        target + carried,
+        surface,
     )
 
 

@@ -4,34 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from companion_rig import LAWS, ZERO, numbers, obstacles, vectors
+from companion_rig import LAWS, TARGET, ZERO, numbers, obstacles, scene, vectors
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from companion.config import ApproachAngleConfig
-from companion.methods import Influence, Scene
+from companion.methods import Influence
 from companion.methods.approach_angle import ApproachAngle
-from companion.surfaces import Circle
 
 CONFIG = ApproachAngleConfig()
 MIRROR = np.diag([1.0, -1.0, 1.0])
-TARGET = np.array([8.0, 0.0, 0.0])
-STRONG = np.array([10.0, 0.0, 0.0])
 
 
 def beside(east, north, up):
     """A place (3,) given from the target."""
     return TARGET + np.array([east, north, up])
-
-
-def scene(position, others, gradient=STRONG, velocity=ZERO):
-    surface = Circle()
-    destination = TARGET + surface.nearest(position - TARGET)
-    prediction = position + 0.1 * np.arange(16)[:, None] * velocity
-    to_go = destination - position
-    return Scene(
-        position, velocity, prediction, destination, ZERO, to_go, TARGET, others, gradient, TARGET, surface
-    )
 
 
 def force(seen, method=None):

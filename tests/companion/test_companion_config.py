@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from pydantic import ValidationError
 
@@ -36,6 +38,18 @@ def test_a_contradiction_is_refused_and_named(name):
     settings, word = WRONG[name]
     with pytest.raises(ValidationError, match=word):
         CompanionConfig.model_validate(settings)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 0.5])
+def test_a_band_that_is_full_only_outside_the_field_is_refused_by_name(beyond):
+    """The message itself says it; the settings that pydantic quotes beside it do not count."""
+    settings = {"field": {"d_safe": 1.5}, "tangential": {"d_full": 1.5 + beyond}}
+    with pytest.raises(ValidationError) as refused:
+        CompanionConfig.model_validate(settings)
+    (fault,) = refused.value.errors()
+    assert re.search(r"tangential\.d_full .* d_safe, here 1\.5 m", fault["msg"])
+    settings["tangential"]["d_full"] = 1.49
+    assert CompanionConfig.model_validate(settings).tangential.d_full == 1.49
 
 
 def test_settings_are_frozen():

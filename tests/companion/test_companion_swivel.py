@@ -4,31 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from companion_rig import LAWS, ZERO, numbers, obstacles, vectors
+from companion_rig import CIRCLE, LAWS, TARGET, numbers, obstacles, scene, vectors
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from companion.config import SwivelConfig
-from companion.methods import Influence, Scene
+from companion.methods import Influence
 from companion.methods.swivel import Swivel
-from companion.surfaces import Circle, Ellipsoid
+from companion.surfaces import Ellipsoid
 
 CONFIG = SwivelConfig()
-CIRCLE = Circle()
 MIRROR = np.diag([1.0, -1.0, 1.0])
-TARGET = np.array([8.0, 0.0, 0.0])
 SURFACES = st.sampled_from([CIRCLE, Ellipsoid(kind="ellipsoid"), None])
-
-
-def scene(position, others, gradient, surface=CIRCLE, target=TARGET, velocity=ZERO):
-    """On the way to the surface around a target that moves."""
-    end = target + 1.6 * velocity
-    destination = (CIRCLE if surface is None else surface).nearest(position - target) + end
-    to_go = destination - 1.6 * velocity - position
-    prediction = np.tile(position, (16, 1))
-    return Scene(
-        position, ZERO, prediction, destination, velocity, to_go, target, others, gradient, end, surface
-    )
 
 
 def turned(seen, method=None):
@@ -52,7 +39,7 @@ def angle(after, before, centre):
 @given(place=vectors(12.0), other=vectors(12.0), gradient=vectors(20.0), velocity=vectors(2.0))
 def test_it_turns_by_k_s_times_the_gradient_and_at_most_a_quarter(place, other, gradient, velocity):
     assume(np.hypot(*(place - TARGET)[:2]) > 0.5 and np.hypot(*(other - TARGET)[:2]) > 0.5)
-    seen = scene(place, obstacles([other]), gradient, velocity=velocity)
+    seen = scene(place, obstacles([other]), gradient, target_velocity=velocity)
     by = angle(turned(seen), seen.destination, seen.target_end)
     size = np.linalg.norm(gradient)
     expected = min(CONFIG.k_s * size, np.pi / 2) if size >= CONFIG.arrived else 0.0
@@ -62,7 +49,7 @@ def test_it_turns_by_k_s_times_the_gradient_and_at_most_a_quarter(place, other, 
 @LAWS
 @given(place=vectors(12.0), other=vectors(12.0), gradient=vectors(20.0), surface=SURFACES)
 def test_the_destination_stays_on_its_surface(place, other, gradient, surface):
-    seen = scene(place, obstacles([other]), gradient, surface)
+    seen = scene(place, obstacles([other]), gradient, surface=surface)
     there = turned(seen) - TARGET
     if surface is None:
         assert np.linalg.norm(there) == pytest.approx(np.linalg.norm(seen.destination - TARGET), abs=1e-9)
@@ -75,7 +62,7 @@ def test_the_destination_stays_on_its_surface(place, other, gradient, surface):
 def test_nothing_is_left_of_it_on_the_surface(place, other, surface, size):
     """Where the gradient vanishes the swivel vanishes."""
     gradient = np.array([size * CONFIG.arrived * 0.999, 0.0, 0.0])
-    seen = scene(place, obstacles([other]), gradient, surface)
+    seen = scene(place, obstacles([other]), gradient, surface=surface)
     assert turned(seen) is seen.destination
 
 

@@ -4,41 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from companion_band import NOTHING, force, method, scene
 from companion_rig import LAWS, ZERO, numbers, obstacles, vectors
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from companion.config import TangentialConfig
-from companion.methods import Influence, Scene
-from companion.methods.tangential import Tangential
+from companion.methods import Influence
 
-U_MAX, DT, D_SAFE = 2.0, 0.1, 3.0
+D_SAFE = 3.0
 CONFIG = TangentialConfig()
 EDGE = D_SAFE + CONFIG.d_band
-STRONG = np.array([10.0, 0.0, 0.0])
 SENSES = st.sampled_from(["own", "right", "left"])
-NOTHING = Influence(np.zeros((16, 3)), 1.0, ZERO)
 MIRROR = np.diag([1.0, -1.0, 1.0])
-
-
-def method(sense="own", **settings):
-    return Tangential(TangentialConfig(**settings), sense, U_MAX, DT)
-
-
-def scene(others, to_go=(10.0, 0.0, 0.0), position=ZERO, velocity=ZERO, gradient=STRONG):
-    to_go, position = np.asarray(to_go, dtype=float), np.asarray(position, dtype=float)
-    prediction = position + DT * np.arange(16)[:, None] * velocity
-    destination = position + to_go
-    return Scene(
-        position, velocity, prediction, destination, ZERO, to_go, ZERO, others, np.asarray(gradient), ZERO
-    )
-
-
-def force(*args, sense="own", **kwargs):
-    """The force (3,) of a method that remembers nothing, and the factor on Ω_t."""
-    influence = method(sense).influence(scene(*args, **kwargs), NOTHING)
-    np.testing.assert_array_equal(influence.force, np.tile(influence.force[0], (16, 1)))
-    return influence.force[0], influence.omega_scale
 
 
 @LAWS
@@ -259,23 +237,3 @@ def test_who_is_fast_sideways_is_not_made_faster():
     half, whole = (force(ahead, velocity=share * CONFIG.pass_speed * sideways)[0] for share in (0.5, 1.0))
     assert np.linalg.norm(half) > 0.0
     assert not whole.any()
-
-
-@pytest.mark.parametrize("shift", [-0.4, 0.4])
-def test_a_row_with_no_way_through_is_passed_as_one(shift):
-    """Each alone would be left on its own side, and the forces would cancel between the two."""
-    row = obstacles([[2.0, shift + 0.7, 0.0], [2.0, shift - 0.7, 0.0]])
-    f = force(row)[0]
-    assert abs(f[1]) > CONFIG.force_max / 2
-    # The middle of the row is to the left if it is shifted there: it is passed on its right.
-    assert np.sign(f[1]) == -np.sign(shift)
-    wide = obstacles([[2.0, shift + 1.7, 0.0], [2.0, shift - 1.7, 0.0]])
-    assert abs(force(wide)[0][1]) < abs(f[1])
-
-
-def test_who_joins_a_group_is_passed_as_the_group_is():
-    method_ = method()
-    one, two = [[2.0, 0.3, 0.0]], [[2.0, 0.3, 0.0], [2.0, -2.0, 0.0]]
-    first = method_.influence(scene(obstacles(one)), NOTHING).force[0]
-    second = method_.influence(scene(obstacles(two)), NOTHING).force[0]
-    assert np.sign(first[1]) == np.sign(second[1]) == -1.0
