@@ -45,7 +45,9 @@ class HorizonConfig(Settings):
     """N steps of dt; N + 1 inputs u(0)…u(N)."""
 
     steps: int = Field(15, ge=2, le=15, description="N; at most 15, so that a plan fits one TUNNEL message")
-    dt_us: Micros = Field(100_000, le=262_140, description="prediction step, µs; not the replan period")
+    dt_us: int = Field(
+        100_000, gt=0, le=262_140, multiple_of=4, description="prediction step, µs; not the replan period"
+    )
 
 
 class CostConfig(Settings):

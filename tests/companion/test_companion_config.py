@@ -36,8 +36,10 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_a_contradiction_is_refused_and_named(name):
     settings, word = WRONG[name]
-    with pytest.raises(ValidationError, match=word):
+    with pytest.raises(ValidationError) as refused:
         CompanionConfig.model_validate(settings)
+    # What pydantic quotes of the input does not count.
+    assert any(word in f"{fault['loc']} {fault['msg']}" for fault in refused.value.errors())
 
 
 @pytest.mark.parametrize("beyond", [0.0, 0.5])
