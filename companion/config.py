@@ -12,12 +12,14 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from companion.certified.settings import CertifiedConfig
 from companion.moving import Moving, MovingPost, MovingSphere
 from companion.obstacles import Obstacle, Post, Sphere
 from companion.settings import Settings
 from companion.surfaces import Circle, Surface, SurfaceConfig
 
 MethodName = Literal["baseline", "swivel", "approach_angle", "tangential"]
+Avoidance = Literal["field", "certified"]
 TurningSense = Literal["own", "right", "left"]
 Positive = Annotated[float, Field(gt=0.0, le=1e4)]
 Micros = Annotated[int, Field(gt=0, le=10_000_000, multiple_of=4)]
@@ -229,6 +231,9 @@ class CompanionConfig(Settings):
     turning_sense: TurningSense = Field(
         "own", description="'own': by approach, as the paper; otherwise one sense for all vehicles"
     )
+    avoidance: Avoidance = Field(
+        "field", description="'field': the paper's; 'certified': committed plans between moving planes"
+    )
     planar: bool = False
     shares_plan: bool = Field(True, description="tell the others the horizon that is flown")
     neighbour_prediction: Literal["held", "velocity"] = Field(
@@ -262,6 +267,7 @@ class CompanionConfig(Settings):
         0.0, ge=-1.0, le=1.0, description="rad/s, counter-clockwise from above: the ring turns on its surface"
     )
     heading: HeadingConfig = HeadingConfig()
+    certified: CertifiedConfig = CertifiedConfig()
     guard: GuardConfig = GuardConfig()
     rates: RatesConfig = RatesConfig()
 

@@ -22,3 +22,7 @@ class SolverError(CompanionError):
 
 class SurfaceError(CompanionError):
     """A user's surface cannot be used. Example: its function raises, or gives a NaN."""
+
+
+class CertificateError(CompanionError):
+    """A plan that may not be committed: it does not end at rest, or breaks its planes."""

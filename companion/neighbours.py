@@ -138,6 +138,13 @@ class Neighbours:
         count = len(ids)
         return Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count], self._margin[:count])
 
+    def last_heard(self) -> list[tuple[int, int, Array, Array]]:
+        """System id, time (µs), position (3,) and velocity (3,) of everybody's last known state."""
+        return [
+            (system, int(time), state[0:3], state[3:6])
+            for system, time, state in zip(self._ids, self._times, self._states, strict=True)
+        ]
+
     def ages(self, now: int) -> dict[int, int]:
         """Age (µs) of every neighbour's track."""
         return {system: now - int(time) for system, time in zip(self._ids, self._times, strict=True)}

@@ -9,12 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.bearings import turned
+from companion.certified.flight import CertifiedFlight
+from companion.certified.keeper import Why
 from companion.config import CompanionConfig
 from companion.errors import CompanionError, SurfaceError
 from companion.forces import Obstacles
 from companion.guard import Guard
 from companion.heading import Heading
-from companion.horizon import Array, Horizon, Motion
+from companion.horizon import Array, Motion
 from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
 from companion.plan_log import PlanLog
 from companion.planner import Aim, Plan, Planner, standing
@@ -25,7 +27,7 @@ from companion.sharing import Sharing
 from companion.world import View, World
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, LocalFrame
-from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source
+from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source, Tunnel
 from mavlink_bridge.node import Datagram
 
 COMPONENT = 195
@@ -81,6 +83,9 @@ class Companion:
         self._frame: LocalFrame | None = None
         self._goal: Array | None = None
         self._settling = Settling(config)
+        self._certified = (
+            CertifiedFlight(config, self._source, fleet) if config.avoidance == "certified" else None
+        )
         self._surface = config.surface_of(system)
         self._obstacles = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
         self._heading = Heading(config.heading, config.horizon)
@@ -93,10 +98,12 @@ class Companion:
     @property
     def tally(self) -> Tally:
         """Counters for the summary."""
-        guard = self.guard
-        return Tally(
-            self._plans, self._relaxed, guard.failures, guard.held, guard.anchored_anew, self._plan_ns[:]
-        )
+        held, failures, anchored = self.guard.held, self.guard.failures, self.guard.anchored_anew
+        if self._certified is not None:
+            keeper = self._certified.keeper
+            held, failures = sum(keeper.held.values()), keeper.held[Why.UNSOLVED]
+            anchored = keeper.anchored_anew
+        return Tally(self._plans, self._relaxed, failures, held, anchored, self._plan_ns[:])
 
     @property
     def bad_frames(self) -> int:
@@ -114,15 +121,20 @@ class Companion:
         commands = self.pilot.step(now, view)
         self._fly(now, view)
         setpoints = self._setpoints(now, view)
-        shared = self._sharing.due(now, view, self.guard.horizon)
+        certified = self._certified
+        shared = self._sharing.due(now, view, self.guard.horizon if certified is None else None)
+        leaving = self.pilot.phase in (Phase.LAND, Phase.DONE)
+        told = [] if certified is None else certified.messages(now, farewell=leaving)
         return self._encode(
-            autopilot=[*commands, *setpoints, *shared.autopilot], swarm=shared.swarm, ground=answers
+            autopilot=[*commands, *setpoints, *shared.autopilot], swarm=shared.swarm + told, ground=answers
         )
 
     def _has_to_act(self, now: int) -> bool:
         """Under way there is nothing to do between two deadlines but to listen."""
-        return self.pilot.phase is not Phase.ESCORT or now >= min(
-            self._next_plan, self._next_setpoint, self._sharing.next_due
+        return (
+            self.pilot.phase is not Phase.ESCORT
+            or self._certified is not None
+            or now >= min(self._next_plan, self._next_setpoint, self._sharing.next_due)
         )
 
     def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
@@ -134,7 +146,10 @@ class Companion:
                     continue
                 if link == "autopilot":
                     self.pilot.hear(message)
-                self.world.hear(now, link, message)
+                if self._certified is not None and link == "swarm" and isinstance(message, Tunnel):
+                    self._certified.hear(now, message)
+                else:
+                    self.world.hear(now, link, message)
         return answers
 
     def _obey(self, message: Message) -> list[Message]:
@@ -186,6 +201,11 @@ class Companion:
             self._heading.reset(view.yaw)
             self._goal = view.own.position if self._goal is None else self._goal
             self.guard.start(now, measured)
+            if self._certified is not None:
+                self._certified.stand(now, measured.position)
+        if self._certified is not None:
+            self._fly_certified(now, view, measured, self._certified, stale=stale)
+            return
         if now < self._next_plan:
             return
         self._next_plan += self.config.rates.replan_us * (
@@ -199,6 +219,33 @@ class Companion:
             self.guard.start(now, measured)
             return
         self._plan(now, view, measured)
+
+    def _fly_certified(
+        self, now: int, view: View, measured: Motion, flight: CertifiedFlight, *, stale: bool
+    ) -> None:
+        """As committed; the next epoch's plan when it is due."""
+        if not self.pilot.guided:
+            flight.stand(now, measured.position)
+        elif not stale:
+            flight.watch(now, measured)
+        if self.pilot.guided and flight.due(now):
+            started = self._stopwatch()
+            try:
+                aim = None if stale else self._aim(now, view, measured)
+            except SurfaceError:
+                aim = None
+            if aim is None:
+                flight.keeper.carry_on(Why.MISSING)
+            elif flight.lost:
+                flight.keeper.anchor(now, measured)
+            else:
+                self._plans += flight.plan(now, aim, self.world, view)
+            self._plan_ns.append(min(max(self._stopwatch() - started, 0), _LONGEST_NS))
+        self.guard.horizon = horizon = flight.horizon()
+        if horizon is not None and now >= self._next_plan:
+            self._next_plan = now + self.config.rates.replan_us
+            step, count = self.config.horizon.dt_us, self.config.horizon.steps + 1
+            self._face(now, view, horizon.positions(now + step, count, step))
 
     def _plan(self, now: int, view: View, measured: Motion) -> None:
         try:
@@ -228,14 +275,15 @@ class Companion:
         self.plan_log.add(now, self.plan.gradient)
         self._relaxed += self.plan.relaxed
         self.guard.accept(now, self.plan.horizon)
-        self._face(now, view, self.plan.horizon)
+        self._face(now, view, self.plan.horizon.knots[1:, 0:3])
 
-    def _face(self, now: int, view: View, horizon: Horizon) -> None:
-        """Plan the yaw along the horizon; a companion that plans nothing keeps its yaw."""
+    def _face(self, now: int, view: View, places: Array) -> None:
+        """Plan the yaw along the own ``places`` (N + 1, 3) of the next steps; a companion that plans nothing
+        keeps its yaw."""
         if view.target is None:
             return
-        ahead: Array = 1e-6 * horizon.dt * np.arange(1.0, len(horizon.knots))
-        self._heading.plan(now, horizon.knots[1:, 0:3], view.target.ahead(ahead).positions)
+        ahead: Array = 1e-6 * self.config.horizon.dt_us * np.arange(1.0, len(places) + 1.0)
+        self._heading.plan(now, places, view.target.ahead(ahead).positions)
 
     def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to: the own goal, or the surface around the target where it will be at the end of the
@@ -251,7 +299,8 @@ class Companion:
             return standing(goal, None if target is None else target.position)
         if target is None:
             return None
-        ahead = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
+        steps = config.horizon.steps + 1
+        ahead = steps * config.horizon.dt_us * 1e-6 if self._certified is None else self._certified.seconds
         (end,), (velocity,) = target.ahead(np.array([ahead]))
         surface = self._surface
         offset = surface.nearest(measured.position - target.position)

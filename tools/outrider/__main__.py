@@ -37,7 +37,7 @@ def _root() -> None:
 def swarm(
     scenario: Annotated[str, typer.Argument(help="A file, or the name of a shipped scenario.")],
     method: Annotated[Optional[str], typer.Option(help=_METHODS)] = None,  # noqa: UP045
-    avoidance: Annotated[Optional[str], typer.Option(help="field.")] = None,  # noqa: UP045
+    avoidance: Annotated[Optional[str], typer.Option(help="field or certified.")] = None,  # noqa: UP045
     planar: Annotated[bool, typer.Option("--planar", help="Fix the height, as the paper.")] = False,
     vehicles: Annotated[Optional[int], typer.Option(help="How many fly.")] = None,  # noqa: UP045
     seed: Annotated[int, typer.Option(min=0, help="Of jitter, phases and link faults.")] = 1,

@@ -65,7 +65,11 @@ class Fleet:
         moving = (*companion.moving, *self.scenario.moving_known)
         sigma = max(companion.field.position_sigma, profile.worst_axis)
         field = companion.field.model_copy(update={"position_sigma": sigma})
-        return companion.model_copy(update={"obstacles": known, "moving": moving, "field": field})
+        changes: dict[str, object] = {"obstacles": known, "moving": moving, "field": field}
+        if companion.avoidance == "certified" and not companion.certified.fleet:
+            fleet = tuple(self.scenario.systems[: self.scenario.vehicles])
+            changes["certified"] = companion.certified.model_copy(update={"fleet": fleet})
+        return companion.model_copy(update=changes)
 
     def companion_config_of(self, k: int) -> CompanionConfig:
         """Those of vehicle ``k``: a bystander flies to goals, shares no plan and knows of no obstacle."""
@@ -75,6 +79,7 @@ class Fleet:
         changes: dict[str, object] = {
             "task": "goto",
             "methods": ("baseline",),
+            "avoidance": "field",
             "shares_plan": False,
             "target_d_min": None,
             "target_d_safe": None,

@@ -8,11 +8,12 @@ from typing import NamedTuple, get_args
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from companion.config import MethodName
+from companion.config import Avoidance, MethodName
 from outrider.errors import InputError
 from outrider.scenario import Points, Scenario
 from outrider.schema_nodes import Schema
 
+AVOIDANCES = get_args(Avoidance)
 METHODS = get_args(MethodName)
 _SLOWEST_PLAN = 10_000_000
 """µs."""
@@ -41,8 +42,12 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
     companion: dict[str, object] = {}
     if options.method is not None:
         companion["methods"] = _methods(options.method)
-    if options.avoidance not in (None, "field"):
-        raise InputError(f"--avoidance {options.avoidance}: allowed is 'field'")
+    if options.avoidance is not None:
+        if options.avoidance not in AVOIDANCES:
+            raise InputError(f"--avoidance {options.avoidance}: allowed are {' and '.join(AVOIDANCES)}")
+        companion["avoidance"] = options.avoidance
+        if options.avoidance == "certified" and scenario.companion.turning_sense == "own":
+            companion["turning_sense"] = "right"
     if options.planar:
         companion["planar"] = True
     if options.vehicles is not None:

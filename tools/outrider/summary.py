@@ -51,7 +51,7 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
     return {
         "scenario": scenario.name,
         "method": "+".join(config.methods),
-        "avoidance": "field",
+        "avoidance": config.avoidance,
         "planar": config.planar,
         "turning_sense": config.turning_sense if set(config.methods) - {"baseline"} else "own",
         "seed": flight.seed,

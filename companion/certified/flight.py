@@ -1,0 +1,129 @@
+"""The certified mode of one companion: what it hears and tells of plans, and when it makes the next one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.certified.keeper import Keeper, Why
+from companion.certified.ledger import Ledger
+from companion.certified.program import Program, Wish
+from companion.certified.stall import StallTurn
+from companion.certified.surroundings import Surroundings
+from companion.config import CompanionConfig
+from companion.horizon import Array, Horizon, Motion
+from companion.planner import Aim
+from companion.world import View, World
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import Message, Source, Tunnel
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack
+from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.roster_wire import Roster
+from mavlink_bridge.roster_wire import pack as pack_roster
+from mavlink_bridge.roster_wire import unpack as unpack_roster
+
+_SENSES = {"left": -1.0}
+
+
+class CertifiedFlight:
+    """Committed plans, the others' plans and the surroundings, put together for one vehicle."""
+
+    def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
+        certified, steps = config.certified, config.horizon.steps + 1
+        self._config, self._own = config, own
+        program = Program(steps, config.limits, certified, planar=config.planar)
+        self._stall = StallTurn(certified.stall, program.pull, _SENSES.get(config.turning_sense, 1.0))
+        self.keeper = Keeper(certified, program, self._stall, fleet.fingerprint, planar=config.planar)
+        self.ledger = Ledger(
+            own.system,
+            frozenset(certified.fleet),
+            steps,
+            certified.dt_us,
+            certified.epoch_us,
+            fleet.fingerprint,
+        )
+        self._surroundings = Surroundings(config, steps)
+        seconds = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
+        self._before_end: Array = seconds - seconds[-1]
+        self._steps = steps
+        self.off = self.excursion = 0.0
+        """Distance (m) of the vehicle from its plan, now and at most."""
+        self.left_tube = 0
+        """How often it got out of the tube."""
+        self._outside = False
+        self._next_told = 0
+        self._told_epoch = -1
+        self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
+        """From now to the end of the plan that is made next, s, at most."""
+
+    def hear(self, now: int, message: Tunnel) -> None:
+        """A TUNNEL on the swarm link."""
+        system = message.source.system
+        if message.payload_type == PAYLOAD_TYPE:
+            self.ledger.hear_plan(now, system, message.payload)
+        elif message.payload_type == ROSTER:
+            try:
+                self.ledger.hear_roster(now, system, unpack_roster(message.payload))
+            except PlanWireError:
+                self.ledger.refused += 1
+
+    def stand(self, now: int, position: Array) -> None:
+        """Not steering yet: the plan is to stand at ``position`` (3,)."""
+        self.keeper.begin(now, position)
+
+    def due(self, now: int) -> bool:
+        """Whether the next epoch's plan is to be made now, one way or the other. Carries on by itself what
+        cannot wait any longer."""
+        if not self.keeper.turn(now):
+            return False
+        if not self.ledger.missing(self.keeper.epoch(now)):
+            return True
+        if self.keeper.last_call(now):
+            self.keeper.carry_on(Why.MISSING)
+        return False
+
+    def watch(self, now: int, measured: Motion) -> None:
+        """Note how far the vehicle is from its plan. Outside the tube the promise rests; the plan stays, for
+        the autopilot finds back to it."""
+        horizon = self.keeper.horizon()
+        if horizon is None:
+            return
+        off = horizon.at(now).position - measured.position
+        self.off = float(np.sqrt(off @ off))
+        self.excursion = max(self.excursion, self.off)
+        outside = self.off > self._config.certified.tube
+        self.left_tube += outside and not self._outside
+        self._outside = outside
+
+    @property
+    def lost(self) -> bool:
+        """Whether the vehicle is so far from its plan that it has to be planned anew from where it is."""
+        return self.off > self._config.guard.tube
+
+    def plan(self, now: int, aim: Aim, world: World, view: View) -> bool:
+        """Make the next epoch's plan towards ``aim``, whose end is where this plan ends."""
+        keeper = self.keeper
+        start = keeper.start()
+        own = keeper.own()
+        others = self._surroundings.others(keeper.epoch(now), own, self.ledger, world, view)
+        goal = self._stall.turned(start.position_m, aim.destination)
+        places = goal + self._before_end[:, None] * aim.velocity
+        wish = Wish(places, np.broadcast_to(aim.velocity, places.shape), np.zeros((self._steps, 3)))
+        return keeper.replan(wish, aim.destination, others)
+
+    def horizon(self) -> Horizon | None:
+        """What is flown."""
+        return self.keeper.horizon()
+
+    def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
+        """What is to be told on the swarm link now: the newest plan, at once and then from time to time, and
+        whom it was made with."""
+        told = self.keeper.told()
+        if told is None or (told.epoch == self._told_epoch and now < self._next_told):
+            return []
+        self._told_epoch, self._next_told = told.epoch, now + self._config.certified.repeat_us
+        roster = Roster(told.epoch, self.ledger.members, farewell)
+        return [
+            Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(told)),
+            Tunnel(self._own, 0, 0, ROSTER, pack_roster(roster)),
+        ]

@@ -1,0 +1,113 @@
+"""What each knows of the others' committed plans, and whom it counts with.
+
+Plans are filed by the epoch they begin at. A vehicle replans in an epoch only if it holds the plan of that
+very epoch of everybody it counts with (``missing`` is empty): an older one will not do, for its sender may
+have made another since. Who was once heard with a plan counts from then on, and so does whoever one of those
+counts with; who has said farewell stays where its last plan ends.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from companion.certified.committed import controls, rests
+from companion.horizon import Array
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.plan_wire import WirePlan, unpack
+from mavlink_bridge.roster_wire import Roster
+
+_KEPT = 4
+"""Epochs of a sender that are kept."""
+
+
+class Filed(NamedTuple):
+    """A plan with its control points (n, 3, 3), m."""
+
+    plan: WirePlan
+    controls: Array
+
+
+class Ledger:
+    """Plans and rosters of the others. ``expected``: system ids that are to take part, heard or not.
+    ``steps`` and ``dt`` (µs) are everybody's; ``epoch`` (µs) is a whole number of dt."""
+
+    def __init__(
+        self, own: int, expected: frozenset[int], steps: int, dt: int, epoch: int, origin: int
+    ) -> None:
+        self._own = own
+        self._expected = expected - {own}
+        self._steps, self._dt, self._epoch, self._origin = steps, dt, epoch, origin
+        self._plans: dict[int, dict[int, Filed]] = {}
+        self._rosters: dict[int, Roster] = {}
+        self._left: dict[int, Filed] = {}
+        self.refused = 0
+
+    @property
+    def members(self) -> frozenset[int]:
+        """Everybody that is counted with."""
+        known = self._expected.union(self._plans, *(roster.members for roster in self._rosters.values()))
+        return frozenset(known - {self._own} - set(self._left))
+
+    def hear_plan(self, now: int, system: int, payload: bytes) -> None:
+        """A TUNNEL payload of kind plan; one that cannot be a committed plan is refused and counted."""
+        if system == self._own:
+            return
+        try:
+            plan = unpack(payload)
+        except PlanWireError:
+            self.refused += 1
+            return
+        fits = (
+            plan.origin == self._origin
+            and plan.dt == self._dt
+            and len(plan.accelerations) == self._steps
+            and plan.epoch % self._epoch == 0
+            and abs(plan.epoch - now) <= _KEPT * self._epoch
+            and rests(plan)
+        )
+        filed = self._plans.setdefault(system, {}) if fits else {}
+        known = filed.get(plan.epoch)
+        if not fits or (known is not None and known.plan != plan):
+            self.refused += 1
+            return
+        if known is None:
+            filed[plan.epoch] = Filed(plan, controls(plan))
+            for epoch in sorted(filed)[:-_KEPT]:
+                del filed[epoch]
+
+    def hear_roster(self, now: int, system: int, roster: Roster) -> None:
+        """Whom a member counts with. A farewell leaves its last plan where it ends."""
+        if system == self._own:
+            return
+        last = self._rosters.get(system)
+        if last is not None and roster.epoch < last.epoch:
+            return
+        if roster.farewell:
+            plans = self._plans.get(system)
+            if plans:
+                self._left[system] = plans[max(plans)]
+            return
+        self._left.pop(system, None)
+        self._rosters[system] = roster
+
+    def missing(self, epoch: int) -> set[int]:
+        """Members whose plan of ``epoch`` (µs) is not held, or who do not count with us yet."""
+        found = set()
+        for system in self.members:
+            roster = self._rosters.get(system)
+            if epoch not in self._plans.get(system, {}) or roster is None or self._own not in roster.members:
+                found.add(system)
+        return found
+
+    def plans(self, epoch: int) -> dict[int, Filed]:
+        """Plans of ``epoch`` (µs) by system id, of members."""
+        return {
+            system: filed[epoch]
+            for system, filed in sorted(self._plans.items())
+            if epoch in filed and system not in self._left
+        }
+
+    @property
+    def left(self) -> dict[int, Filed]:
+        """The last plans of those who said farewell."""
+        return dict(self._left)

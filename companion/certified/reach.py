@@ -1,0 +1,48 @@
+"""How far apart plans have to be, and where those may be that share none.
+
+The promise is about true places; what is planned differs from them. Between two vehicles each differs by the
+tube (its autopilot's tracking error), by k·σ of its estimate, and by v_max times the error of its clock.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from companion.certified.settings import CertifiedConfig
+from companion.config import FieldConfig, LimitsConfig
+from companion.horizon import Array
+
+
+def margin(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
+    """By how much (m) one vehicle's true place may differ from its plan: tube, k·σ, clock."""
+    speed = sqrt(sum(v * v for v in limits.v_max))
+    return config.tube + config.sigmas * field.position_sigma + 1e-6 * config.clock_us * speed
+
+
+def between(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
+    """Least distance (m) between two plans: d_min and what both differ by. The errors of two estimates are
+    independent, so they add as squares."""
+    each = margin(config, field, limits) - config.sigmas * field.position_sigma
+    return field.d_min + 2.0 * each + sqrt(2.0) * config.sigmas * field.position_sigma
+
+
+def stranger(
+    position: Array, velocity: Array, age: float, seconds: Array, speed: float, acceleration: float
+) -> tuple[Array, Array]:
+    """Balls that hold one that flies as it likes, at most at ``speed`` (m/s) and with ``acceleration``
+    (m/s²): centres (n, 3, 3) at the control points of n segments and radii (n,), m.
+
+    It was at ``position`` (3,) with ``velocity`` (3,) ``age`` seconds before the first of n + 1 knots, which
+    are at ``seconds`` (n + 1,). Two balls hold it, one about where it was, one about where it would be if it
+    flew on; the smaller counts.
+    """
+    later = age + seconds
+    begin, end = later[:-1], later[1:]
+    stays = speed * end
+    goes_on = 0.5 * acceleration * end**2
+    flies = goes_on < stays
+    moved = np.stack([begin, 0.5 * (begin + end), end], axis=1) * flies[:, None]
+    centres = position + moved[:, :, None] * velocity
+    return centres, np.where(flies, goes_on, stays)

@@ -1,0 +1,114 @@
+"""What a certified plan keeps away from, on its own knots: the plans of those that share them, what stands,
+and balls about those that fly as they like."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from companion.certified.corridor import Others
+from companion.certified.ledger import Ledger
+from companion.certified.reach import between, margin, stranger
+from companion.config import CompanionConfig
+from companion.horizon import Array
+from companion.obstacles import FixedObstacles, Post
+from companion.world import View, World
+
+_STEPS_OF_SIGHT = 1.0
+"""m beyond what matters for certain, so that nothing comes into sight in the middle of a plan."""
+
+
+class Surroundings:
+    """Of one vehicle; ``others`` for each plan."""
+
+    def __init__(self, config: CompanionConfig, steps: int) -> None:
+        self._config, self._steps = config, steps
+        own = config.certified
+        self.between = between(own, config.field, config.limits)
+        """Least distance (m) between two plans."""
+        self._margin = margin(own, config.field, config.limits)
+        self._posts = FixedObstacles(tuple(o for o in config.obstacles if isinstance(o, Post)))
+        self._balls = FixedObstacles(tuple(o for o in config.obstacles if not isinstance(o, Post)))
+        self._sizes = {one.system: one.radius for one in config.moving}
+        n, dt = steps, 1e-6 * own.dt_us
+        self._seconds: Array = dt * np.arange(n + 1.0)
+        speed = sqrt(sum(v * v for v in config.limits.v_max))
+        self._sight = n * dt * speed + self.between + _STEPS_OF_SIGHT
+
+    def others(self, epoch: int, own: Array, ledger: Ledger, world: World, view: View) -> Others:
+        """All that counts for the plan that begins one epoch after ``epoch`` (µs); ``own`` (n, 3, 3): the
+        committed control points from there on."""
+        shift = self._config.certified.epoch_us // self._config.certified.dt_us
+        controls, distance, shares = [], [], []
+        for filed in ledger.plans(epoch).values():
+            controls.append(_later(filed.controls, shift))
+            distance.append(np.full(self._steps, self.between))
+            shares.append(True)
+        begins = epoch + self._config.certified.epoch_us
+        strangers = [*self._strangers(begins, ledger, world), *self._target(begins, view)]
+        for centres, radii in [*self._standing(own), *self._gone(own, ledger), *strangers]:
+            controls.append(centres)
+            distance.append(radii)
+            shares.append(False)
+        if not controls:
+            none = np.zeros(0, dtype=np.bool_)
+            return Others(np.zeros((0, self._steps, 3, 3)), np.zeros((0, self._steps)), none)
+        return Others(np.stack(controls), np.stack(distance), np.array(shares))
+
+    def _standing(self, own: Array) -> list[tuple[Array, Array]]:
+        """Spheres about their centres; posts beside the vehicle, whatever its height: they count as if they
+        had no top."""
+        points = own.reshape(-1, 3)
+        found = []
+        for fixed, upright in ((self._balls, False), (self._posts, True)):
+            if not len(fixed):
+                continue
+            _, positions, radii = fixed.around(points, self._sight)
+            for place, radius in zip(positions.reshape(-1, self._steps, 3, 3), radii, strict=True):
+                centres = place.copy()
+                if upright:
+                    centres[..., 2] = own[..., 2]
+                least = self._config.field.d_min + radius + self._margin
+                found.append((centres, np.full(self._steps, least)))
+        return found
+
+    def _gone(self, own: Array, ledger: Ledger) -> list[tuple[Array, Array]]:
+        """Those who said farewell are on the way down, or stand below: nobody flies over them."""
+        found = []
+        for filed in ledger.left.values():
+            centres = own.copy()
+            centres[..., :2] = filed.controls[-1, 2, :2]
+            found.append((centres, np.full(self._steps, self.between)))
+        return found
+
+    def _strangers(self, begins: int, ledger: Ledger, world: World) -> list[tuple[Array, Array]]:
+        config = self._config
+        known = ledger.members.union(ledger.left)
+        found = []
+        for system, time, position, velocity in world.neighbours.last_heard():
+            if system in known:
+                continue
+            age = max(1e-6 * (begins - time), 0.0)
+            bounds = config.certified.stranger_speed, config.certified.stranger_acceleration
+            centres, reach = stranger(position, velocity, age, self._seconds, *bounds)
+            size = self._sizes.get(system, 0.0)
+            found.append((centres, reach + self.between + size))
+        return found
+
+    def _target(self, begins: int, view: View) -> list[tuple[Array, Array]]:
+        """Where the target flies on as it does, if it is an obstacle: it is followed, not guarded against."""
+        config, target = self._config, view.target
+        if target is None or config.target_d_min is None:
+            return []
+        ends = target.ahead(self._seconds + 1e-6 * config.certified.epoch_us).positions
+        middle = 0.5 * (ends[:-1] + ends[1:])
+        centres = np.stack([ends[:-1], middle, ends[1:]], axis=1)
+        return [(centres, np.full(self._steps, config.target_d_min + self._margin))]
+
+
+def _later(controls: Array, knots: int) -> Array:
+    """Control points ``knots`` later; after the end they rest."""
+    rest = np.broadcast_to(controls[-1, 2], (min(knots, len(controls)), 3, 3))
+    result: Array = np.concatenate([controls[knots:], rest])
+    return result
