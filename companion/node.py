@@ -133,7 +133,7 @@ class Companion:
         """Under way there is nothing to do between two deadlines but to listen."""
         return (
             self.pilot.phase is not Phase.ESCORT
-            or self._certified is not None
+            or (self._certified is not None and not self._certified.idle(now))
             or now >= min(self._next_plan, self._next_setpoint, self._sharing.next_due)
         )
 
@@ -226,8 +226,10 @@ class Companion:
         """As committed; the next epoch's plan when it is due."""
         if not self.pilot.guided:
             flight.stand(now, measured.position)
-        elif not stale:
-            flight.watch(now, measured)
+        else:
+            flight.steer()
+            if not stale:
+                flight.watch(now, measured)
         if self.pilot.guided and flight.due(now):
             started = self._stopwatch()
             try:

@@ -51,6 +51,7 @@ class CertifiedFlight:
         self.left_tube = 0
         """How often it got out of the tube."""
         self._outside = False
+        self._steers = False
         self._next_told = 0
         self._told_epoch = -1
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
@@ -68,8 +69,13 @@ class CertifiedFlight:
                 self.ledger.refused += 1
 
     def stand(self, now: int, position: Array) -> None:
-        """Not steering yet: the plan is to stand at ``position`` (3,)."""
+        """Not steering: to stand at ``position`` (3,) is all, and nothing is told of it."""
         self.keeper.begin(now, position)
+        self._steers = False
+
+    def steer(self) -> None:
+        """What is planned is flown from now on."""
+        self._steers = True
 
     def due(self, now: int) -> bool:
         """Whether the next epoch's plan is to be made now, one way or the other. Carries on by itself what
@@ -111,6 +117,11 @@ class CertifiedFlight:
         wish = Wish(places, np.broadcast_to(aim.velocity, places.shape), np.zeros((self._steps, 3)))
         return keeper.replan(wish, aim.destination, others)
 
+    def idle(self, now: int) -> bool:
+        """Whether there is nothing to make or to tell until something else is due."""
+        following = self.keeper.following
+        return following is not None and now < following.epoch and now < self._next_told
+
     def horizon(self) -> Horizon | None:
         """What is flown."""
         return self.keeper.horizon()
@@ -118,7 +129,7 @@ class CertifiedFlight:
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
         """What is to be told on the swarm link now: the newest plan, at once and then from time to time, and
         whom it was made with."""
-        told = self.keeper.told()
+        told = self.keeper.told() if self._steers or farewell else None
         if told is None or (told.epoch == self._told_epoch and now < self._next_told):
             return []
         self._told_epoch, self._next_told = told.epoch, now + self._config.certified.repeat_us

@@ -47,20 +47,23 @@ class Keeper:
     ) -> None:
         self._config, self._program, self._stall, self._origin = config, program, stall, origin
         self._planar = planar
+        self._told = 0
         self.current: WirePlan | None = None
         self.following: WirePlan | None = None
         self.held: dict[Why, int] = dict.fromkeys(Why, 0)
         self.anchored_anew = 0
-        self._solved_at = 0
 
     def epoch(self, now: int) -> int:
         """The beginning (µs) of the epoch that holds ``now``."""
         return now - now % self._config.epoch_us
 
     def begin(self, now: int, position: Array) -> None:
-        """Stand at ``position`` (3,) m from this epoch on."""
-        self.current = resting(self.epoch(now), self._config.dt_us, self._program.n, position, self._origin)
-        self.following = None
+        """Stand at ``position`` (3,) m; what is told is the plan of the next epoch of which nothing else has
+        been told."""
+        epoch, steps = self.epoch(now), self._program.n
+        self.current = resting(epoch, self._config.dt_us, steps, position, self._origin)
+        free = max(epoch, self._told) + self._config.epoch_us
+        self.following = self.current._replace(epoch=free)
 
     def turn(self, now: int) -> bool:
         """Go on to the epoch that holds ``now``. True if its follower is still to be made."""
@@ -142,7 +145,9 @@ class Keeper:
 
     def told(self) -> WirePlan | None:
         """The plan that others are to know now."""
-        return self.current if self.following is None else self.following
+        plan = self.current if self.following is None else self.following
+        self._told = self._told if plan is None else max(self._told, plan.epoch)
+        return plan
 
     def _flown_until(self) -> Array:
         """The acceleration (3,) with which this epoch ends."""

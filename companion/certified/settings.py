@@ -19,6 +19,9 @@ class StallConfig(Settings):
     bend_more: Positive = Field(3.1, description="rad, the largest turn ever")
     patience: Positive = Field(2.5, description="s without progress before larger turns are tried")
     slow: Positive = Field(1.0, description="rad/s by which the largest turn grows then")
+    detour: Positive = Field(
+        3.0, description="m: on a turn that is larger than ``bend`` the goal is no further"
+    )
     up: Positive = Field(4.0, description="rad/s at which it turns aside where it is pushed back in full")
     down: Positive = Field(6.0, description="rad/s at which it turns back")
     speed: Positive = Field(2.0, description="m/s of the rest point towards the goal that is no stall")

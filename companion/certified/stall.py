@@ -38,8 +38,13 @@ class StallTurn:
         self._waited = 0.0
 
     def turned(self, position: Array, goal: Array) -> Array:
-        """Where to aim for from ``position`` (3,) instead of ``goal`` (3,)."""
-        return position + _about_z(goal - position, -self._sense * self.angle)
+        """Where to aim for from ``position`` (3,) instead of ``goal`` (3,): on a large turn no further than a
+        detour leads."""
+        way = goal - position
+        length = float(np.sqrt(way @ way))
+        if self.angle > self._config.bend and length > self._config.detour:
+            way = way * (self._config.detour / length)
+        return position + _about_z(way, -self._sense * self.angle)
 
     def learn(self, rest: Array, goal: Array, push: Array, seconds: float) -> None:
         """What the plan that was just made tells: it rests at ``rest`` (3,), its planes push with ``push``

@@ -20,7 +20,8 @@ def swap(task: Task) -> dict[str, Any]:
     """Figures as of a flight, drawn from the task alone."""
     random = np.random.default_rng([task.seed, *task.key.encode()])
     converged = bool(random.random() > 0.1)
-    violations = int(random.random() < 0.05)
+    # At least one among the first seeds, whatever the key of the cell makes of the rest.
+    violations = int(task.seed == 7 or random.random() < 0.05)
     return {
         "converged": converged,
         "convergence_time_s": round(float(random.gamma(20.0, 0.5)), 3) if converged else None,

@@ -24,6 +24,7 @@ class Stream(IntEnum):
     SCENE_STARTS = 6
     SCENE_GOALS = 7
     SCENE_COUNTS = 8
+    SCENE_TROUBLE = 9
 
 
 def stream(seed: int, of: Stream, number: int = 0) -> np.random.Generator:

@@ -16,6 +16,7 @@ from outrider.streams import Stream, stream
 from outrider.sweeps.grid import leaves, overlay
 from outrider.sweeps.places import Array, Circles, obstacles, scatter, walk
 from outrider.sweeps.scenes import Scene, Things
+from outrider.sweeps.trouble import strike
 
 _MARGIN = 10.0
 """m around all places within which the planner may move."""
@@ -117,6 +118,9 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
         "box_max": [reach, reach, scene.height[1] + 5.0],
     }
     document["companion"] = companion
+    if scene.trouble is not None:
+        struck = strike(scene.trouble, count, stream(seed, Stream.SCENE_TROUBLE))
+        document = overlay(document, leaves(struck))
     # Three times the longest way, and a minute after the last jump.
     way = 2.0 * math.sqrt(2.0) * (extent + radius)
     document["cap_s"] = float(min(3600, math.ceil(last_jump + 60.0 + 3.0 * way / dial.speed)))

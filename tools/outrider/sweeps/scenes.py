@@ -9,6 +9,7 @@ from pydantic import Field, JsonValue, model_validator
 
 from outrider.scenario_part import Part, Share
 from outrider.sweeps.grid import leaves
+from outrider.sweeps.trouble import Trouble
 
 Metres = Annotated[float, Field(gt=0.0, le=200.0)]
 Span = tuple[Metres, Metres]
@@ -133,6 +134,7 @@ class Scene(Part):
     spheres: Balls | None = None
     posts: Poles | None = None
     jumps: Jumps | None = Field(None, description="of the target, in an escort")
+    trouble: Trouble | None = Field(None, description="what goes wrong, drawn too")
     scenario: dict[str, JsonValue] = Field({}, description="anything else of the scenarios that are drawn")
 
     @model_validator(mode="after")
