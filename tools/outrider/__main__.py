@@ -103,15 +103,31 @@ def paper(
 
 
 @app.command()
+def replay(
+    run_dir: Annotated[Path, typer.Argument(help="What a flight left: logs and configuration.yaml.")],
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Check from the plans on the wire that all kept apart.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Go through the logs of a run again. Ends with 1 if there are findings."""
+    from outrider.certify.command import certify as certifying
+
+    if not certify:
+        raise InputError(f"replay {run_dir}: what for is not said; allowed: --certify")
+    raise typer.Exit(certifying(run_dir, as_json))
+
+
+@app.command()
 def bench(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer rounds, no flight.")] = False,
 ) -> None:
     """Measure this machine: plan step, PIQP, physics, codec, tlog, real-time factor (CPU time)."""
     from outrider.bench import measure
-    from outrider.console import bench_progress, show_bench
+    from outrider.console import share_progress, show_bench
 
-    with bench_progress() as watch:
+    with share_progress() as watch:
         figures = measure(watch, quick=quick)
     if as_json:
         sys.stdout.write(json.dumps(figures) + "\n")

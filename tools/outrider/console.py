@@ -89,8 +89,8 @@ def show(summary: Mapping[str, Value]) -> None:
 
 
 @contextmanager
-def bench_progress() -> Iterator[Callable[[str, float], None]]:
-    """A bar for the benchmark; the callable takes what is measured now and the share that is done."""
+def share_progress() -> Iterator[Callable[[str, float], None]]:
+    """A bar for what is no flight; the callable takes what is done now and the share that is done."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:

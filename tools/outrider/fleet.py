@@ -17,6 +17,7 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.node_clock import NodeClock
 from outrider import names
 from outrider.bystander import Bystander
+from outrider.companion_settings import settings_of
 from outrider.moving import MovingObstacle
 from outrider.operator import Operator
 from outrider.scenario import FixedTarget, PathTarget, Scenario
@@ -28,7 +29,6 @@ from outrider.targets import Recorded, Standing, Target, Walking
 from sitl.autopilot_config import AutopilotConfig
 from sitl.config import VehicleConfig
 from sitl.node import Autopilot
-from sitl.profiles import PROFILES
 
 
 class End(NamedTuple):
@@ -58,18 +58,8 @@ class Fleet:
 
     @property
     def companion_config(self) -> CompanionConfig:
-        """The companions' settings with the obstacles of the scenario in them, and in the field how wrong the
-        sensor profile is, unless the settings say more."""
-        companion, profile = self.scenario.companion, PROFILES[self.scenario.sensors]
-        known = (*companion.obstacles, *self.scenario.obstacles)
-        moving = (*companion.moving, *self.scenario.moving_known)
-        sigma = max(companion.field.position_sigma, profile.worst_axis)
-        field = companion.field.model_copy(update={"position_sigma": sigma})
-        changes: dict[str, object] = {"obstacles": known, "moving": moving, "field": field}
-        if companion.avoidance == "certified" and not companion.certified.fleet:
-            fleet = tuple(self.scenario.systems[: self.scenario.vehicles])
-            changes["certified"] = companion.certified.model_copy(update={"fleet": fleet})
-        return companion.model_copy(update=changes)
+        """The companions' settings with what the scenario tells them."""
+        return settings_of(self.scenario)
 
     def companion_config_of(self, k: int) -> CompanionConfig:
         """Those of vehicle ``k``: a bystander flies to goals, shares no plan and knows of no obstacle."""

@@ -1,0 +1,72 @@
+"""``outrider replay --certify``: from a run directory to its verdict."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from outrider.certify.histories import Kind
+from outrider.certify.reading import read
+from outrider.certify.verdict import Verdict, judge
+from outrider.console import share_progress
+
+MOST_SHOWN = 20
+
+
+def certify(directory: Path, as_json: bool = False) -> int:
+    """Judge the run in ``directory`` and say so; the exit status: 0 certified, 1 there are findings.
+
+    InputError for a directory without evidence.
+    """
+    with share_progress() as watch:
+        evidence = read(directory, watch)
+    verdict = judge(evidence)
+    if as_json:
+        sys.stdout.write(json.dumps(verdict.document()) + "\n")
+    else:
+        show(str(directory), verdict)
+    return 0 if verdict.certified else 1
+
+
+def show(name: str, verdict: Verdict) -> None:
+    """The verdict as a table, then each finding and each anchor in a line."""
+    pairs, nearest = verdict.pairs, verdict.pairs.nearest
+    anchors = verdict.steps(Kind.ANCHOR)
+    word = "certified" if verdict.certified else "not certified"
+    if verdict.certified and pairs.resting:
+        word = f"certified but for {pairs.resting} pairs after an anchor"
+    table = Table(title=Text(f"{name} · {word}"), show_header=False)
+    rows = {
+        "vehicles": len(verdict.histories),
+        "epochs": len(pairs.epochs),
+        "pairs of plans checked": pairs.checked,
+        "… not checked after a farewell": pairs.farewell,
+        "… not checked after an anchor": pairs.resting,
+        "least distance of two plans, m": ""
+        if nearest is None
+        else f"{nearest.distance:.4f}, {nearest.who[0]} and {nearest.who[1]} at "
+        f"{verdict.seconds(nearest.epoch):g} s",
+        "required, m": f"{verdict.required:.4f}",
+        "plans made": len(verdict.steps(Kind.FIRST, Kind.MADE, Kind.ANCHOR)),
+        "plans carried on": len(verdict.steps(Kind.CARRIED_ON)),
+        "anchors": len(anchors),
+        "farewells": sum(len(history.leaves) for history in verdict.histories),
+        "damaged records": verdict.damaged,
+        "findings": len(verdict.findings),
+    }
+    for words, value in rows.items():
+        table.add_row(words, str(value))
+    console = Console()
+    console.print(table)
+    lines = [verdict.line(finding) for finding in verdict.findings]
+    told = [f"anchor: {system}, {verdict.seconds(epoch):g} s" for system, epoch in anchors]
+    for group in (lines, told):
+        for line in group[:MOST_SHOWN]:
+            console.print(Text(line), soft_wrap=True)
+        if len(group) > MOST_SHOWN:
+            console.print(Text(f"and {len(group) - MOST_SHOWN} more"))

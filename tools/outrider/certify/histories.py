@@ -1,0 +1,168 @@
+"""One vehicle's plans, one for each epoch: what it told against what the others heard, and each plan against
+the one before.
+
+Whoever hears a plan refuses one that does not fit, and counts on the one before, carried on; so does this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from enum import Enum
+from itertools import zip_longest
+from typing import NamedTuple
+
+from companion.certified.committed import carried_on, rests
+from mavlink_bridge.plan_wire import WirePlan, pack
+from outrider.certify.evidence import Finding, Log, Sighting, Terms
+
+_FAR = 4
+"""Epochs between the beginning of a plan and when it is heard: more, and nobody takes it."""
+_AXES = ("east", "north", "up")
+
+
+class Kind(Enum):
+    """How a plan relates to the one before."""
+
+    FIRST = "begins"
+    MADE = "made anew from where the plan before is"
+    CARRIED_ON = "the plan before, carried on"
+    ANCHOR = "made anew from elsewhere"
+
+
+class Step(NamedTuple):
+    """The plan of one epoch."""
+
+    plan: WirePlan
+    kind: Kind
+
+
+class Leave(NamedTuple):
+    """A farewell at ``said`` (µs), and the epoch (µs) from which on it is there again, if it is."""
+
+    said: int
+    back: int | None
+
+
+class History(NamedTuple):
+    """Of one vehicle: its plans in the order of their epochs, and when it was not there."""
+
+    system: int
+    steps: tuple[Step, ...]
+    leaves: tuple[Leave, ...]
+
+    def left(self, epoch: int) -> bool:
+        """Whether it had said farewell before ``epoch`` (µs) began: it may be landing, and its last plan is
+        no longer flown."""
+        return any(leave.said < epoch and (leave.back is None or epoch < leave.back) for leave in self.leaves)
+
+
+def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, list[Finding]]:
+    """What ``system`` told, by all ``logs``, and what is wrong with it."""
+    own = next((log for log in logs if log.owner == system), None)
+    by_epoch: dict[int, list[Sighting]] = {}
+    for log in logs:
+        for sighting in log.sightings:
+            if sighting.sender == system:
+                by_epoch.setdefault(sighting.plan.epoch, []).append(sighting)
+    findings: list[Finding] = []
+    chosen = []
+    for epoch in sorted(by_epoch):
+        found = by_epoch[epoch]
+        findings += _disagreements(system, found, logged=own is not None)
+        sound = []
+        for plan in dict.fromkeys(sighting.plan for sighting in found):
+            of_it = [sighting for sighting in found if sighting.plan == plan]
+            flaw = _flaw(plan, terms, [sighting.time for sighting in of_it])
+            if flaw is None:
+                last_told = max((s.time for s in of_it if s.owner == system), default=0)
+                sound.append((sum(s.copies for s in of_it), last_told, plan))
+            else:
+                findings.append(Finding(flaw[0], (system,), of_it[0].time, flaw[1]))
+        if sound:
+            # Of several, what most hold; and of those what is flown, which is the last.
+            chosen.append(max(sound)[-1])
+    leaves = () if own is None else tuple(_leaves(own, chosen))
+    steps = tuple(_steps(chosen, leaves))
+    findings += [finding for step in steps for finding in _limits(system, step, terms)]
+    return History(system, steps, leaves), findings
+
+
+def _disagreements(system: int, found: Sequence[Sighting], *, logged: bool) -> list[Finding]:
+    """What was told differs from what was told otherwise, or from what was heard; all are of one epoch."""
+    epoch = found[0].plan.epoch
+    told = list(dict.fromkeys(sighting.plan for sighting in found if sighting.owner == system))
+    heard = [sighting for sighting in found if sighting.owner != system and sighting.plan not in told]
+    findings = []
+    if len(told) > 1:
+        figures = f"{len(told)} plans; {_differ(told[-1], told[:-1])}"
+        findings.append(Finding("two plans told of one epoch", (system,), epoch, figures))
+    if heard and logged and not told:
+        hearers = tuple(sorted({sighting.owner for sighting in heard}))
+        what = "a plan heard that its sender did not tell"
+        return [Finding(what, (system, *hearers), heard[0].time, f"its epoch is {epoch} µs")]
+    reference = told or [heard[0].plan] if heard else []
+    for sighting in heard:
+        if sighting.plan not in reference:
+            figures = _differ(sighting.plan, reference)
+            findings.append(Finding("a plan altered", (system, sighting.owner), epoch, figures))
+    return findings
+
+
+def _differ(plan: WirePlan, others: Iterable[WirePlan]) -> str:
+    """By how many bits a plan differs from the one most like it."""
+    bits = min((int.from_bytes(pack(plan)) ^ int.from_bytes(pack(other))).bit_count() for other in others)
+    return f"{bits} bit differs" if bits == 1 else f"{bits} bits differ"
+
+
+def _flaw(plan: WirePlan, terms: Terms, seen: Sequence[int]) -> tuple[str, str] | None:
+    """Why nobody takes a plan that was told or heard at ``seen`` (µs): what is wrong, and figures."""
+    if not rests(plan):
+        left = plan.states()[-1, 1] * 1e-3 * plan.dt * 1e-6
+        return "a plan that does not end at rest", f"{float((left @ left) ** 0.5):.4f} m/s left"
+    if plan.origin != terms.origin:
+        return "a plan in another frame", f"fingerprint {plan.origin}, the fleet's is {terms.origin}"
+    if plan.dt != terms.dt or len(plan.accelerations) != terms.steps or plan.epoch % terms.epoch:
+        knots = f"{len(plan.accelerations)} knots of {plan.dt} µs from {plan.epoch} µs"
+        fleet = f"the fleet's are {terms.steps} of {terms.dt} µs from k·{terms.epoch} µs"
+        return "a plan on other knots", f"{knots}; {fleet}"
+    if min(abs(plan.epoch - time) for time in seen) > _FAR * terms.epoch:
+        return "a plan of another time", f"begins {1e-6 * (plan.epoch - seen[0]):.1f} s after it was told"
+    return None
+
+
+def _leaves(own: Log, plans: Sequence[WirePlan]) -> Iterable[Leave]:
+    """Farewells, and the first of ``plans`` after each that was told when it no longer said farewell."""
+    told = {sighting.plan: sighting.time for sighting in own.sightings if sighting.sender == own.owner}
+    for word, following in zip_longest(own.words, own.words[1:]):
+        if word.farewell:
+            again = [] if following is None else [p.epoch for p in plans if told.get(p, 0) >= following.time]
+            yield Leave(word.time, min(again, default=None))
+
+
+def _steps(plans: Sequence[WirePlan], leaves: Sequence[Leave]) -> Iterable[Step]:
+    """How each plan relates to the one before. In a gap that one goes on: nobody can have heard another."""
+    back = {leave.back for leave in leaves}
+    last: WirePlan | None = None
+    for plan in plans:
+        if last is None or plan.epoch in back:
+            kind = Kind.FIRST
+        else:
+            goes_on = carried_on(last, (plan.epoch - last.epoch) // plan.dt)
+            if plan == goes_on:
+                kind = Kind.CARRIED_ON
+            else:
+                continued = (plan.position, plan.velocity) == (goes_on.position, goes_on.velocity)
+                kind = Kind.MADE if continued else Kind.ANCHOR
+        last = plan
+        yield Step(plan, kind)
+
+
+def _limits(system: int, step: Step, terms: Terms) -> Iterable[Finding]:
+    """A plan that is carried on was within them when it was made."""
+    if step.kind is Kind.CARRIED_ON:
+        return
+    for axis, (name, most) in enumerate(zip(_AXES, terms.a_max, strict=True)):
+        largest = max(abs(a[axis]) for a in step.plan.accelerations)
+        if largest > most:
+            figures = f"{1e-3 * largest:.3f} m/s² {name}, at most {1e-3 * most:.3f}"
+            yield Finding("an acceleration beyond the limits", (system,), step.plan.epoch, figures)

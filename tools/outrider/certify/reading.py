@@ -1,0 +1,151 @@
+"""A run directory to evidence: the configuration says what was agreed on, the logs what was told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict
+
+from companion.certified.reach import between
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.errors import LogError, PlanWireError
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import Tunnel
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE as PLAN
+from mavlink_bridge.plan_wire import unpack as unpack_plan
+from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.roster_wire import unpack as unpack_roster
+from mavlink_bridge.tlog import read_tlog
+from outrider import names
+from outrider.certify.evidence import Evidence, Garbled, Log, Sighting, Terms, Word
+from outrider.companion_settings import settings_of
+from outrider.errors import Fault, InputError
+from outrider.scenario import Scenario
+from outrider.yaml_file import load
+
+CONFIGURATION = "configuration.yaml"
+_TUNNEL = 385
+_ALLOWED = "allowed: what outrider swarm SCENARIO --avoidance certified --out leaves"
+_OFTEN = 4096
+"""Records from one look at the progress to the next."""
+
+Watch = Callable[[str, float], None]
+
+
+class Resolved(BaseModel):
+    """The configuration that a run leaves beside its logs."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    seed: int
+    scenario: Scenario
+
+
+def read(directory: Path, watch: Watch) -> Evidence:
+    """All evidence in ``directory``; ``watch`` hears which log is read, and the share that is done.
+
+    Raises InputError where there is none.
+    """
+    if not directory.is_dir():
+        wrong = "not a directory" if directory.exists() else "no such directory"
+        raise InputError(Fault(str(directory), f"{wrong}; {_ALLOWED}"))
+    path = directory / CONFIGURATION
+    scenario = load(path, Resolved).scenario
+    if scenario.companion.avoidance != "certified":
+        flown = scenario.companion.avoidance
+        raise InputError(Fault(str(path), f"flown with scenario.companion.avoidance {flown!r}; {_ALLOWED}"))
+    found = {system: directory / names.log(system) for system in scenario.systems}
+    found = {system: log for system, log in found.items() if log.is_file()}
+    if not found:
+        raise InputError(Fault(str(directory), f"holds no log vehicle-N.tlog; {_ALLOWED}"))
+    size = sum(log.stat().st_size for log in found.values())
+    logs, faults, done = [], [], 0
+    for system, log in found.items():
+
+        def told(at: int, name: str = log.name, before: int = done) -> None:
+            watch(name, (before + at) / size)
+
+        try:
+            logs.append(_read(system, log, told))
+        except LogError as error:
+            faults.append(str(error))
+        done += log.stat().st_size
+    if not any(log.sightings for log in logs):
+        wrong = faults[0] if faults and not logs else f"{directory}: its {len(found)} logs hold no plan"
+        raise InputError(f"{wrong}; {_ALLOWED}")
+    return Evidence(terms_of(scenario), tuple(logs))
+
+
+def terms_of(scenario: Scenario) -> Terms:
+    """What the companions of a scenario agree on."""
+    config = settings_of(scenario)
+    certified, limits, origin = config.certified, config.limits, scenario.origin
+    x, y, z = (round(1e3 * most) for most in limits.u_max)
+    return Terms(
+        certified.fleet,
+        frozenset(scenario.moving_systems),
+        certified.dt_us,
+        certified.epoch_us,
+        config.horizon.steps + 1,
+        FleetFrame(origin.latitude, origin.longitude, origin.altitude).fingerprint,
+        between(certified, config.field, limits),
+        (x, y, z),
+        config.planar,
+    )
+
+
+class _Tally:
+    """What one log holds so far. A payload that is told again is counted, and not read twice."""
+
+    def __init__(self, owner: int) -> None:
+        self._owner = owner
+        self._plans: dict[tuple[int, bytes], tuple[int, int]] = {}
+        self._garbled: dict[int, Garbled] = {}
+        self._words: list[Word] = []
+        self._roster = b""
+
+    def add(self, time: int, message: Tunnel) -> None:
+        """A TUNNEL of any kind."""
+        sender, payload = message.source.system, message.payload
+        if message.payload_type == PLAN:
+            first, copies = self._plans.get((sender, payload), (time, 0))
+            self._plans[sender, payload] = first, copies + 1
+        elif message.payload_type == ROSTER and sender == self._owner and payload != self._roster:
+            self._roster = payload
+            try:
+                farewell = unpack_roster(payload).farewell
+            except PlanWireError:
+                self._garble(sender, time, 1)
+                return
+            if farewell != (bool(self._words) and self._words[-1].farewell):
+                self._words.append(Word(time, farewell))
+
+    def _garble(self, sender: int, time: int, copies: int) -> None:
+        bad = self._garbled.get(sender, Garbled(self._owner, sender, time, 0))
+        self._garbled[sender] = bad._replace(copies=bad.copies + copies)
+
+    def log(self, damaged: int) -> Log:
+        """All of it, with so many records that could not be read."""
+        sightings = []
+        for (sender, payload), (time, copies) in self._plans.items():
+            try:
+                sightings.append(Sighting(self._owner, sender, unpack_plan(payload), time, copies))
+            except PlanWireError:
+                self._garble(sender, time, copies)
+        return Log(self._owner, tuple(sightings), tuple(self._garbled.values()), tuple(self._words), damaged)
+
+
+def _read(owner: int, path: Path, at: Callable[[int], None]) -> Log:
+    """One log; ``at`` hears how many bytes have been read. Raises LogError."""
+    tally, codec = _Tally(owner), Codec(lambda identifier, _system, _component: identifier == _TUNNEL)
+    reader, size = read_tlog(path), 0
+    for number, record in enumerate(reader):
+        size += 8 + len(record.frame)
+        if number % _OFTEN == 0:
+            at(size)
+        for message in codec.feed(record.frame):
+            if isinstance(message, Tunnel):
+                tally.add(record.time, message)
+    report = reader.report
+    return tally.log(report.bad + report.truncated + codec.counters.bad)

@@ -1,0 +1,114 @@
+"""What the evidence of a run comes to."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from outrider.certify.evidence import Evidence, Finding, Log, Terms
+from outrider.certify.histories import History, Kind, history
+from outrider.certify.pairs import Pairs, check
+
+
+class Verdict(NamedTuple):
+    """``findings`` in the order of time; without any, the run is certified. ``began``: the first epoch (µs),
+    from which on seconds are counted."""
+
+    histories: tuple[History, ...]
+    pairs: Pairs
+    required: float
+    damaged: int
+    began: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def certified(self) -> bool:
+        """Whether every pair was certified at every epoch, as far as the logs tell."""
+        return not self.findings
+
+    def seconds(self, time: int) -> float:
+        """``time`` (µs) from the beginning on, s."""
+        return round(1e-6 * (time - self.began), 3)
+
+    def steps(self, *kinds: Kind) -> list[tuple[int, int]]:
+        """System id and epoch (µs) of all plans of these ``kinds``."""
+        found = [(h.system, s.plan.epoch) for h in self.histories for s in h.steps if s.kind in kinds]
+        return sorted(found, key=lambda one: one[::-1])
+
+    def line(self, finding: Finding) -> str:
+        """A finding for people: what, who, when, figures."""
+        who = ", ".join(map(str, finding.who))
+        parts = [f"{finding.what}: {who}", f"{self.seconds(finding.time):g} s", finding.figures]
+        return ", ".join(part for part in parts if part)
+
+    def document(self) -> dict[str, Any]:
+        """Values of JSON. ``plans``: those that were not carried on, anchors among them; ``unchecked``: pairs
+        left out, by why."""
+        pairs, nearest = self.pairs, self.pairs.nearest
+        return {
+            "certified": self.certified,
+            "vehicles": len(self.histories),
+            "epochs": len(pairs.epochs),
+            "pairs": pairs.checked,
+            "unchecked": {"farewell": pairs.farewell, "resting": pairs.resting},
+            "least_m": None if nearest is None else nearest.distance,
+            "least_s": None if nearest is None else self.seconds(nearest.epoch),
+            "least_between": None if nearest is None else list(nearest.who),
+            "required_m": self.required,
+            "plans": len(self.steps(Kind.FIRST, Kind.MADE, Kind.ANCHOR)),
+            "carried_on": len(self.steps(Kind.CARRIED_ON)),
+            "anchors": len(self.steps(Kind.ANCHOR)),
+            "farewells": sum(len(history.leaves) for history in self.histories),
+            "damaged_records": self.damaged,
+            "findings": [
+                {"what": f.what, "who": list(f.who), "when_s": self.seconds(f.time), "figures": f.figures}
+                for f in self.findings
+            ],
+        }
+
+
+def judge(evidence: Evidence) -> Verdict:
+    """The verdict on a run."""
+    terms, logs = evidence
+    histories, findings = [], _strange(terms, logs)
+    for system in terms.fleet:
+        found, wrong = history(system, terms, logs)
+        histories.append(found)
+        findings += wrong
+    pairs = check(histories, terms)
+    began = min(pairs.epochs, default=0)
+    findings += [*pairs.findings, *_absent(histories, logs, began)]
+    findings.sort(key=lambda finding: (finding.time, finding.who))
+    damaged = sum(log.damaged for log in logs)
+    return Verdict(tuple(histories), pairs, terms.required, damaged, began, tuple(findings))
+
+
+def _strange(terms: Terms, logs: tuple[Log, ...]) -> list[Finding]:
+    """Payloads that are no plan, and plans of those of whom nobody knows."""
+    known = terms.apart.union(terms.fleet)
+    findings = [
+        Finding("what is no plan was sent as one", (one.sender, one.owner), one.time, f"{one.copies} times")
+        for log in logs
+        for one in log.garbled
+    ]
+    strangers = {s.sender: s.time for log in logs for s in log.sightings if s.sender not in known}
+    findings += [
+        Finding("a plan of one that is not of the fleet", (system,), time, "")
+        for system, time in strangers.items()
+    ]
+    return findings
+
+
+def _absent(histories: list[History], logs: tuple[Log, ...], began: int) -> list[Finding]:
+    """Those of whom too little is left."""
+    owners = {log.owner for log in logs}
+    findings = [
+        Finding("no log of its own that can be read", (one.system,), began, "its plans are as heard")
+        for one in histories
+        if one.system not in owners
+    ]
+    findings += [
+        Finding("no plan of its own", (one.system,), began, "nothing of it is certified")
+        for one in histories
+        if not one.steps
+    ]
+    return findings
