@@ -1,0 +1,83 @@
+"""The scenes that every planner is measured on: a seed to a scenario, which ``outrider`` flies too.
+
+Whoever takes part is placed by `places`, and so stands where ``outrider`` puts it with the same seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from outrider.errors import InputError
+from outrider.resources import find
+from outrider.scenario import Scenario
+from outrider.starts import Array, Starts, starts
+from outrider.streams import Stream, stream
+from outrider.yaml_file import load
+
+VEHICLES, SIDE, HEIGHT, APART = 12, 12.0, 5.0, 1.5
+"""Of a crowd: how many fly, the side of their square (m), their height (m), and how far any two starts, and
+any two goals, are apart (m)."""
+_TRIES = 100_000
+"""Places that are drawn before a square counts as full. A dozen takes about twenty."""
+
+Scene = Callable[[int], Scenario]
+
+
+def antipodal_8(_seed: int) -> Scenario:
+    """The shipped swap of eight on a circle of 8 m; the seed acts in `places`, where starts are jittered."""
+    return _shipped("antipodal-8")
+
+
+def antipodal_16(_seed: int) -> Scenario:
+    """The shipped swap of sixteen on a circle of 12 m."""
+    return _shipped("antipodal-16")
+
+
+def crowd(seed: int) -> Scenario:
+    """Random starts and goals in a square; everything else as in the swap of eight."""
+    document = _shipped("antipodal-8").model_dump(mode="json")
+    document |= {
+        "name": f"crowd-{VEHICLES}",
+        "description": f"{VEHICLES} vehicles, random starts and goals in a square of {SIDE:g} m, seed {seed}",
+        "task": "goto",
+        "vehicles": VEHICLES,
+        "starts": {
+            "kind": "points",
+            "at": scattered(stream(seed, Stream.SCENE_STARTS)).tolist(),
+            "goals": scattered(stream(seed, Stream.SCENE_GOALS)).tolist(),
+        },
+    }
+    return Scenario.model_validate(document)
+
+
+SCENES: Mapping[str, Scene] = {
+    "antipodal-8": antipodal_8,
+    "antipodal-16": antipodal_16,
+    f"crowd-{VEHICLES}": crowd,
+}
+
+
+def places(scenario: Scenario, seed: int) -> Starts:
+    """Where all start and must go, as in a flight of ``outrider``."""
+    return starts(scenario, seed, scenario.companion.planar)
+
+
+def scattered(
+    random: np.random.Generator, count: int = VEHICLES, side: float = SIDE, apart: float = APART
+) -> Array:
+    """Places (count, 3), fleet-local ENU, m, at `HEIGHT`, evenly drawn in a square around the origin and kept
+    if ``apart`` from all before; whole millimetres. InputError if there is no room."""
+    found = np.empty((0, 2))
+    for _ in range(_TRIES):
+        place = np.round(random.uniform(-side / 2.0, side / 2.0, 2), 3) + 0.0
+        if (np.linalg.norm(found - place, axis=1) >= apart).all():
+            found = np.vstack([found, place])
+        if len(found) == count:
+            return np.column_stack([found, np.full(count, HEIGHT)])
+    raise InputError(f"{count} places {apart:g} m apart are too many for a square of {side:g} m")
+
+
+def _shipped(name: str) -> Scenario:
+    return load(find("scenarios", name), Scenario)
