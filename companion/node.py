@@ -27,7 +27,7 @@ from companion.sharing import Sharing
 from companion.world import View, World
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, LocalFrame
-from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source, Tunnel
+from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source, Timesync, Tunnel
 from mavlink_bridge.node import Datagram
 
 COMPONENT = 195
@@ -146,7 +146,7 @@ class Companion:
                     continue
                 if link == "autopilot":
                     self.pilot.hear(message)
-                if self._certified is not None and link == "swarm" and isinstance(message, Tunnel):
+                if self._certified is not None and link == "swarm" and isinstance(message, Tunnel | Timesync):
                     self._certified.hear(now, message)
                 else:
                     self.world.hear(now, link, message)

@@ -8,7 +8,7 @@ AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1: other components of the vehicle have no say in where it is."""
 _WANTED = {
     "autopilot": {0, 1, 30, 32, 49, 77, 245, 253},
-    "swarm": {33, 385},
+    "swarm": {33, 111, 385},
     "target": {33},
     "ground": {75, 76},
 }

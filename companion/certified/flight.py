@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from companion.certified.clocks import ClockWatch
 from companion.certified.keeper import Keeper, Why
 from companion.certified.ledger import Ledger
 from companion.certified.program import Program, Wish
@@ -15,7 +16,7 @@ from companion.planner import Aim
 from companion.world import View, World
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, Source, Tunnel
+from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack
 from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
 from mavlink_bridge.roster_wire import Roster
@@ -42,6 +43,8 @@ class CertifiedFlight:
             certified.epoch_us,
             fleet.fingerprint,
         )
+        self.clocks = ClockWatch(own, certified.clock_us)
+        self._replies: list[Timesync] = []
         self._surroundings = Surroundings(config, steps)
         seconds = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
         self._before_end: Array = seconds - seconds[-1]
@@ -57,9 +60,12 @@ class CertifiedFlight:
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
         """From now to the end of the plan that is made next, s, at most."""
 
-    def hear(self, now: int, message: Tunnel) -> None:
-        """A TUNNEL on the swarm link."""
+    def hear(self, now: int, message: Tunnel | Timesync) -> None:
+        """A TUNNEL or TIMESYNC on the swarm link."""
         system = message.source.system
+        if isinstance(message, Timesync):
+            self._replies += self.clocks.hear(now, message)
+            return
         if message.payload_type == PAYLOAD_TYPE:
             self.ledger.hear_plan(now, system, message.payload)
         elif message.payload_type == ROSTER:
@@ -82,10 +88,11 @@ class CertifiedFlight:
         cannot wait any longer."""
         if not self.keeper.turn(now):
             return False
-        if not self.ledger.missing(self.keeper.epoch(now)):
+        wrong = not self.clocks.wrong.isdisjoint(self.ledger.members)
+        if not wrong and not self.ledger.missing(self.keeper.epoch(now)):
             return True
         if self.keeper.last_call(now):
-            self.keeper.carry_on(Why.MISSING)
+            self.keeper.carry_on(Why.CLOCK if wrong else Why.MISSING)
         return False
 
     def watch(self, now: int, measured: Motion) -> None:
@@ -120,7 +127,8 @@ class CertifiedFlight:
     def idle(self, now: int) -> bool:
         """Whether there is nothing to make or to tell until something else is due."""
         following = self.keeper.following
-        return following is not None and now < following.epoch and now < self._next_told
+        waiting = following is not None and now < following.epoch and now < self._next_told
+        return waiting and not self._replies
 
     def horizon(self) -> Horizon | None:
         """What is flown."""
@@ -129,12 +137,15 @@ class CertifiedFlight:
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
         """What is to be told on the swarm link now: the newest plan, at once and then from time to time, and
         whom it was made with."""
+        sync: list[Message] = [*self._replies, *self.clocks.due(now)]
+        self._replies.clear()
         told = self.keeper.told() if self._steers or farewell else None
         if told is None or (told.epoch == self._told_epoch and now < self._next_told):
-            return []
+            return sync
         self._told_epoch, self._next_told = told.epoch, now + self._config.certified.repeat_us
         roster = Roster(told.epoch, self.ledger.members, farewell)
         return [
+            *sync,
             Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(told)),
             Tunnel(self._own, 0, 0, ROSTER, pack_roster(roster)),
         ]

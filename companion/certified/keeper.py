@@ -26,6 +26,7 @@ class Why(Enum):
     """Why a plan was carried on instead of made anew."""
 
     MISSING = "a plan of somebody who counts has not arrived"
+    CLOCK = "the clock of somebody who counts is wrong, or our own"
     UNSOLVED = "no plan that keeps all planes was found"
 
 
