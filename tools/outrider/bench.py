@@ -24,6 +24,7 @@ from mavlink_bridge.frames import FleetFrame, enu_to_ned
 from mavlink_bridge.messages import GlobalPosition, Source, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
 from mavlink_bridge.tlog import TlogWriter, read_tlog
+from outrider import bench_certified
 from outrider.flight import Flight
 from outrider.resources import config_root, find
 from outrider.scenario import Scenario
@@ -56,7 +57,7 @@ def measure(progress: Progress, *, quick: bool) -> dict[str, object]:
     steps, piqp = plan_step(rounds)
     progress("physics", 0.2)
     figures: dict[str, object] = {
-        "plan_step_ms": {"field": _levels(steps)},
+        "plan_step_ms": {"field": _levels(steps), "certified": _levels(bench_certified.plan_step(rounds))},
         "piqp_ms": _levels(piqp),
         "piqp_share": round(float(np.median(piqp) / np.median(steps)), 3),
         "vehicle_steps_per_cpu_s": physics(rounds),
