@@ -81,6 +81,7 @@ def nearest(triangles: Array) -> Array:
     margins = np.einsum("kci,kvi->kcv", candidates, triangles).min(axis=2)
     best = margins.argmax(axis=1)
     result: Array = candidates[np.arange(len(best)), best]
+    result[~result.any(axis=1)] = (1.0, 0.0, 0.0)
     return result
 
 
@@ -98,8 +99,10 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _unit(vectors: Array) -> Array:
+    """Of (k, c, 3); what is too short to have a direction is no direction. Some fixed one instead would win
+    now and then by a rounding error, on one side only."""
     norm = np.sqrt(np.einsum("kci,kci->kc", vectors, vectors))
     short = norm < _TINY
     result: Array = vectors / np.where(short, 1.0, norm)[..., None]
-    result[short] = (1.0, 0.0, 0.0)
+    result[short] = 0.0
     return result

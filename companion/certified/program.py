@@ -113,8 +113,11 @@ class Program:
         c = self._cost(free[:, 2], state.velocity, state.before, wish)
         rows = _Rows(self, free, state, planes)
         active = rows.values(state.committed) < _NEAR
+        flown = state.committed.T.ravel()
+        a_max = np.maximum(self._a_max, flown)
+        a_min = np.minimum(-self._a_max, flown)
         for count in range(1, _ROUNDS + 1):
-            a, multipliers = self._attempt(c, state.velocity, *rows.chosen(active))
+            a, multipliers = self._attempt(c, state.velocity, a_min, a_max, *rows.chosen(active))
             broken = rows.values(a) < -_TOLERANCE
             if not broken.any():
                 return Answer(a, rows.pressure(active, multipliers), count)
@@ -140,12 +143,15 @@ class Program:
         )
         return c.T.ravel()
 
-    def _attempt(self, c: Array, velocity: Array, G: Array, low: Array) -> tuple[Array, Array]:
+    def _attempt(
+        self, c: Array, velocity: Array, a_min: Array, a_max: Array, G: Array, low: Array
+    ) -> tuple[Array, Array]:
         solver = piqp.DenseSolver()
         settings = solver.settings
         settings.verbose = False
         settings.preconditioner_iter = 0
-        settings.max_iter = 60
+        # Mostly 20 are enough; where the committed plan breaks limits there is hardly an interior.
+        settings.max_iter = 250
         settings.eps_abs = settings.eps_rel = 1e-7
         settings.check_duality_gap = True
         settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = 1e-5
@@ -158,8 +164,8 @@ class Program:
             np.asfortranarray(G) if some else None,
             low if some else None,
             np.full(len(low), np.inf) if some else None,
-            -self._a_max,
-            self._a_max,
+            a_min,
+            a_max,
         )
         status = solver.solve()
         result = solver.result
