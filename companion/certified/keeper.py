@@ -21,6 +21,11 @@ from companion.errors import CertificateError, CompanionError, SolverError
 from companion.horizon import Array, Horizon, Motion
 from mavlink_bridge.plan_wire import WirePlan, quantise
 
+_REPAIRS = 2
+"""Solutions more for a plan that rounding has put on the wrong side."""
+_ROUNDING = 1e-3
+"""m: what rounding may do to a place."""
+
 
 class Why(Enum):
     """Why a plan was carried on instead of made anew."""
@@ -98,22 +103,25 @@ class Keeper:
         start = self._shifted()
         corridor = planes(controls(start), others, self._config.spare, upright=self._planar)
         state = State(start.position_m, start.velocity_m_s, self._flown_until(), start.accelerations_m_s2)
-        try:
-            answer = self._program.solve(state, wish, corridor)
-            plan = committed(start, answer.accelerations)
-        except (SolverError, CertificateError):
-            self.carry_on(Why.UNSOLVED)
-            return False
-        points = controls(plan)
-        # What was rounded is what is checked: the plan that the others will hold.
-        kept = np.einsum("mnk,nik->mni", corridor.normals, points) - corridor.least
-        if kept.min(initial=np.inf) < 0.0:
-            self.carry_on(Why.UNSOLVED)
-            return False
-        push = np.einsum("mni,mnk->k", answer.pressure, corridor.normals)
-        self._stall.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
-        self.following = plan
-        return True
+        for _ in range(_REPAIRS + 1):
+            try:
+                answer = self._program.solve(state, wish, corridor)
+                plan = committed(start, answer.accelerations)
+            except (SolverError, CertificateError):
+                break
+            points = controls(plan)
+            # What was rounded is what is checked: the plan that the others will hold.
+            broken = corridor.least - np.einsum("mnk,nik->mni", corridor.normals, points)
+            if broken.max(initial=0.0) <= 0.0:
+                push = np.einsum("mni,mnk->k", answer.pressure, corridor.normals)
+                self._stall.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
+                self.following = plan
+                return True
+            # Only where the committed plan itself has nothing to spare: once more, with that much wanted.
+            more = np.where(broken > 0.0, broken + _ROUNDING, 0.0)
+            corridor = corridor._replace(wanted=corridor.wanted + more)
+        self.carry_on(Why.UNSOLVED)
+        return False
 
     def anchor(self, now: int, measured: Motion) -> None:
         """Plan the next epoch anew from the ``measured`` motion, to rest: after a jump or a push that left

@@ -69,7 +69,7 @@ def plan_step(rounds: int) -> Array:
 
 
 def _scene(config: CompanionConfig, seed: int, epoch: int) -> Scene:
-    """Eight neighbours around, 1.5 to 3 m off at nearly the same height, each on its way somewhere."""
+    """Eight neighbours around, 1.5 to 3 m off at nearly the same height, all under way together."""
     random = np.random.default_rng(seed)
     fleet = FleetFrame(47.397742, 8.545594, 488.0)
     flight = CertifiedFlight(config, Source(1, 195), fleet)
@@ -77,14 +77,14 @@ def _scene(config: CompanionConfig, seed: int, epoch: int) -> Scene:
     here = np.array([0.0, 0.0, 5.0])
     around = 2.0 * np.pi * (np.arange(_NEIGHBOURS) + random.uniform(-0.2, 0.2, _NEIGHBOURS)) / _NEIGHBOURS
     reach = random.uniform(1.5, 3.0, _NEIGHBOURS)
-    for k in range(_NEIGHBOURS):
-        place = here + reach[k] * np.array([np.cos(around[k]), np.sin(around[k]), 0.0])
-        speed = random.normal(0.0, 0.5, 3) * (1.0, 1.0, 0.1)
-        plan = _braking(config, epoch, place, speed, fleet.fingerprint)
-        flight.hear(epoch, Tunnel(Source(20 + k, 195), 0, 0, PAYLOAD_TYPE, pack(plan)))
     angle = random.uniform(0.0, 2.0 * np.pi)
     course = np.array([np.cos(angle), np.sin(angle), 0.0])
-    own = _braking(config, epoch, here, 0.5 * course, fleet.fingerprint)
+    for k in range(_NEIGHBOURS):
+        place = here + reach[k] * np.array([np.cos(around[k]), np.sin(around[k]), 0.0])
+        speed = course + random.uniform(-0.15, 0.15, 3) * (1.0, 1.0, 0.1)
+        plan = _braking(config, epoch, place, speed, fleet.fingerprint)
+        flight.hear(epoch, Tunnel(Source(20 + k, 195), 0, 0, PAYLOAD_TYPE, pack(plan)))
+    own = _braking(config, epoch, here, course, fleet.fingerprint)
     return Scene(flight, world, own, standing(here + 8.0 * course, np.array([2.0, 2.0, 0.0])))
 
 
