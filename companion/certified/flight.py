@@ -117,7 +117,10 @@ class CertifiedFlight:
 
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
         """What is to be told on the swarm link now: the newest plan, at once and then from time to time, and
-        whom it was made with."""
+        whom it was made with. ``farewell``: it makes no other; that is said once it flies the last."""
+        if farewell:
+            self.keeper.turn(now)
+            farewell = self.keeper.following is None
         told = self.keeper.told()
         if told is None or (told.epoch == self._told_epoch and now < self._next_told):
             return []
