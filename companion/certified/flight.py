@@ -50,7 +50,7 @@ class CertifiedFlight:
         """Distance (m) of the vehicle from its plan, now and at most."""
         self.left_tube = 0
         """How often it got out of the tube."""
-        self._outside = False
+        self._outside = self._steers = False
         self._next_told = 0
         self._told_epoch = -1
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
@@ -68,12 +68,23 @@ class CertifiedFlight:
                 self.ledger.refused += 1
 
     def stand(self, now: int, position: Array) -> None:
-        """Not steering yet: the plan is to stand at ``position`` (3,)."""
-        self.keeper.begin(now, position)
+        """Not steering, not yet or just again: the plan is to stand at ``position`` (3,), and nobody is told
+        before it steers. But a plan in whose tube the vehicle still is goes on, and so does one that was told
+        for this epoch: others count on it."""
+        keeper, horizon = self.keeper, self.keeper.horizon()
+        if horizon is not None:
+            off = horizon.at(now).position - position
+            inside = float(off @ off) <= self._config.certified.tube**2
+            if inside or self._told_epoch >= keeper.epoch(now):
+                keeper.turn(now)
+                return
+        keeper.begin(now, position)
+        self._steers = False
 
     def due(self, now: int) -> bool:
         """Whether the next epoch's plan is to be made now, one way or the other. Carries on by itself what
         cannot wait any longer."""
+        self._steers = True
         if not self.keeper.turn(now):
             return False
         if not self.ledger.missing(self.keeper.epoch(now)):
@@ -122,7 +133,9 @@ class CertifiedFlight:
             self.keeper.turn(now)
             farewell = self.keeper.following is None
         told = self.keeper.told()
-        if told is None or (told.epoch == self._told_epoch and now < self._next_told):
+        if told is None or not (self._steers or farewell):
+            return []
+        if told.epoch == self._told_epoch and now < self._next_told:
             return []
         self._told_epoch, self._next_told = told.epoch, now + self._config.certified.repeat_us
         roster = Roster(told.epoch, self.ledger.members, farewell)
