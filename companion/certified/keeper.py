@@ -12,7 +12,7 @@ from enum import Enum
 
 import numpy as np
 
-from companion.certified.committed import carried_on, committed, controls, horizon_of, resting
+from companion.certified.committed import carried_on, committed, controls, horizon_of, resting, rounding
 from companion.certified.corridor import Others, planes
 from companion.certified.program import Program, State, Wish
 from companion.certified.settings import CertifiedConfig
@@ -47,6 +47,7 @@ class Keeper:
     ) -> None:
         self._config, self._program, self._stall, self._origin = config, program, stall, origin
         self._planar = planar
+        self._rounding = rounding(program.n, config.dt_us)
         self.current: WirePlan | None = None
         self.following: WirePlan | None = None
         self.held: dict[Why, int] = dict.fromkeys(Why, 0)
@@ -94,22 +95,24 @@ class Keeper:
         start = self._shifted()
         corridor = planes(controls(start), others, self._config.spare, upright=self._planar)
         state = State(start.position_m, start.velocity_m_s, self._flown_until(), start.accelerations_m_s2)
-        try:
-            answer = self._program.solve(state, wish, corridor)
-            plan = committed(start, answer.accelerations)
-        except (SolverError, CertificateError):
-            self.carry_on(Why.UNSOLVED)
-            return False
-        points = controls(plan)
-        # What was rounded is what is checked: the plan that the others will hold.
-        kept = np.einsum("mnk,nik->mni", corridor.normals, points) - corridor.least
-        if kept.min(initial=np.inf) < 0.0:
-            self.carry_on(Why.UNSOLVED)
-            return False
-        push = np.einsum("mni,mnk->k", answer.pressure, corridor.normals)
-        self._stall.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
-        self.following = plan
-        return True
+        # Where there is no room, rounding breaks what is just kept: then a little more is asked for.
+        firmly = np.maximum(corridor.wanted, corridor.least + self._rounding)
+        for asked in (corridor, corridor._replace(wanted=firmly)):
+            try:
+                answer = self._program.solve(state, wish, asked)
+                plan = committed(start, answer.accelerations)
+            except (SolverError, CertificateError):
+                continue
+            points = controls(plan)
+            # What was rounded is what is checked: the plan that the others will hold.
+            kept = np.einsum("mnk,nik->mni", corridor.normals, points) - corridor.least
+            if kept.min(initial=np.inf) >= 0.0:
+                push = np.einsum("mni,mnk->k", answer.pressure, corridor.normals)
+                self._stall.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
+                self.following = plan
+                return True
+        self.carry_on(Why.UNSOLVED)
+        return False
 
     def anchor(self, now: int, measured: Motion) -> None:
         """Plan the next epoch anew from the ``measured`` motion, to rest: after a jump or a push that left

@@ -190,7 +190,8 @@ class _Rows:
         # The first control point is where the vehicle is, whatever it does.
         wanted[:, 0, 0] = -np.inf
         self._low: Array = np.concatenate([program._limits_low - none, wanted.ravel()])
-        self._low -= np.maximum(-self.values(state.committed), 0.0)
+        # The planes are never broken by it: what they want beyond it is wanted.
+        self._low[: self._split] -= np.maximum(-self.values(state.committed)[: self._split], 0.0)
 
     def values(self, a: Array) -> Array:
         """By how much each row holds with accelerations (n, 3)."""
