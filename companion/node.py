@@ -226,12 +226,13 @@ class Companion:
         """As committed; the next epoch's plan when it is due."""
         if not self.pilot.guided:
             flight.stand(now, measured.position)
-        else:
-            flight.steer()
-            if not stale:
-                flight.watch(now, measured)
+        elif not stale:
+            flight.watch(now, measured)
         if self.pilot.guided and flight.due(now):
             started = self._stopwatch()
+            if self.pilot.phase is Phase.SETTLE:
+                here = np.broadcast_to(measured.position, (self.config.horizon.steps + 1, 3))
+                self._obstacles = self.world.obstacles(now, view, here)
             try:
                 aim = None if stale else self._aim(now, view, measured)
             except SurfaceError:

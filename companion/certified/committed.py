@@ -8,6 +8,8 @@ a receiver makes of the bytes.
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 import numpy.typing as npt
 
@@ -57,6 +59,14 @@ def committed(start: WirePlan, accelerations: Array) -> WirePlan:
     rounded[-1] = -np.array(start.velocity) - rounded[:-1].sum(axis=0)
     knots: tuple[Integers, ...] = tuple((x, y, z) for x, y, z in rounded.tolist())
     return start._replace(accelerations=knots)
+
+
+def rounding(steps: int, dt: int) -> Array:
+    """How far (n, 3) m rounding moves the control points of a plan, at most: half a unit an acceleration."""
+    n = np.arange(steps)
+    units = np.stack([n**2, n**2 + n, (n + 1) ** 2], axis=1)
+    result: Array = 0.25 * sqrt(3.0) * _MM * (dt * 1e-6) ** 2 * units
+    return result
 
 
 def controls(plan: WirePlan) -> Array:

@@ -53,8 +53,7 @@ class CertifiedFlight:
         """Distance (m) of the vehicle from its plan, now and at most."""
         self.left_tube = 0
         """How often it got out of the tube."""
-        self._outside = False
-        self._steers = False
+        self._outside = self._steers = False
         self._next_told = 0
         self._told_epoch = -1
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
@@ -75,17 +74,23 @@ class CertifiedFlight:
                 self.ledger.refused += 1
 
     def stand(self, now: int, position: Array) -> None:
-        """Not steering: to stand at ``position`` (3,) is all, and nothing is told of it."""
-        self.keeper.begin(now, position)
+        """Not steering, not yet or just again: the plan is to stand at ``position`` (3,), and nobody is told
+        before it steers. But a plan in whose tube the vehicle still is goes on, and so does one that was told
+        for this epoch: others count on it."""
+        keeper, horizon = self.keeper, self.keeper.horizon()
+        if horizon is not None:
+            off = horizon.at(now).position - position
+            inside = float(off @ off) <= self._config.certified.tube**2
+            if inside or self._told_epoch >= keeper.epoch(now):
+                keeper.turn(now)
+                return
+        keeper.begin(now, position)
         self._steers = False
-
-    def steer(self) -> None:
-        """What is planned is flown from now on."""
-        self._steers = True
 
     def due(self, now: int) -> bool:
         """Whether the next epoch's plan is to be made now, one way or the other. Carries on by itself what
         cannot wait any longer."""
+        self._steers = True
         if not self.keeper.turn(now):
             return False
         wrong = not self.clocks.wrong.isdisjoint(self.ledger.members)
@@ -136,12 +141,18 @@ class CertifiedFlight:
 
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
         """What is to be told on the swarm link now: the newest plan, at once and then from time to time, and
-        whom it was made with."""
+        whom it was made with. ``farewell``: it makes no other; that is said once it flies the last."""
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()
-        told = self.keeper.told() if self._steers or farewell else None
-        if told is None or (told.epoch == self._told_epoch and now < self._next_told):
+        if farewell:
+            self.keeper.turn(now)
+            farewell = self.keeper.following is None
+        told = self.keeper.told()
+        if told is None or not (self._steers or farewell):
             return sync
+        if told.epoch == self._told_epoch and now < self._next_told:
+            return sync
+        self.keeper.told_until = told.epoch
         self._told_epoch, self._next_told = told.epoch, now + self._config.certified.repeat_us
         roster = Roster(told.epoch, self.ledger.members, farewell)
         return [

@@ -12,7 +12,7 @@ from enum import Enum
 
 import numpy as np
 
-from companion.certified.committed import carried_on, committed, controls, horizon_of, resting
+from companion.certified.committed import carried_on, committed, controls, horizon_of, resting, rounding
 from companion.certified.corridor import Others, planes
 from companion.certified.program import Program, State, Wish
 from companion.certified.settings import CertifiedConfig
@@ -20,11 +20,6 @@ from companion.certified.stall import StallTurn
 from companion.errors import CertificateError, CompanionError, SolverError
 from companion.horizon import Array, Horizon, Motion
 from mavlink_bridge.plan_wire import WirePlan, quantise
-
-_REPAIRS = 2
-"""Solutions more for a plan that rounding has put on the wrong side."""
-_ROUNDING = 1e-3
-"""m: what rounding may do to a place."""
 
 
 class Why(Enum):
@@ -53,7 +48,9 @@ class Keeper:
     ) -> None:
         self._config, self._program, self._stall, self._origin = config, program, stall, origin
         self._planar = planar
-        self._told = 0
+        self._rounding = rounding(program.n, config.dt_us)
+        self.told_until = 0
+        """The last epoch (µs) of which a plan was told."""
         self.current: WirePlan | None = None
         self.following: WirePlan | None = None
         self.held: dict[Why, int] = dict.fromkeys(Why, 0)
@@ -68,7 +65,7 @@ class Keeper:
         been told."""
         epoch, steps = self.epoch(now), self._program.n
         self.current = resting(epoch, self._config.dt_us, steps, position, self._origin)
-        free = max(epoch, self._told) + self._config.epoch_us
+        free = max(epoch, self.told_until) + self._config.epoch_us
         self.following = self.current._replace(epoch=free)
 
     def turn(self, now: int) -> bool:
@@ -103,23 +100,22 @@ class Keeper:
         start = self._shifted()
         corridor = planes(controls(start), others, self._config.spare, upright=self._planar)
         state = State(start.position_m, start.velocity_m_s, self._flown_until(), start.accelerations_m_s2)
-        for _ in range(_REPAIRS + 1):
+        # Where there is no room, rounding breaks what is just kept: then a little more is asked for.
+        firmly = np.maximum(corridor.wanted, corridor.least + self._rounding)
+        for asked in (corridor, corridor._replace(wanted=firmly)):
             try:
-                answer = self._program.solve(state, wish, corridor)
+                answer = self._program.solve(state, wish, asked)
                 plan = committed(start, answer.accelerations)
             except (SolverError, CertificateError):
-                break
+                continue
             points = controls(plan)
             # What was rounded is what is checked: the plan that the others will hold.
-            broken = corridor.least - np.einsum("mnk,nik->mni", corridor.normals, points)
-            if broken.max(initial=0.0) <= 0.0:
+            kept = np.einsum("mnk,nik->mni", corridor.normals, points) - corridor.least
+            if kept.min(initial=np.inf) >= 0.0:
                 push = np.einsum("mni,mnk->k", answer.pressure, corridor.normals)
                 self._stall.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
                 self.following = plan
                 return True
-            # Only where the committed plan itself has nothing to spare: once more, with that much wanted.
-            more = np.where(broken > 0.0, broken + _ROUNDING, 0.0)
-            corridor = corridor._replace(wanted=corridor.wanted + more)
         self.carry_on(Why.UNSOLVED)
         return False
 
@@ -154,9 +150,7 @@ class Keeper:
 
     def told(self) -> WirePlan | None:
         """The plan that others are to know now."""
-        plan = self.current if self.following is None else self.following
-        self._told = self._told if plan is None else max(self._told, plan.epoch)
-        return plan
+        return self.current if self.following is None else self.following
 
     def _flown_until(self) -> Array:
         """The acceleration (3,) with which this epoch ends."""

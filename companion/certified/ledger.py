@@ -3,14 +3,15 @@
 Plans are filed by the epoch they begin at. A vehicle replans in an epoch only if it holds the plan of that
 very epoch of everybody it counts with (``missing`` is empty): an older one will not do, for its sender may
 have made another since. Who was once heard with a plan counts from then on, and so does whoever one of those
-counts with; who has said farewell stays where its last plan ends.
+counts with; who has said farewell flies its last plan to the end and stays there. That is believed only with
+the very plan that the farewell goes with: an older one may end elsewhere.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from companion.certified.committed import controls, rests
+from companion.certified.committed import carried_on, controls, rests
 from companion.horizon import Array
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.plan_wire import WirePlan, unpack
@@ -76,16 +77,20 @@ class Ledger:
                 del filed[epoch]
 
     def hear_roster(self, now: int, system: int, roster: Roster) -> None:
-        """Whom a member counts with. A farewell leaves its last plan where it ends."""
+        """Whom a member counts with. A farewell says that its plan of that epoch is its last; whoever has
+        not got that plan yet, or is not in that epoch yet, hears it again."""
         if system == self._own:
             return
         last = self._rosters.get(system)
         if last is not None and roster.epoch < last.epoch:
             return
+        left = self._left.get(system)
+        if left is not None and roster.epoch <= left.plan.epoch:
+            return
         if roster.farewell:
-            plans = self._plans.get(system)
-            if plans:
-                self._left[system] = plans[max(plans)]
+            filed = self._plans.get(system, {}).get(roster.epoch)
+            if filed is not None and roster.epoch <= now:
+                self._left[system] = filed
             return
         self._left.pop(system, None)
         self._rosters[system] = roster
@@ -100,12 +105,12 @@ class Ledger:
         return found
 
     def plans(self, epoch: int) -> dict[int, Filed]:
-        """Plans of ``epoch`` (µs) by system id, of members."""
-        return {
-            system: filed[epoch]
-            for system, filed in sorted(self._plans.items())
-            if epoch in filed and system not in self._left
-        }
+        """Plans of ``epoch`` (µs), that of now, by system id: of members and of those who left."""
+        found = {system: filed[epoch] for system, filed in self._plans.items() if epoch in filed}
+        for system, last in self._left.items():
+            plan = carried_on(last.plan, (epoch - last.plan.epoch) // self._dt)
+            found[system] = Filed(plan, controls(plan))
+        return dict(sorted(found.items()))
 
     @property
     def left(self) -> dict[int, Filed]:

@@ -1,0 +1,182 @@
+"""What is known of the others: one plan of each for each epoch, whoever counts is never forgotten, and a
+farewell is believed only with the plan that it leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from certified_plans import DT, EPOCH, STEPS
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.certified.committed import carried_on, committed, controls, resting
+from companion.certified.ledger import Ledger
+from companion.horizon import Array
+from mavlink_bridge.plan_wire import WirePlan, pack
+from mavlink_bridge.roster_wire import Roster
+
+OWN, OTHER, THIRD = 1, 2, 3
+ORIGIN = 7
+LENGTH = 200_000
+NOW = EPOCH + 30_000
+
+
+def ledger(expected: frozenset[int] = frozenset()) -> Ledger:
+    return Ledger(OWN, expected, STEPS, DT, LENGTH, ORIGIN)
+
+
+def plan(epoch: int = 0, x: float = 0.0, speed: float = 0.0) -> WirePlan:
+    """From (x, 0, 5) m on, in epoch number ``epoch``, braking from ``speed`` (m/s)."""
+    start = resting(EPOCH + epoch * LENGTH, DT, STEPS, (x, 0.0, 5.0), ORIGIN)
+    start = start._replace(velocity=(round(speed / (1e-9 * DT)), 0, 0))
+    slowing: Array = -start.velocity_m_s / (1e-6 * DT * STEPS) + 0.0 * start.accelerations_m_s2
+    return committed(start, slowing)
+
+
+def hear(book: Ledger, system: int, what: WirePlan, *members: int, now: int = NOW, bye: bool = False) -> None:
+    book.hear_plan(now, system, pack(what))
+    book.hear_roster(now, system, Roster(what.epoch, frozenset(members), bye))
+
+
+@given(st.integers(0, 8 * 128 - 1), st.lists(st.booleans(), min_size=1, max_size=6))
+def test_a_plan_altered_in_one_bit_is_never_held_beside_the_true_one(bit: int, order: list[bool]) -> None:
+    """It is refused, or it is the only one of its epoch that is ever held: whichever comes first."""
+    true = pack(plan(speed=1.0))
+    altered = bytearray(true)
+    altered[bit // 8] ^= 1 << bit % 8
+    book, first = ledger(), None
+    for intact in order:
+        book.hear_plan(NOW, OTHER, true if intact else bytes(altered))
+        held = [filed.plan for filed in book.plans(EPOCH).values()]
+        first = held[0] if first is None and held else first
+        assert held == ([] if first is None else [first])
+        assert len(held) <= 1
+    if first is not None:
+        different = sum(intact != (pack(first) == true) for intact in order)
+        assert book.refused == different
+        np.testing.assert_array_equal(book.plans(EPOCH)[OTHER].controls, controls(first))
+    else:
+        assert not any(order)
+        assert book.refused == len(order)
+
+
+@given(st.binary(max_size=140))
+def test_any_other_bytes_are_refused(data: bytes) -> None:
+    book = ledger()
+    book.hear_plan(NOW, OTHER, data)
+    assert book.refused == 1
+    assert not book.members
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        plan()._replace(origin=8),
+        plan()._replace(dt=100_000),
+        plan()._replace(epoch=EPOCH + 4),
+        plan(epoch=5),
+        plan(epoch=-5),
+        plan()._replace(velocity=(1, 0, 0)),
+        plan()._replace(accelerations=plan().accelerations[:-1]),
+    ],
+    ids=["frame", "step", "between epochs", "far ahead", "long ago", "does not rest", "short"],
+)
+def test_what_cannot_be_a_committed_plan_is_refused(bad: WirePlan) -> None:
+    book = ledger()
+    book.hear_plan(NOW, OTHER, pack(bad))
+    assert book.refused == 1
+    assert not book.members
+
+
+def test_who_is_expected_is_missing_until_its_plan_of_the_epoch_is_here_and_it_counts_with_us() -> None:
+    book = ledger(frozenset({OWN, OTHER}))
+    assert book.missing(EPOCH) == {OTHER}
+    book.hear_plan(NOW, OTHER, pack(plan()))
+    assert book.missing(EPOCH) == {OTHER}
+    book.hear_roster(NOW, OTHER, Roster(EPOCH, frozenset({OWN})))
+    assert not book.missing(EPOCH)
+    assert book.missing(EPOCH + LENGTH) == {OTHER}
+    book.hear_roster(NOW, OTHER, Roster(EPOCH + LENGTH, frozenset({THIRD})))
+    assert book.missing(EPOCH) == {OTHER, THIRD}
+
+
+def test_whoever_one_counts_with_counts_and_is_never_forgotten() -> None:
+    book = ledger()
+    hear(book, OTHER, plan(), OWN, THIRD)
+    assert book.members == {OTHER, THIRD}
+    assert book.missing(EPOCH) == {THIRD}
+    hear(book, THIRD, plan(x=3.0), OWN, OTHER)
+    assert not book.missing(EPOCH)
+    for epoch in range(1, 12):
+        now = NOW + epoch * LENGTH
+        hear(book, OTHER, plan(epoch), OWN, now=now)
+        assert book.members == {OTHER, THIRD}
+        assert book.missing(EPOCH + epoch * LENGTH) == {THIRD}
+
+
+def test_of_two_rosters_the_later_epoch_counts_whichever_comes_last() -> None:
+    book = ledger()
+    hear(book, OTHER, plan(1), OWN)
+    book.hear_roster(NOW, OTHER, Roster(EPOCH, frozenset()))
+    assert not book.missing(EPOCH + LENGTH)
+
+
+def test_its_own_words_are_not_news() -> None:
+    book = ledger()
+    hear(book, OWN, plan(), OTHER)
+    assert not book.members
+    assert not book.plans(EPOCH)
+
+
+class TestFarewell:
+    def test_who_left_is_neither_a_member_nor_missing(self) -> None:
+        book = ledger(frozenset({OTHER}))
+        hear(book, OTHER, plan(), OWN)
+        hear(book, OTHER, plan(), OWN, bye=True)
+        assert not book.members
+        assert not book.missing(EPOCH + 3 * LENGTH)
+        assert book.left[OTHER].plan == plan()
+
+    def test_its_last_plan_is_flown_to_the_end(self) -> None:
+        book, last = ledger(), plan(speed=2.0)
+        hear(book, OTHER, last, OWN)
+        hear(book, OTHER, last, OWN, bye=True)
+        for epoch in (0, 1, 7, 40):
+            assert book.plans(EPOCH + epoch * LENGTH)[OTHER].plan == carried_on(last, epoch)
+
+    def test_it_is_not_believed_without_the_plan_that_it_goes_with(self) -> None:
+        """An older one may end elsewhere."""
+        book = ledger()
+        hear(book, OTHER, plan(), OWN)
+        later = NOW + LENGTH
+        book.hear_roster(later, OTHER, Roster(EPOCH + LENGTH, frozenset({OWN}), farewell=True))
+        assert book.missing(EPOCH + LENGTH) == {OTHER}
+        assert not book.left
+        hear(book, OTHER, plan(1, x=0.5), OWN, now=later, bye=True)
+        assert not book.missing(EPOCH + LENGTH)
+        assert book.left[OTHER].plan == plan(1, x=0.5)
+
+    def test_it_is_not_believed_before_its_epoch(self) -> None:
+        """Until then another plan is flown."""
+        book = ledger()
+        hear(book, OTHER, plan(1), OWN, bye=True)
+        assert book.missing(EPOCH) == {OTHER}
+        hear(book, OTHER, plan(1), OWN, bye=True, now=NOW + LENGTH)
+        assert not book.missing(EPOCH + LENGTH)
+
+    def test_what_was_said_before_it_and_comes_after_it_changes_nothing(self) -> None:
+        book = ledger()
+        hear(book, OTHER, plan(), OWN)
+        hear(book, OTHER, plan(2), OWN, bye=True, now=NOW + 2 * LENGTH)
+        hear(book, OTHER, plan(1), OWN, now=NOW + 2 * LENGTH)
+        hear(book, OTHER, plan(2), OWN, now=NOW + 2 * LENGTH)
+        assert not book.members
+        assert book.left[OTHER].plan == plan(2)
+
+    def test_who_comes_back_counts_again(self) -> None:
+        book = ledger()
+        hear(book, OTHER, plan(), OWN, bye=True)
+        hear(book, OTHER, plan(3, x=1.0), now=NOW + 3 * LENGTH)
+        assert book.missing(EPOCH + 3 * LENGTH) == {OTHER}
+        hear(book, OTHER, plan(4, x=1.0), OWN, now=NOW + 4 * LENGTH)
+        assert not book.missing(EPOCH + 4 * LENGTH)
