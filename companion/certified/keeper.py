@@ -52,6 +52,9 @@ class Keeper:
         self.told_until = 0
         """The last epoch (µs) of which a plan was told."""
         self.current: WirePlan | None = None
+        nothing = resting(0, config.dt_us, program.n, np.zeros(3), origin)
+        # A plan, the same from the next epoch on, and the control points of that: asked for several times.
+        self._carried: tuple[WirePlan | None, WirePlan, Array] = (nothing, nothing, controls(nothing))
         self.following: WirePlan | None = None
         self.held: dict[Why, int] = dict.fromkeys(Why, 0)
         self.anchored_anew = 0
@@ -89,7 +92,8 @@ class Keeper:
 
     def own(self) -> Array:
         """Control points (n, 3, 3) of the committed plan from the next epoch on, m."""
-        return controls(self._shifted())
+        self._shifted()
+        return self._carried[2]
 
     def start(self) -> WirePlan:
         """The committed plan from the next epoch on: where the next plan begins."""
@@ -98,7 +102,7 @@ class Keeper:
     def replan(self, wish: Wish, goal: Array, others: Others) -> bool:
         """Make the next epoch's plan; False if none was found and the old one is carried on."""
         start = self._shifted()
-        corridor = planes(controls(start), others, self._config.spare, upright=self._planar)
+        corridor = planes(self.own(), others, self._config.spare, upright=self._planar)
         state = State(start.position_m, start.velocity_m_s, self._flown_until(), start.accelerations_m_s2)
         # Where there is no room, rounding breaks what is just kept: then a little more is asked for.
         firmly = np.maximum(corridor.wanted, corridor.least + self._rounding)
@@ -163,4 +167,7 @@ class Keeper:
     def _shifted(self) -> WirePlan:
         if self.current is None:
             raise CompanionError("there is no committed plan yet")
-        return carried_on(self.current, self._config.epoch_us // self._config.dt_us)
+        if self.current is not self._carried[0]:
+            plan = carried_on(self.current, self._config.epoch_us // self._config.dt_us)
+            self._carried = self.current, plan, controls(plan)
+        return self._carried[1]
