@@ -66,6 +66,8 @@ class SerialPort(StreamLink):
             _, _, control, _, _, _, characters = termios.tcgetattr(port)
             control &= ~(termios.CSIZE | termios.PARENB | termios.CSTOPB | getattr(termios, "CRTSCTS", 0))
             control |= termios.CS8 | termios.CREAD | termios.CLOCAL
+            # Somebody may have left 0 there: then nothing to read looks like a port that is gone.
+            characters[termios.VMIN], characters[termios.VTIME] = 1, 0
             speed = self._speed
             termios.tcsetattr(port, termios.TCSANOW, [0, 0, control, 0, speed, speed, characters])
         except (OSError, termios.error) as error:

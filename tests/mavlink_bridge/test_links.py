@@ -258,6 +258,27 @@ def test_a_serial_port_changes_no_byte_and_has_its_speed() -> None:
     vehicle.close()
 
 
+def test_a_serial_port_with_nothing_to_read_is_still_there() -> None:
+    """Also if whoever had it before left VMIN = 0, by which nothing to read looks like an end."""
+    termios = pytest.importorskip("termios")
+    near, far = os.openpty()
+    tty.setraw(near)
+    tty.setraw(far)
+    found = termios.tcgetattr(far)
+    found[6][termios.VMIN], found[6][termios.VTIME] = 0, 0
+    termios.tcsetattr(far, termios.TCSANOW, found)
+    port = SerialPort(Serial(os.ttyname(far), 57600), SimulatedClock())
+    os.close(far)
+    vehicle = Terminal(near, SimulatedClock())
+    for number in range(3):
+        assert port.receive() == []
+        vehicle.send(frame(number))
+        assert gather(port, bool, [vehicle]) == [frame(number)]
+    assert port.peers == 1
+    port.close()
+    vehicle.close()
+
+
 def test_a_serial_port_that_was_pulled_out_comes_back(tmp_path: Path) -> None:
     clock, device = SimulatedClock(), tmp_path / "ttyACM0"
 

@@ -16,7 +16,6 @@ import numpy as np
 from companion.node import Tally
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.histogram import Histogram
-from mavlink_bridge.node_clock import QUANTUM
 from mavlink_bridge.realtime import RealTime
 from mavlink_bridge.runtime import Scheduled
 from outrider import names
@@ -28,7 +27,7 @@ from outrider.flight import Progress, truth_of
 from outrider.outcome import Messages, Outcome, Punctuality
 from outrider.realtime.board import Board
 from outrider.realtime.crew import Crew
-from outrider.realtime.muster import muster, rough
+from outrider.realtime.muster import muster, operators_turn, rough
 from outrider.realtime.traces import Trace, put_together
 from outrider.realtime.wiring import wire
 from outrider.realtime.workers import Remains
@@ -89,7 +88,9 @@ class RealTimeFlight:
                 behind = rough(self.fleet, operator, {"ground": None})
                 conductor = Conductor(self.scenario, self.fleet.starts, operator, start)
                 leader = _Leader(self.fleet, conductor, crew, board, self._progress)
-                every = Scheduled(behind, self.scenario.timing.companion_us, start // QUANTUM * QUANTUM)
+                every = Scheduled(
+                    behind, self.scenario.timing.companion_us, operators_turn(self.fleet, start)
+                )
                 loop = RealTime(every, wiring.operator, self._clock)
                 loop.run(lambda: self._interrupts > 1, lambda now: leader.look(now, self._interrupts > 0))
             finally:

@@ -57,7 +57,7 @@ def muster(
                 k, companion, system, logs, Seat(behind, every, wiring.companions[k], clock, board), cuts
             )
         )
-    phase = start + staggered(_slots(fleet) - 1, _slots(fleet), timing.companion_us)
+    phase = start + staggered(_slots(fleet) - 2, _slots(fleet), timing.companion_us)
     played: list[Target | MovingObstacle] = [fleet.target(), *fleet.moving()]
     for node, links in zip(played, [wiring.target, *wiring.moving], strict=True):
         behind = rough(fleet, node, {})
@@ -73,12 +73,19 @@ def turns(fleet: Fleet, k: int, start: int) -> tuple[int, int, NodeClock]:
     timing, slots, clock = fleet.scenario.timing, _slots(fleet), fleet.clock(k, start)
     turn = start + staggered(2 * k, slots, timing.companion_us)
     companion = turn + (clock.local(turn) - turn) % timing.companion_us
-    return start + staggered(2 * k + 1, slots, timing.autopilot_us), companion, clock
+    autopilot = start + staggered(2 * k + 1, slots, timing.companion_us) % timing.autopilot_us
+    return autopilot, companion, clock
+
+
+def operators_turn(fleet: Fleet, start: int) -> int:
+    """When from ``start`` (µs) on the operator is due: last, in nobody's slot."""
+    slots = _slots(fleet)
+    return start - start % QUANTUM + staggered(slots - 1, slots, fleet.scenario.timing.companion_us)
 
 
 def _slots(fleet: Fleet) -> int:
-    """One for each autopilot and companion, and one for what the harness plays."""
-    return 2 * len(fleet.systems) + 1
+    """One for each autopilot and companion, one for what the harness plays, and the operator's."""
+    return 2 * len(fleet.systems) + 2
 
 
 def staggered(k: int, count: int, period: int) -> int:
