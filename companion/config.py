@@ -15,13 +15,12 @@ from pydantic import Field, model_validator
 from companion.certified.settings import CertifiedConfig
 from companion.moving import Moving, MovingPost, MovingSphere
 from companion.obstacles import Obstacle, Post, Sphere
-from companion.settings import Settings
+from companion.settings import Positive, Settings, WireStep
 from companion.surfaces import Circle, Surface, SurfaceConfig
 
 MethodName = Literal["baseline", "swivel", "approach_angle", "tangential"]
 Avoidance = Literal["field", "certified"]
 TurningSense = Literal["own", "right", "left"]
-Positive = Annotated[float, Field(gt=0.0, le=1e4)]
 Micros = Annotated[int, Field(gt=0, le=10_000_000, multiple_of=4)]
 Triple = tuple[float, float, float]
 Bounds = tuple[
@@ -47,9 +46,7 @@ class HorizonConfig(Settings):
     """N steps of dt; N + 1 inputs u(0)…u(N)."""
 
     steps: int = Field(15, ge=2, le=15, description="N; at most 15, so that a plan fits one TUNNEL message")
-    dt_us: int = Field(
-        100_000, gt=0, le=262_140, multiple_of=4, description="prediction step, µs; not the replan period"
-    )
+    dt_us: WireStep = Field(100_000, description="prediction step, µs; not the replan period")
 
 
 class CostConfig(Settings):

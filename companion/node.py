@@ -233,17 +233,14 @@ class Companion:
             if self.pilot.phase is Phase.SETTLE:
                 here = np.broadcast_to(measured.position, (self.config.horizon.steps + 1, 3))
                 self._obstacles = self.world.obstacles(now, view, here)
-            try:
-                aim = None if stale else self._aim(now, view, measured)
-            except SurfaceError:
-                aim = None
+            aim = None if stale else self._aim(now, view, measured)
             if aim is None:
                 flight.keeper.carry_on(Why.MISSING)
             elif flight.lost:
                 flight.keeper.anchor(now, measured)
             else:
                 self._plans += flight.plan(now, aim, self.world, view)
-            self._plan_ns.append(min(max(self._stopwatch() - started, 0), _LONGEST_NS))
+            self._took(started)
         self.guard.horizon = horizon = flight.horizon()
         if horizon is not None and now >= self._next_plan:
             self._next_plan = now + self.config.rates.replan_us
@@ -251,10 +248,7 @@ class Companion:
             self._face(now, view, horizon.positions(now + step, count, step))
 
     def _plan(self, now: int, view: View, measured: Motion) -> None:
-        try:
-            aim = self._aim(now, view, measured)
-        except SurfaceError:
-            aim = None
+        aim = self._aim(now, view, measured)
         if aim is None:
             self.guard.hold(now, solver=False)
             return
@@ -273,7 +267,7 @@ class Companion:
             self.guard.hold(now, solver=True)
             return
         finally:
-            self._plan_ns.append(min(max(self._stopwatch() - started, 0), _LONGEST_NS))
+            self._took(started)
         self._plans += 1
         self.plan_log.add(now, self.plan.gradient)
         self._relaxed += self.plan.relaxed
@@ -288,7 +282,18 @@ class Companion:
         ahead: Array = 1e-6 * self.config.horizon.dt_us * np.arange(1.0, len(places) + 1.0)
         self._heading.plan(now, places, view.target.ahead(ahead).positions)
 
+    def _took(self, started: int) -> None:
+        """A plan that was begun when the stopwatch showed ``started`` is done."""
+        self._plan_ns.append(min(max(self._stopwatch() - started, 0), _LONGEST_NS))
+
     def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:
+        """Where to; None when nobody knows."""
+        try:
+            return self._destination(now, view, measured)
+        except SurfaceError:
+            return None
+
+    def _destination(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to: the own goal, or the surface around the target where it will be at the end of the
         horizon."""
         config, target = self.config, view.target

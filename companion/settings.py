@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0.0, le=1e4)]
+WireStep = Annotated[int, Field(gt=0, le=262_140, multiple_of=4)]
+"""µs between the knots of a plan that fits the wire. A type of its own: a bound given again beside one that a
+type has already is ignored."""
 
 
 class Settings(BaseModel):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from companion.config import CompanionConfig
-from companion.horizon import Horizon
+from companion.horizon import Array, Horizon
 from companion.world import View
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, enu_to_ned, yaw_to_ned
@@ -71,19 +71,20 @@ class Sharing:
     def _position(self, since_boot: int, view: View) -> GlobalPosition:
         if view.own is None:
             raise ValueError("no own state to share")
-        latitude, longitude, altitude = self._fleet.to_geodetic(view.own.position)
-        north, east, down = enu_to_ned(view.own.velocity)
         yaw = None if view.yaw is None else yaw_to_ned(view.yaw)
-        return GlobalPosition(
-            self._own,
-            since_boot,
-            latitude,
-            longitude,
-            altitude,
-            float(view.own.position[2]),
-            (float(north), float(east), float(down)),
-            yaw,
-        )
+        return position_message(self._own, since_boot, self._fleet, view.own.position, view.own.velocity, yaw)
+
+
+def position_message(
+    source: Source, since_boot: int, fleet: FleetFrame, position: Array, velocity: Array, yaw: float | None
+) -> GlobalPosition:
+    """Where ``source`` is, as it tells it: position (3,), velocity (3,), fleet-local ENU; NED yaw; µs since
+    boot."""
+    latitude, longitude, altitude = fleet.to_geodetic(position)
+    north, east, down = enu_to_ned(velocity).tolist()
+    return GlobalPosition(
+        source, since_boot, latitude, longitude, altitude, float(position[2]), (north, east, down), yaw
+    )
 
 
 def plan_message(horizon: Horizon, source: Source, fleet: FleetFrame) -> Tunnel | None:

@@ -7,6 +7,8 @@ not raise on them, and results are copied because the next solve overwrites them
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 import piqp
 
@@ -21,15 +23,8 @@ class QpSolver:
     def __init__(self, P: Array, G: Array | None = None, max_iter: int = 60) -> None:
         self.size = len(P)
         self.rows = 0 if G is None else len(G)
-        self._solver = piqp.DenseSolver()
-        settings = self._solver.settings
-        settings.verbose = False
-        settings.preconditioner_iter = 0
-        settings.max_iter = max_iter
-        settings.eps_abs = settings.eps_rel = 1e-8
-        settings.check_duality_gap = True
         # At the default gap, 1e-8, the last inputs are off by up to 2e-3 m/s²: this costs one iteration more.
-        settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = 1e-10, 1e-12
+        self._solver = _quiet(max_iter, 1e-8, (1e-10, 1e-12))
         wide, tall = np.full(self.size, 1.0), np.full(self.rows, 1.0)
         P = np.asfortranarray(P)
         if G is None:
@@ -60,8 +55,46 @@ class QpSolver:
             self._solver.update(c=c, h_l=h_l, h_u=h_u, x_l=x_l, x_u=x_u)
         else:
             self._solver.update(c=c, x_l=x_l, x_u=x_u)
-        status = self._solver.solve()
-        result = self._solver.result
-        if status != piqp.PIQP_SOLVED:
-            raise SolverError(str(status.name), int(result.info.iter))
-        return np.array(result.x)
+        return np.array(_solved(self._solver).x)
+
+
+class Optimum(NamedTuple):
+    """The minimiser (n,) and the multipliers (m,) ≥ 0 of the rows, copies."""
+
+    x: Array
+    multipliers: Array
+
+
+def solve_once(
+    P: Array, c: Array, A: Array, b: Array, G: Array, low: Array, x_l: Array, x_u: Array
+) -> Optimum:
+    """min ½ xᵀPx + cᵀx  subject to  Ax = b, Gx ≥ low, x_l ≤ x ≤ x_u: a QP whose rows (m, n), maybe none, are
+    others each time. SolverError when PIQP does not say SOLVED."""
+    # Mostly 20 iterations are enough; where there is hardly an interior it takes many.
+    solver = _quiet(250, 1e-7, (1e-5, 1e-5))
+    rows = (np.asfortranarray(G), low, np.full(len(low), np.inf)) if len(low) else (None, None, None)
+    solver.setup(P, c, A, b, *rows, x_l, x_u)
+    result = _solved(solver)
+    return Optimum(np.array(result.x), np.array(result.z_l) if len(low) else np.zeros(0))
+
+
+def _quiet(max_iter: int, eps: float, gap: tuple[float, float]) -> Any:
+    """A dense solver with tolerances ``eps`` and of the duality ``gap``, absolute and relative."""
+    solver = piqp.DenseSolver()
+    settings = solver.settings
+    settings.verbose = False
+    settings.preconditioner_iter = 0
+    settings.max_iter = max_iter
+    settings.eps_abs = settings.eps_rel = eps
+    settings.check_duality_gap = True
+    settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = gap
+    return solver
+
+
+def _solved(solver: Any) -> Any:
+    """The result of a solver that is set up."""
+    status = solver.solve()
+    result = solver.result
+    if status != piqp.PIQP_SOLVED:
+        raise SolverError(str(status.name), int(result.info.iter))
+    return result

@@ -17,8 +17,6 @@ from companion.errors import CertificateError
 from companion.horizon import Array, Horizon
 from mavlink_bridge.plan_wire import Integers, WirePlan, quantise
 
-CONTROLS = 3
-"""Control points of a segment."""
 _MM = 1e-3
 
 

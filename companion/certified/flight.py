@@ -55,7 +55,6 @@ class CertifiedFlight:
         """How often it got out of the tube."""
         self._outside = self._steers = False
         self._next_told = 0
-        self._told_epoch = -1
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
         """From now to the end of the plan that is made next, s, at most."""
 
@@ -81,7 +80,7 @@ class CertifiedFlight:
         if horizon is not None:
             off = horizon.at(now).position - position
             inside = float(off @ off) <= self._config.certified.tube**2
-            if inside or self._told_epoch >= keeper.epoch(now):
+            if inside or keeper.told_until >= keeper.epoch(now):
                 keeper.turn(now)
                 return
         keeper.begin(now, position)
@@ -150,10 +149,9 @@ class CertifiedFlight:
         told = self.keeper.told()
         if told is None or not (self._steers or farewell):
             return sync
-        if told.epoch == self._told_epoch and now < self._next_told:
+        if told.epoch == self.keeper.told_until and now < self._next_told:
             return sync
-        self.keeper.told_until = told.epoch
-        self._told_epoch, self._next_told = told.epoch, now + self._config.certified.repeat_us
+        self.keeper.told_until, self._next_told = told.epoch, now + self._config.certified.repeat_us
         roster = Roster(told.epoch, self.ledger.members, farewell)
         return [
             *sync,

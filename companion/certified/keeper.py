@@ -52,9 +52,9 @@ class Keeper:
         self.told_until = 0
         """The last epoch (µs) of which a plan was told."""
         self.current: WirePlan | None = None
-        nothing = resting(0, config.dt_us, program.n, np.zeros(3), origin)
-        # A plan, the same from the next epoch on, and the control points of that: asked for several times.
-        self._carried: tuple[WirePlan | None, WirePlan, Array] = (nothing, nothing, controls(nothing))
+        # What is made of ``current``, and of both plans, is asked for several times.
+        self._ahead: tuple[WirePlan, WirePlan, Array] | None = None
+        self._flown: tuple[WirePlan, WirePlan | None, Horizon] | None = None
         self.following: WirePlan | None = None
         self.held: dict[Why, int] = dict.fromkeys(Why, 0)
         self.anchored_anew = 0
@@ -87,22 +87,22 @@ class Keeper:
 
     def carry_on(self, why: Why) -> None:
         """Fly on in the next epoch as committed."""
-        self.following = self._shifted()
+        self.following = self.start()
         self.held[why] += 1
 
     def own(self) -> Array:
         """Control points (n, 3, 3) of the committed plan from the next epoch on, m."""
-        self._shifted()
-        return self._carried[2]
+        return self._carried()[1]
 
     def start(self) -> WirePlan:
-        """The committed plan from the next epoch on: where the next plan begins."""
-        return self._shifted()
+        """The committed plan from the next epoch on: where the next plan begins. CompanionError without
+        one."""
+        return self._carried()[0]
 
     def replan(self, wish: Wish, goal: Array, others: Others) -> bool:
         """Make the next epoch's plan; False if none was found and the old one is carried on."""
-        start = self._shifted()
-        corridor = planes(self.own(), others, self._config.spare, upright=self._planar)
+        start, own = self._carried()
+        corridor = planes(own, others, self._config.spare, upright=self._planar)
         state = State(start.position_m, start.velocity_m_s, self._flown_until(), start.accelerations_m_s2)
         # Where there is no room, rounding breaks what is just kept: then a little more is asked for.
         firmly = np.maximum(corridor.wanted, corridor.least + self._rounding)
@@ -126,10 +126,11 @@ class Keeper:
     def anchor(self, now: int, measured: Motion) -> None:
         """Plan the next epoch anew from the ``measured`` motion, to rest: after a jump or a push that left
         the tube. What is between two such plans is not certified."""
-        left = 1e-6 * (self.epoch(now) + self._config.epoch_us - now)
+        begins = self.epoch(now) + self._config.epoch_us
+        left = 1e-6 * (begins - now)
         n, dt = self._program.n, 1e-6 * self._config.dt_us
         start = quantise(
-            self.epoch(now) + self._config.epoch_us,
+            begins,
             self._config.dt_us,
             measured.position + left * measured.velocity,
             measured.velocity,
@@ -145,12 +146,13 @@ class Keeper:
         """What is flown from now on: this epoch's plan, and the next one's where it is made."""
         if self.current is None:
             return None
-        flown = horizon_of(self.current)
-        if self.following is None:
-            return flown
-        steps = self._config.epoch_us // self._config.dt_us
-        knots = np.vstack([flown.knots[:steps], horizon_of(self.following).knots])
-        return Horizon(flown.epoch, flown.dt, knots)
+        if self._flown is None or self._flown[0] is not self.current or self._flown[1] is not self.following:
+            horizon = horizon_of(self.current)
+            if self.following is not None:
+                first, rest = horizon.knots[: self._config.knots], horizon_of(self.following).knots
+                horizon = horizon._replace(knots=np.vstack([first, rest]))
+            self._flown = self.current, self.following, horizon
+        return self._flown[2]
 
     def told(self) -> WirePlan | None:
         """The plan that others are to know now."""
@@ -160,14 +162,14 @@ class Keeper:
         """The acceleration (3,) with which this epoch ends."""
         if self.current is None:
             return np.zeros(3)
-        steps = self._config.epoch_us // self._config.dt_us
-        result: Array = self.current.accelerations_m_s2[steps - 1]
+        result: Array = self.current.accelerations_m_s2[self._config.knots - 1]
         return result
 
-    def _shifted(self) -> WirePlan:
+    def _carried(self) -> tuple[WirePlan, Array]:
+        """The committed plan from the next epoch on, and its control points."""
         if self.current is None:
             raise CompanionError("there is no committed plan yet")
-        if self.current is not self._carried[0]:
-            plan = carried_on(self.current, self._config.epoch_us // self._config.dt_us)
-            self._carried = self.current, plan, controls(plan)
-        return self._carried[1]
+        if self._ahead is None or self._ahead[0] is not self.current:
+            plan = carried_on(self.current, self._config.knots)
+            self._ahead = self.current, plan, controls(plan)
+        return self._ahead[1:]

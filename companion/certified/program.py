@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import piqp
 from numpy.typing import NDArray
 
 from companion.certified.corridor import Planes
@@ -22,6 +21,7 @@ from companion.config import LimitsConfig
 from companion.errors import SolverError
 from companion.horizon import Array
 from companion.prediction import prediction
+from companion.solver import solve_once
 
 _ROUNDS = 8
 _NEAR = 0.7
@@ -101,11 +101,6 @@ class Program:
         )
         self._limits_low: Array = np.concatenate([-v_max, -v_max, low, -high, low, -high])
 
-    def controls(self, position: Array, velocity: Array, accelerations: Array) -> Array:
-        """Control points (n, 3, 3) of the motion from a state (3,), (3,) with accelerations (n, 3)."""
-        moved: Array = np.einsum("bij,jk->ibk", self._maps, accelerations)
-        return self._free(position, velocity) + moved
-
     def solve(self, state: State, wish: Wish, planes: Planes) -> Answer:
         """The best plan from ``state`` that keeps all rows. SolverError if PIQP finds none, or if rows are
         still broken after some rounds."""
@@ -117,10 +112,11 @@ class Program:
         a_max = np.maximum(self._a_max, flown)
         a_min = np.minimum(-self._a_max, flown)
         for count in range(1, _ROUNDS + 1):
-            a, multipliers = self._attempt(c, state.velocity, a_min, a_max, *rows.chosen(active))
+            found = solve_once(self._P, c, self._A, -state.velocity, *rows.chosen(active), a_min, a_max)
+            a: Array = found.x.reshape(3, self.n).T
             broken = rows.values(a) < -_TOLERANCE
             if not broken.any():
-                return Answer(a, rows.pressure(active, multipliers), count)
+                return Answer(a, rows.pressure(active, found.multipliers), count)
             if not (broken & ~active).any():
                 break
             active |= broken
@@ -142,37 +138,6 @@ class Program:
             - config.omega_jerk * flown
         )
         return c.T.ravel()
-
-    def _attempt(
-        self, c: Array, velocity: Array, a_min: Array, a_max: Array, G: Array, low: Array
-    ) -> tuple[Array, Array]:
-        solver = piqp.DenseSolver()
-        settings = solver.settings
-        settings.verbose = False
-        settings.preconditioner_iter = 0
-        # Mostly 20 are enough; where the committed plan breaks limits there is hardly an interior.
-        settings.max_iter = 250
-        settings.eps_abs = settings.eps_rel = 1e-7
-        settings.check_duality_gap = True
-        settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = 1e-5
-        some = len(low) > 0
-        solver.setup(
-            self._P,
-            c,
-            self._A,
-            -velocity,
-            np.asfortranarray(G) if some else None,
-            low if some else None,
-            np.full(len(low), np.inf) if some else None,
-            a_min,
-            a_max,
-        )
-        status = solver.solve()
-        result = solver.result
-        if status != piqp.PIQP_SOLVED:
-            raise SolverError(str(status.name), int(result.info.iter))
-        a: Array = np.array(result.x).reshape(3, self.n).T
-        return a, np.array(result.z_l) if some else np.zeros(0)
 
 
 class _Rows:

@@ -15,17 +15,26 @@ from companion.config import FieldConfig, LimitsConfig
 from companion.horizon import Array
 
 
+def fastest(limits: LimitsConfig) -> float:
+    """The largest speed, m/s, of a plan that goes as fast as it may on each axis."""
+    return sqrt(sum(v * v for v in limits.v_max))
+
+
 def margin(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
     """By how much (m) one vehicle's true place may differ from its plan: tube, k·σ, clock."""
-    speed = sqrt(sum(v * v for v in limits.v_max))
-    return config.tube + config.sigmas * field.position_sigma + 1e-6 * config.clock_us * speed
+    return _strays(config, limits) + config.sigmas * field.position_sigma
 
 
 def between(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
     """Least distance (m) between two plans: d_min and what both differ by. The errors of two estimates are
     independent, so they add as squares."""
-    each = margin(config, field, limits) - config.sigmas * field.position_sigma
-    return field.d_min + 2.0 * each + sqrt(2.0) * config.sigmas * field.position_sigma
+    strays = 2.0 * _strays(config, limits)
+    return field.d_min + strays + sqrt(2.0) * config.sigmas * field.position_sigma
+
+
+def _strays(config: CertifiedConfig, limits: LimitsConfig) -> float:
+    """By how much (m) where a vehicle believes that it is may differ from its plan: tube and clock."""
+    return config.tube + 1e-6 * config.clock_us * fastest(limits)
 
 
 def stranger(

@@ -6,9 +6,8 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from companion.settings import Settings
+from companion.settings import Positive, Settings, WireStep
 
-Positive = Annotated[float, Field(gt=0.0, le=1e4)]
 Weight = Annotated[float, Field(ge=0.0, le=1e4)]
 
 
@@ -31,9 +30,7 @@ class StallConfig(Settings):
 class CertifiedConfig(Settings):
     """Committed plans, planes and epochs."""
 
-    dt_us: int = Field(
-        200_000, gt=0, le=262_140, multiple_of=4, description="knots of the plans, µs: absolute, k·dt"
-    )
+    dt_us: WireStep = Field(200_000, description="knots of the plans, µs: absolute, k·dt")
     epoch_us: int = Field(200_000, gt=0, le=2_000_000, multiple_of=4, description="µs; a whole number of dt")
     last_call_us: int = Field(
         20_000, ge=0, le=1_000_000, description="so long before the end of an epoch nothing is waited for"
@@ -56,6 +53,11 @@ class CertifiedConfig(Settings):
     omega_jerk: Weight = Field(0.3, description="weight of the change of a from step to step")
     spare: Positive = Field(0.01, description="m wanted beyond the least distance, for rounding")
     stall: StallConfig = StallConfig()
+
+    @property
+    def knots(self) -> int:
+        """Knots of an epoch."""
+        return self.epoch_us // self.dt_us
 
     @model_validator(mode="after")
     def _epochs(self) -> CertifiedConfig:

@@ -12,10 +12,9 @@ and L the direction and the distance of the goal from the rest point, ġ the spe
 
 from __future__ import annotations
 
-from math import cos, sin
-
 import numpy as np
 
+from companion.bearings import turned
 from companion.certified.settings import StallConfig
 from companion.horizon import Array
 
@@ -44,7 +43,7 @@ class StallTurn:
         length = float(np.sqrt(way @ way))
         if self.angle > self._config.bend and length > self._config.detour:
             way = way * (self._config.detour / length)
-        return position + _about_z(way, -self._sense * self.angle)
+        return position + turned(way, -self._sense * self.angle)
 
     def learn(self, rest: Array, goal: Array, push: Array, seconds: float) -> None:
         """What the plan that was just made tells: it rests at ``rest`` (3,), its planes push with ``push``
@@ -63,7 +62,7 @@ class StallTurn:
         against = -float(push @ direction)
         if over > 0.0:
             # In a trap that does not move, what pushes back along the turned way counts too.
-            against = max(against, -float(push @ _about_z(direction, -self._sense * self.angle)))
+            against = max(against, -float(push @ turned(direction, -self._sense * self.angle)))
         pushed = min(max(against / (self._pull * max(left, _NEAREST)), 0.0), 1.0)
         pushed *= min(max(1.0 - gaining / config.speed, 0.0), 1.0)
         if pushed > config.pushed:
@@ -71,9 +70,3 @@ class StallTurn:
             self.angle = min(most, self.angle + config.up * seconds * pushed)
         else:
             self.angle = max(0.0, self.angle - config.down * seconds / (1.0 + over))
-
-
-def _about_z(vector: Array, angle: float) -> Array:
-    c, s = cos(angle), sin(angle)
-    x, y, z = vector
-    return np.array([c * x - s * y, s * x + c * y, z])

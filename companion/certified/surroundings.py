@@ -3,13 +3,11 @@ and balls about those that fly as they like."""
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
 
 from companion.certified.corridor import Others
 from companion.certified.ledger import Ledger
-from companion.certified.reach import between, margin, stranger
+from companion.certified.reach import between, fastest, margin, stranger
 from companion.config import CompanionConfig
 from companion.horizon import Array
 from companion.obstacles import FixedObstacles, Post
@@ -33,13 +31,12 @@ class Surroundings:
         self._sizes = {one.system: one.radius for one in config.moving}
         n, dt = steps, 1e-6 * own.dt_us
         self._seconds: Array = dt * np.arange(n + 1.0)
-        speed = sqrt(sum(v * v for v in config.limits.v_max))
-        self._sight = n * dt * speed + self.between + _STEPS_OF_SIGHT
+        self._sight = n * dt * fastest(config.limits) + self.between + _STEPS_OF_SIGHT
 
     def others(self, epoch: int, own: Array, ledger: Ledger, world: World, view: View) -> Others:
         """All that counts for the plan that begins one epoch after ``epoch`` (µs); ``own`` (n, 3, 3): the
         committed control points from there on."""
-        shift = self._config.certified.epoch_us // self._config.certified.dt_us
+        shift = self._config.certified.knots
         controls, distance, shares = [], [], []
         for filed in ledger.plans(epoch).values():
             controls.append(_later(filed.controls, shift))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from companion.sharing import position_message
 from mavlink_bridge.codec import Codec
-from mavlink_bridge.frames import FleetFrame, enu_to_ned
-from mavlink_bridge.messages import GlobalPosition, Source, Tunnel
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import Source, Tunnel
 from mavlink_bridge.node import Datagram
 from outrider.paths import Motion
 
@@ -37,17 +38,7 @@ class Beacon:
 
     def say(self, now: int, motion: Motion, plan: Tunnel | None = None) -> list[Datagram]:
         """Position and velocity at ``now``, and a plan if there is one."""
-        latitude, longitude, altitude = self._fleet.to_geodetic(motion.position)
-        north, east, down = enu_to_ned(motion.velocity).tolist()
-        position = GlobalPosition(
-            self.source,
-            now - (now if self._boot is None else self._boot),
-            latitude,
-            longitude,
-            altitude,
-            float(motion.position[2]),
-            (north, east, down),
-            None,
-        )
-        data = self._codec.encode(position)
+        since_boot = now - (now if self._boot is None else self._boot)
+        said = position_message(self.source, since_boot, self._fleet, motion.position, motion.velocity, None)
+        data = self._codec.encode(said)
         return [Datagram(self._link, data if plan is None else data + self._codec.encode(plan))]

@@ -18,9 +18,10 @@ from companion.forces import Obstacles
 from companion.heading import Heading
 from companion.planner import Aim, Planner, standing
 from companion.setpoint import setpoint
+from companion.sharing import position_message
 from companion.world import World
 from mavlink_bridge.codec import Codec
-from mavlink_bridge.frames import FleetFrame, enu_to_ned
+from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import GlobalPosition, Source, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
 from mavlink_bridge.tlog import TlogWriter, read_tlog
@@ -196,14 +197,7 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
         place = position + reach[k] * np.array([np.cos(around[k]), np.sin(around[k]), 0.0])
         speed = random.normal(0.0, 1.0, 3) * (1.0, 1.0, 0.1)
         source = Source(20 + k, 195)
-        north, east, down = enu_to_ned(speed)
-        world.hear(
-            980_000,
-            "swarm",
-            GlobalPosition(
-                source, 0, *fleet.to_geodetic(place), 5.0, (float(north), float(east), float(down)), None
-            ),
-        )
+        world.hear(980_000, "swarm", position_message(source, 0, fleet, place, speed, None))
         shared = quantise(
             960_000,
             config.horizon.dt_us,

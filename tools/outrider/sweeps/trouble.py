@@ -12,12 +12,12 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, JsonValue, model_validator
 
+from companion.certified.settings import CertifiedConfig
 from outrider.scenario_part import FIRST_SYSTEM, Part, Share
 
 Milliseconds = Annotated[float, Field(ge=0.0, le=5_000.0)]
 Seconds = Annotated[float, Field(gt=0.0, le=120.0)]
-_KNOT_MS = 200.0
-"""A certified plan's knots."""
+_KNOT_US = CertifiedConfig().dt_us
 Few = Annotated[int, Field(ge=0, le=20)]
 
 
@@ -66,8 +66,8 @@ def strike(trouble: Trouble, count: int, random: np.random.Generator) -> dict[st
     loss, delay_ms, jitter_ms = (bad(span) for span in (trouble.loss, trouble.delay_ms, trouble.jitter_ms))
     if trouble.fitting_epochs > random.uniform():
         # As whoever sets the fleet up would: no shorter than a plan takes to arrive.
-        epochs = max(int(np.ceil((delay_ms + jitter_ms) / _KNOT_MS)), 1)
-        document["companion"] = {"certified": {"epoch_us": int(1000 * _KNOT_MS) * epochs}}
+        epochs = max(int(np.ceil((delay_ms + jitter_ms) / (1e-3 * _KNOT_US))), 1)
+        document["companion"] = {"certified": {"epoch_us": _KNOT_US * epochs}}
     document["links"] = {
         "swarm": {
             "loss": loss,
