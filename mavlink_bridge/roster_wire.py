@@ -45,5 +45,8 @@ def unpack(data: bytes) -> Roster:
     if len(data) != _SIZE or data[0] != KIND or data[1] & ~_FAREWELL or data[9] & 1:
         raise PlanWireError(f"{len(data)} bytes are not a roster")
     bits = int.from_bytes(data[9:], "little")
-    members = frozenset(system for system in range(1, 256) if bits >> system & 1)
-    return Roster(int.from_bytes(data[2:9], "little"), members, bool(data[1] & _FAREWELL))
+    members = []
+    while bits:
+        members.append(bits.bit_length() - 1)
+        bits ^= 1 << members[-1]
+    return Roster(int.from_bytes(data[2:9], "little"), frozenset(members), bool(data[1] & _FAREWELL))

@@ -69,7 +69,7 @@ def nearest(triangles: Array) -> Array:
     Of a flat triangle the interior is no use: whichever of edges and interior holds the triangle further off
     counts. A triangle about the origin itself gets some unit vector: nothing separates it.
     """
-    following = np.roll(triangles, -1, axis=1)
+    following = triangles[:, (1, 2, 0)]
     edges = following - triangles
     square = np.einsum("kei,kei->ke", edges, edges)
     share = -np.einsum("kei,kei->ke", triangles, edges) / np.maximum(square, _TINY)

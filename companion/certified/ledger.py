@@ -41,17 +41,22 @@ class Ledger:
         self._plans: dict[int, dict[int, Filed]] = {}
         self._rosters: dict[int, Roster] = {}
         self._left: dict[int, Filed] = {}
+        self._last: dict[int, bytes] = {}
+        self._members: frozenset[int] | None = None
         self.refused = 0
 
     @property
     def members(self) -> frozenset[int]:
         """Everybody that is counted with."""
-        known = self._expected.union(self._plans, *(roster.members for roster in self._rosters.values()))
-        return frozenset(known - {self._own} - set(self._left))
+        if self._members is None:
+            known = self._expected.union(self._plans, *(roster.members for roster in self._rosters.values()))
+            self._members = known - {self._own} - set(self._left)
+        return self._members
 
     def hear_plan(self, now: int, system: int, payload: bytes) -> None:
         """A TUNNEL payload of kind plan; one that cannot be a committed plan is refused and counted."""
-        if system == self._own:
+        # Most are told again what they hold.
+        if system == self._own or self._last.get(system) == payload:
             return
         try:
             plan = unpack(payload)
@@ -71,6 +76,9 @@ class Ledger:
         if not fits or (known is not None and known.plan != plan):
             self.refused += 1
             return
+        self._last[system] = payload
+        if not filed:
+            self._members = None
         if known is None:
             filed[plan.epoch] = Filed(plan, controls(plan))
             for epoch in sorted(filed)[:-_KEPT]:
@@ -91,8 +99,11 @@ class Ledger:
             filed = self._plans.get(system, {}).get(roster.epoch)
             if filed is not None and roster.epoch <= now:
                 self._left[system] = filed
+                self._members = None
             return
         self._left.pop(system, None)
+        if last is None or left is not None or roster.members != last.members:
+            self._members = None
         self._rosters[system] = roster
 
     def missing(self, epoch: int) -> set[int]:

@@ -24,7 +24,7 @@ from companion.prediction import prediction
 from companion.solver import solve_once
 
 _ROUNDS = 8
-_NEAR = 0.7
+_NEAR = 0.1
 """m/s and m: rows that the committed plan is nearer to take part from the first solution on."""
 _TOLERANCE = 1e-5
 """m and m/s: what PIQP leaves; far below what is wanted beyond the least distance."""
@@ -85,6 +85,9 @@ class Program:
         )
         self._P = np.asfortranarray(np.kron(np.eye(3), one))
         self._A = np.asfortranarray(np.kron(np.eye(3), self._S_v[-1:]))
+        # Of the optimality conditions without rows and bounds, so that the best plan is one product.
+        conditions = np.block([[self._P, self._A.T], [self._A, np.zeros((3, 3))]])
+        self._without_rows: Array = np.linalg.inv(conditions)[: 3 * n]
         self.pull = 2.0 * float(self._weights.sum())
         """What the cost pulls with at a plan that is a metre from all the places that it should be at."""
         a_max = np.array(limits.u_max) - _ROUNDED
@@ -107,10 +110,12 @@ class Program:
         free = self._free(state.position, state.velocity)
         c = self._cost(free[:, 2], state.velocity, state.before, wish)
         rows = _Rows(self, free, state, planes)
-        active = rows.values(state.committed) < _NEAR
         flown = state.committed.T.ravel()
         a_max = np.maximum(self._a_max, flown)
         a_min = np.minimum(-self._a_max, flown)
+        best = self._without_rows @ np.concatenate([-c, -state.velocity])
+        best = np.minimum(np.maximum(best, a_min), a_max).reshape(3, self.n).T
+        active = (rows.values(state.committed) < _NEAR) | (rows.values(best) < 0.0)
         for count in range(1, _ROUNDS + 1):
             found = solve_once(self._P, c, self._A, -state.velocity, *rows.chosen(active), a_min, a_max)
             a: Array = found.x.reshape(3, self.n).T

@@ -36,22 +36,18 @@ class Surroundings:
     def others(self, epoch: int, own: Array, ledger: Ledger, world: World, view: View) -> Others:
         """All that counts for the plan that begins one epoch after ``epoch`` (µs); ``own`` (n, 3, 3): the
         committed control points from there on."""
-        shift = self._config.certified.knots
-        controls, distance, shares = [], [], []
-        for filed in ledger.plans(epoch).values():
-            controls.append(_later(filed.controls, shift))
-            distance.append(np.full(self._steps, self.between))
-            shares.append(True)
+        plans = [filed.controls for filed in ledger.plans(epoch).values()]
         begins = epoch + self._config.certified.epoch_us
         strangers = [*self._strangers(begins, ledger, world), *self._target(begins, view)]
-        for centres, radii in [*self._standing(own), *self._gone(own, ledger), *strangers]:
-            controls.append(centres)
-            distance.append(radii)
-            shares.append(False)
-        if not controls:
-            none = np.zeros(0, dtype=np.bool_)
-            return Others(np.zeros((0, self._steps, 3, 3)), np.zeros((0, self._steps)), none)
-        return Others(np.stack(controls), np.stack(distance), np.array(shares))
+        alone = [*self._standing(own), *self._gone(own, ledger), *strangers]
+        count, n = len(plans), self._steps
+        controls = np.empty((count + len(alone), n, 3, 3))
+        if plans:
+            controls[:count] = _later(np.array(plans), self._config.certified.knots)
+        distance = np.full((len(controls), n), self.between)
+        for index, (centres, radii) in enumerate(alone, count):
+            controls[index], distance[index] = centres, radii
+        return Others(controls, distance, np.arange(len(controls)) < count)
 
     def _standing(self, own: Array) -> list[tuple[Array, Array]]:
         """Spheres about their centres; posts beside the vehicle, whatever its height: they count as if they
@@ -105,7 +101,9 @@ class Surroundings:
 
 
 def _later(controls: Array, knots: int) -> Array:
-    """Control points ``knots`` later; after the end they rest."""
-    rest = np.broadcast_to(controls[-1, 2], (min(knots, len(controls)), 3, 3))
-    result: Array = np.concatenate([controls[knots:], rest])
+    """Control points (M, n, 3, 3) ``knots`` later; after the end they rest."""
+    result = np.empty_like(controls)
+    left = max(controls.shape[1] - knots, 0)
+    result[:, :left] = controls[:, knots:]
+    result[:, left:] = controls[:, -1:, 2:]
     return result
