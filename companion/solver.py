@@ -71,7 +71,7 @@ def solve_once(
     """min ½ xᵀPx + cᵀx  subject to  Ax = b, Gx ≥ low, x_l ≤ x ≤ x_u: a QP whose rows (m, n), maybe none, are
     others each time. SolverError when PIQP does not say SOLVED."""
     # Mostly 20 iterations are enough; where there is hardly an interior it takes many.
-    solver = _quiet(250, 1e-7, (1e-7, 1e-7))
+    solver = _quiet(250, 1e-8, (1e-9, 1e-9))
     rows = (np.asfortranarray(G), low, np.full(len(low), np.inf)) if len(low) else (None, None, None)
     solver.setup(P, c, A, b, *rows, x_l, x_u)
     result = _solved(solver)

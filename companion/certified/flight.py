@@ -122,10 +122,10 @@ class CertifiedFlight:
         keeper = self.keeper
         start = keeper.start()
         own = keeper.own()
-        others = self._surroundings.others(keeper.epoch(now), own, self.ledger, world, view)
+        others, field = self._surroundings.around(keeper.epoch(now), own, self.ledger, world, view)
         goal = self._stall.turned(start.position_m, aim.destination)
         places = goal + self._before_end[:, None] * aim.velocity
-        wish = Wish(places, np.broadcast_to(aim.velocity, places.shape), np.zeros((self._steps, 3)))
+        wish = Wish(places, np.broadcast_to(aim.velocity, places.shape), field)
         return keeper.replan(wish, aim.destination, others)
 
     def idle(self, now: int) -> bool:

@@ -2,10 +2,13 @@
 matter.
 
 Variables are the accelerations a_n (n = 0…N) of each axis in turn. The cost is the paper's on every step
-instead of the last alone, with ‖a − f‖² for ‖u + f‖²: the field is a preference here. The plan ends at rest.
+instead of the last alone, without the field in the input: a plan that ends at rest cannot follow a lasting
+push with its accelerations. What is added for the field is −2 Ω_f f·x on every step, as if it were the slope
+of a potential there: it moves the plan, as far as nothing is in the way. The plan ends at rest.
 Bounds of acceleration are bounds on variables; limits of speed and place and the planes are rows Ga ≥ low, of
-which only those take part that the committed plan is near to, or that a solution has broken. Whatever limit
-the committed plan itself breaks is widened to it: so that plan solves every problem.
+which only those take part that the committed plan is near to, that the best plan without any rows would
+break, or that a solution has broken. Whatever limit the committed plan itself breaks is widened to it: so
+that plan solves every problem.
 """
 
 from __future__ import annotations
@@ -43,8 +46,8 @@ class State(NamedTuple):
 
 
 class Wish(NamedTuple):
-    """What is preferred: places (n, 3) m and velocities (n, 3) m/s after each step, and the field f (n, 3)
-    m/s²."""
+    """What is preferred after each step: places (n, 3) m, velocities (n, 3) m/s, and the field f (n, 3) m/s²
+    that is yielded to."""
 
     places: Array
     velocities: Array
@@ -136,10 +139,10 @@ class Program:
         config = self._config
         flown = np.zeros_like(wish.field)
         flown[0] = before
+        off = self._weights[:, None] * (ends - wish.places) - config.omega_field * wish.field
         c: Array = 2.0 * (
-            self._S_x.T @ (self._weights[:, None] * (ends - wish.places))
+            self._S_x.T @ off
             + config.omega_speed * self._S_v.T @ (velocity - wish.velocities)
-            - config.omega_input * wish.field
             - config.omega_jerk * flown
         )
         return c.T.ravel()

@@ -1,5 +1,5 @@
 """What a certified plan keeps away from, on its own knots: the plans of those that share them, what stands,
-and balls about those that fly as they like."""
+and strangers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import numpy as np
 
 from companion.certified.corridor import Others
 from companion.certified.ledger import Ledger
-from companion.certified.reach import between, fastest, margin, stranger
+from companion.certified.reach import between, fastest, margin
+from companion.certified.strangers import Strangers
 from companion.config import CompanionConfig
 from companion.horizon import Array
 from companion.obstacles import FixedObstacles, Post
@@ -18,7 +19,7 @@ _STEPS_OF_SIGHT = 1.0
 
 
 class Surroundings:
-    """Of one vehicle; ``others`` for each plan."""
+    """Of one vehicle; ``around`` for each plan."""
 
     def __init__(self, config: CompanionConfig, steps: int) -> None:
         self._config, self._steps = config, steps
@@ -28,17 +29,18 @@ class Surroundings:
         self._margin = margin(own, config.field, config.limits)
         self._posts = FixedObstacles(tuple(o for o in config.obstacles if isinstance(o, Post)))
         self._balls = FixedObstacles(tuple(o for o in config.obstacles if not isinstance(o, Post)))
-        self._sizes = {one.system: one.radius for one in config.moving}
-        n, dt = steps, 1e-6 * own.dt_us
-        self._seconds: Array = dt * np.arange(n + 1.0)
-        self._sight = n * dt * fastest(config.limits) + self.between + _STEPS_OF_SIGHT
+        self._strangers = Strangers(config, steps)
+        self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + self.between + _STEPS_OF_SIGHT
 
-    def others(self, epoch: int, own: Array, ledger: Ledger, world: World, view: View) -> Others:
-        """All that counts for the plan that begins one epoch after ``epoch`` (µs); ``own`` (n, 3, 3): the
-        committed control points from there on."""
+    def around(
+        self, epoch: int, own: Array, ledger: Ledger, world: World, view: View
+    ) -> tuple[Others, Array]:
+        """All that counts for the plan that begins one epoch after ``epoch`` (µs), and the field f (n, 3),
+        m/s², that it would rather yield to; ``own`` (n, 3, 3): the committed control points from there on."""
         plans = [filed.controls for filed in ledger.plans(epoch).values()]
-        begins = epoch + self._config.certified.epoch_us
-        strangers = [*self._strangers(begins, ledger, world), *self._target(begins, view)]
+        members = ledger.members.union(ledger.left)
+        seen = self._strangers.seen(epoch + self._config.certified.epoch_us, members, world)
+        strangers = [*self._strangers.balls(seen, own), *self._strangers.target(view)]
         alone = [*self._standing(own), *self._gone(own, ledger), *strangers]
         count, n = len(plans), self._steps
         controls = np.empty((count + len(alone), n, 3, 3))
@@ -47,7 +49,8 @@ class Surroundings:
         distance = np.full((len(controls), n), self.between)
         for index, (centres, radii) in enumerate(alone, count):
             controls[index], distance[index] = centres, radii
-        return Others(controls, distance, np.arange(len(controls)) < count)
+        others = Others(controls, distance, np.arange(len(controls)) < count)
+        return others, self._strangers.field(seen, own)
 
     def _standing(self, own: Array) -> list[tuple[Array, Array]]:
         """Spheres about their centres; posts beside the vehicle, whatever its height: they count as if they
@@ -74,30 +77,6 @@ class Surroundings:
             centres[..., :2] = filed.controls[-1, 2, :2]
             found.append((centres, np.full(self._steps, self.between)))
         return found
-
-    def _strangers(self, begins: int, ledger: Ledger, world: World) -> list[tuple[Array, Array]]:
-        config = self._config
-        known = ledger.members.union(ledger.left)
-        found = []
-        for system, time, position, velocity in world.neighbours.last_heard():
-            if system in known:
-                continue
-            age = max(1e-6 * (begins - time), 0.0)
-            bounds = config.certified.stranger_speed, config.certified.stranger_acceleration
-            centres, reach = stranger(position, velocity, age, self._seconds, *bounds)
-            size = self._sizes.get(system, 0.0)
-            found.append((centres, reach + self.between + size))
-        return found
-
-    def _target(self, begins: int, view: View) -> list[tuple[Array, Array]]:
-        """Where the target flies on as it does, if it is an obstacle: it is followed, not guarded against."""
-        config, target = self._config, view.target
-        if target is None or config.target_d_min is None:
-            return []
-        ends = target.ahead(self._seconds + 1e-6 * config.certified.epoch_us).positions
-        middle = 0.5 * (ends[:-1] + ends[1:])
-        centres = np.stack([ends[:-1], middle, ends[1:]], axis=1)
-        return [(centres, np.full(self._steps, config.target_d_min + self._margin))]
 
 
 def _later(controls: Array, knots: int) -> Array:

@@ -80,7 +80,7 @@ def wish(rng: np.random.Generator, here: Array) -> Wish:
     """Any place within some metres, at any speed."""
     places = np.broadcast_to(here + rng.normal(size=3) * 10.0 ** rng.uniform(-1, 1.2), (STEPS, 3))
     velocities = np.broadcast_to(rng.uniform(-3, 3, 3) * rng.integers(0, 2), (STEPS, 3))
-    return Wish(places, velocities, rng.normal(size=(STEPS, 3)))
+    return Wish(places, velocities, rng.normal(size=(STEPS, 3)) * rng.integers(0, 2))
 
 
 def flown(scene: Scene, accelerations: Array) -> tuple[Array, Array]:
@@ -100,9 +100,10 @@ def residuals(scene: Scene, wish: Wish, accelerations: Array) -> Array:
     weights[-1] = CONFIG.omega_end
     change = np.diff(accelerations, axis=0, prepend=scene.state.before[None])
     parts = (
-        np.sqrt(weights) * (points[:, 2] - wish.places),
+        # −2 Ω f·x as part of the square: it is the place that is elsewhere.
+        np.sqrt(weights) * (points[:, 2] - wish.places - CONFIG.omega_field * wish.field / weights),
         sqrt(CONFIG.omega_speed) * (velocities - wish.velocities),
-        sqrt(CONFIG.omega_input) * (accelerations - wish.field),
+        sqrt(CONFIG.omega_input) * accelerations,
         sqrt(CONFIG.omega_jerk) * change,
     )
     return np.concatenate([part.ravel() for part in parts])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from flight_facts import check_told, clock
 from lockstep_flights import fly, scenario
 
@@ -47,9 +48,12 @@ def test_they_say_where_they_are_and_share_no_plan(tmp_path: Path) -> None:
     assert kinds[Tunnel] == {11, 12, 13}
 
 
-def test_who_comes_through_is_evaded(tmp_path: Path) -> None:
-    """A stranger at 2 m/s, straight through the ring: the n = 0 fallback is enough."""
-    flown = fly(scenario("adversary", {"airborne": True, "cap_s": 25.0}), 1, tmp_path)
+@pytest.mark.parametrize("avoidance", ["field", "certified"])
+def test_who_comes_through_is_evaded(avoidance: str, tmp_path: Path) -> None:
+    """A stranger at 2 m/s, straight through the ring: the n = 0 fallback is enough, and so is yielding to
+    it where plans are certified."""
+    change = {"airborne": True, "cap_s": 25.0, "companion": {"avoidance": avoidance}}
+    flown = fly(scenario("adversary", change), 1, tmp_path)
     check_told(flown)
     samples, _ = clock(flown)
     through = samples.position[:, 5:]

@@ -13,9 +13,17 @@ from outrider.figures import draw
 from outrider.summary import exit_status
 
 
-@pytest.mark.parametrize("prediction", ["held", "velocity"])
-def test_nobody_touches_what_comes_across(prediction: str, tmp_path: Path) -> None:
-    change = {"airborne": True, "vehicles": 4, "companion": {"neighbour_prediction": prediction}}
+@pytest.mark.parametrize(
+    "companion",
+    [
+        {"neighbour_prediction": "held"},
+        {"neighbour_prediction": "velocity"},
+        {"avoidance": "certified", "turning_sense": "right"},
+    ],
+    ids=["held", "velocity", "certified"],
+)
+def test_nobody_touches_what_comes_across(companion: dict[str, str], tmp_path: Path) -> None:
+    change = {"airborne": True, "vehicles": 4, "companion": companion}
     of = scenario("traffic", change)
     flown = fly(of, 2, tmp_path)
     check_told(flown)

@@ -120,6 +120,7 @@ class Fleet:
             altitude=altitude,
             yaw=float(np.pi / 2 - facing),
             sensors=self.scenario.sensors,
+            **self.scenario.autopilot.model_dump(),
             start_height=float(start[2]) if self.scenario.airborne else 0.0,
         )
         return Autopilot(config, self.vehicle, self.frame, self.seed, weather=self.scenario.weather)

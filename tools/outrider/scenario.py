@@ -53,6 +53,14 @@ class Timing(Part):
     companion_us: Period = Field(10_000, description="how often a companion's node runs")
 
 
+class AutopilotPart(Part):
+    """Parameters of the autopilots: for how long a set-point counts. After that ArduPilot brakes, and PX4
+    leaves offboard mode."""
+
+    guided_timeout: float = Field(3.0, ge=0.1, le=60.0, description="s, ArduPilot's GUID_TIMEOUT")
+    offboard_timeout: float = Field(1.0, ge=0.1, le=60.0, description="s, PX4's COM_OF_LOSS_T")
+
+
 class Scenario(Part):
     """One flight."""
 
@@ -62,6 +70,7 @@ class Scenario(Part):
     vehicles: int = Field(ge=1, le=244, description="how many fly the task; bystanders are more")
     vehicle: str = Field("firefly", description="file in config/vehicles")
     flavour: Literal["ardupilot", "px4"] = "ardupilot"
+    autopilot: AutopilotPart = AutopilotPart()
     origin: Origin = Origin()
     starts: Starts
     bystanders: tuple[Bystander, ...] = Field((), max_length=50)

@@ -1,0 +1,101 @@
+"""Those that share no plan: plans keep clear of what they may do, and yield to what they are likely to do."""
+
+from __future__ import annotations
+
+import numpy as np
+from certified_plans import EPOCH, STEPS
+from certified_swarm import FLEET
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.certified.committed import controls, resting
+from companion.certified.flight import CertifiedFlight
+from companion.certified.strangers import Strangers
+from companion.config import CompanionConfig
+from companion.horizon import Array
+from companion.planner import standing
+from companion.world import World
+from mavlink_bridge.messages import GlobalPosition, Source
+
+OWN, OTHER = 11, 190
+NOW = EPOCH
+HERE = np.array([0.0, 0.0, 5.0])
+angles = st.floats(0.0, 2.0 * np.pi)
+
+
+def config(kind: str | None = None, **certified: float) -> CompanionConfig:
+    moving = [] if kind is None else [{"system": OTHER, "kind": kind, "radius": 0.4}]
+    given = {"stranger_speed": 3.0} | certified
+    return CompanionConfig.model_validate(
+        {"task": "goto", "avoidance": "certified", "moving": moving, "certified": given}
+    )
+
+
+def told(world: World, place: Array, velocity: Array) -> None:
+    """The other says where it is, and how fast."""
+    latitude, longitude, altitude = FLEET.to_geodetic(place)
+    ned = (float(velocity[1]), float(velocity[0]), float(-velocity[2]))
+    message = GlobalPosition(Source(OTHER, 1), NOW // 1000, latitude, longitude, altitude, 0.0, ned, None)
+    world.hear(NOW, "swarm", message)
+
+
+def hovering(of: CompanionConfig, place: Array, velocity: Array) -> Array:
+    """Where the next plan of one that hovers, and wants to, ends, with the other at ``place``."""
+    flight, world = CertifiedFlight(of, Source(OWN, 195), FLEET), World(of, OWN, 10, FLEET)
+    told(world, place, velocity)
+    flight.stand(NOW, HERE)
+    flight.keeper.following = None
+    assert flight.plan(NOW, standing(HERE), world, world.at(NOW))
+    assert flight.keeper.following is not None
+    return controls(flight.keeper.following)[-1, 2]
+
+
+@given(angles, st.floats(2.5, 4.5), st.floats(0.8, 3.0))
+def test_who_comes_straight_at_one_that_hovers_is_yielded_to(angle: float, far: float, speed: float) -> None:
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    place = HERE + far * direction
+    stayed = hovering(config(omega_field=0.0), place, -speed * direction)
+    yielded = hovering(config(), place, -speed * direction)
+    # The planes alone ask for nothing: the place is kept.
+    assert np.linalg.norm(stayed - HERE) < 0.05
+    assert (yielded - HERE) @ direction < -0.05
+
+
+@given(angles, st.floats(15.0, 40.0))
+def test_who_is_far_and_slow_changes_nothing(angle: float, far: float) -> None:
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    ends = hovering(config(), HERE + far * direction, -0.2 * direction)
+    assert np.linalg.norm(ends - HERE) < 0.01
+
+
+@given(angles, st.floats(-4.0, 30.0))
+def test_a_walking_post_is_as_near_at_every_height(angle: float, height: float) -> None:
+    of = config("post")
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    place = HERE + 4.0 * direction
+    found = [hovering(of, place * (1, 1, 0) + (0, 0, z), -direction) for z in (5.0, height)]
+    np.testing.assert_allclose(found[0], found[1], atol=1e-3)
+
+
+def test_a_thing_is_where_it_says_and_a_vehicle_only_nearly() -> None:
+    """Of a thing only the own margin counts and its size; a vehicle has a margin of its own."""
+    least = []
+    for of in (config("sphere"), config()):
+        world = World(of, OWN, 10, FLEET)
+        told(world, HERE, np.zeros(3))
+        strangers = Strangers(of, STEPS)
+        least.append(strangers.seen(NOW + 200_000, frozenset(), world)[0].least)
+    own = config().certified
+    clock = 1e-6 * own.clock_us * np.linalg.norm(config().limits.v_max)
+    sigma = own.sigmas * config().field.position_sigma
+    assert np.isclose(least[0], 0.5 + 0.4 + own.tube + clock + sigma)
+    assert np.isclose(least[1], 0.5 + 2.0 * (own.tube + clock) + np.sqrt(2.0) * sigma)
+
+
+def test_a_member_is_no_stranger() -> None:
+    world = World(config(), OWN, 10, FLEET)
+    told(world, HERE, np.zeros(3))
+    strangers = Strangers(config(), STEPS)
+    assert strangers.seen(NOW, frozenset({OTHER}), world) == []
+    own = controls(resting(NOW, 200_000, STEPS, HERE, FLEET.fingerprint))
+    assert (strangers.field([], own) == 0.0).all()
