@@ -265,7 +265,9 @@ def test_a_flight_ends_with_one_json_object_and_a_full_directory(run: Run, tmp_p
     assert summary["min_separation_m"] is None
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == [
         "configuration.yaml",
+        "flight.npz",
         "flight.png",
+        "plan_times.npz",
         "plans.npz",
         "summary.json",
         "vehicle-11.tlog",

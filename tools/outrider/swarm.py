@@ -14,6 +14,7 @@ from mavlink_bridge.frames import FleetFrame
 from outrider import figures
 from outrider.errors import Fault, InputError
 from outrider.flight import Flight, Progress
+from outrider.flight_file import write_flight, write_plan_times
 from outrider.interruption import interruptible
 from outrider.options import METHODS, Options, apply
 from outrider.outcome import Outcome
@@ -97,6 +98,8 @@ def fly(
         summary = summarise(outcome, cost, directory)
         write(summary, directory / "summary.json")
         write_plans(outcome, directory / "plans.npz")
+        write_flight(outcome, directory / "flight.npz")
+        write_plan_times(outcome, directory / "plan_times.npz")
         figures.draw(outcome, summary, directory / "flight.png")
         return summary
 
