@@ -270,6 +270,7 @@ def test_a_flight_ends_with_one_json_object_and_a_full_directory(run: Run, tmp_p
         "plan_times.npz",
         "plans.npz",
         "summary.json",
+        "vehicle-11.steps.npz",
         "vehicle-11.tlog",
     ]
     assert json.loads((tmp_path / "run" / "summary.json").read_text()) == summary
