@@ -110,12 +110,12 @@ def replay(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
-    """Go through the logs of a run again. Ends with 1 if there are findings."""
+    """Go through a flight again: does each companion, given what it received, send what it sent? Ends with 1
+    if not, or if there are findings."""
     from outrider.certify.command import certify as certifying
+    from outrider.replaying.command import replay as replaying
 
-    if not certify:
-        raise InputError(f"replay {run_dir}: what for is not said; allowed: --certify")
-    raise typer.Exit(certifying(run_dir, as_json))
+    raise typer.Exit((certifying if certify else replaying)(run_dir, as_json))
 
 
 @app.command()

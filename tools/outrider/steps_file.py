@@ -36,7 +36,7 @@ class StepsFile:
 def read_steps(path: Path) -> NDArray[np.int64]:
     """The times (n,), µs. InputError if it cannot be read."""
     try:
-        with np.load(path, allow_pickle=False) as found:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             first, gaps = found["first"], found["gaps"]
     except (OSError, BadZipFile, ValueError, KeyError, EOFError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is damaged"
