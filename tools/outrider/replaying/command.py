@@ -68,7 +68,7 @@ def words(difference: Difference) -> str:
     if before is None or after is None or type(before) is not type(after):
         return f"{where}: the log has {_kind(before)}, now it is {_kind(after)}"
     parts = [
-        f"{field} {was} → {now}"
+        f"{field} {was!r} → {now!r}"
         for field, was, now in zip(before._fields, before, after, strict=True)
         if was != now
     ]
