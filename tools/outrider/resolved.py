@@ -7,11 +7,8 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict
 
 from outrider.errors import Fault, InputError
-from outrider.fleet import Fleet
-from outrider.resources import config_root, find
 from outrider.scenario import Scenario
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
 
 CONFIGURATION = "configuration.yaml"
 
@@ -23,11 +20,6 @@ class Resolved(BaseModel):
 
     seed: int
     scenario: Scenario
-
-    def fleet(self) -> Fleet:
-        """The nodes of that flight, made anew."""
-        vehicle = load(find("vehicles", self.scenario.vehicle), VehicleConfig)
-        return Fleet(self.scenario, vehicle, self.seed, config_root() / "logs")
 
 
 def resolved(directory: Path, allowed: str) -> Resolved:

@@ -9,9 +9,13 @@ from companion.node import COMPONENT
 from mavlink_bridge.tlog import read_tlog
 from outrider import names
 from outrider.errors import Fault, InputError
+from outrider.fleet import Fleet
 from outrider.replaying.reenactment import Reenacted, reenact
 from outrider.resolved import resolved
+from outrider.resources import config_root, find
 from outrider.steps_file import read_steps
+from outrider.yaml_file import load
+from sitl.config import VehicleConfig
 
 _ALLOWED = "allowed: what outrider swarm SCENARIO --out leaves"
 _OFTEN = 256
@@ -26,7 +30,9 @@ def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[
 
     Raises InputError where there is no run, or a vehicle's log or steps are missing.
     """
-    fleet = resolved(directory, _ALLOWED).fleet()
+    flown = resolved(directory, _ALLOWED)
+    vehicle = load(find("vehicles", flown.scenario.vehicle), VehicleConfig)
+    fleet = Fleet(flown.scenario, vehicle, flown.seed, config_root() / "logs")
     for system in fleet.systems:
         for name in (names.log(system), names.steps(system)):
             if not (directory / name).is_file():
