@@ -104,7 +104,13 @@ def paper(
 
 @app.command()
 def replay(
-    run_dir: Annotated[Path, typer.Argument(help="What a flight left: logs and configuration.yaml.")],
+    log: Annotated[
+        Path,
+        typer.Argument(metavar="LOG", help="A tlog, or what a flight left: logs and configuration.yaml."),
+    ],
+    listing: Annotated[
+        bool, typer.Option("--list", help="Show who is in the log, and what is damaged.")
+    ] = False,
     certify: Annotated[
         bool, typer.Option("--certify", help="Check from the plans on the wire that all kept apart.")
     ] = False,
@@ -112,10 +118,16 @@ def replay(
 ) -> None:
     """Go through a flight again: does each companion, given what it received, send what it sent? Ends with 1
     if not, or if there are findings."""
+    if listing and certify:
+        raise InputError(f"replay {log}: both at once; allowed: one of --list, --certify")
+    if listing:
+        from outrider.logs.listing import listing as naming
+
+        raise typer.Exit(naming(log, as_json))
     from outrider.certify.command import certify as certifying
     from outrider.replaying.command import replay as replaying
 
-    raise typer.Exit((certifying if certify else replaying)(run_dir, as_json))
+    raise typer.Exit((certifying if certify else replaying)(log, as_json))
 
 
 @app.command()
