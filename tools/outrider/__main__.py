@@ -114,20 +114,32 @@ def replay(
     certify: Annotated[
         bool, typer.Option("--certify", help="Check from the plans on the wire that all kept apart.")
     ] = False,
+    own: Annotated[Optional[int], typer.Option(min=1, max=255, help="The own vehicle's system id.")] = None,  # noqa: UP045
+    neighbours: Annotated[Optional[str], typer.Option(help="Their system ids, with commas.")] = None,  # noqa: UP045
+    target: Annotated[Optional[int], typer.Option(min=1, max=255, help="The target's system id.")] = None,  # noqa: UP045
+    like: Annotated[str, typer.Option(help="Scenario whose companions' settings count.")] = "escort",
+    speed: Annotated[Optional[float], typer.Option(min=0.01, max=1000.0, help="Times the log's own.")] = None,  # noqa: UP045
+    to: Annotated[Optional[str], typer.Option(help="Endpoint for the log's telemetry; no commands.")] = None,  # noqa: UP045
+    out: Annotated[Optional[Path], typer.Option(help="Directory; new or empty.")] = None,  # noqa: UP045
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
-    """Go through a flight again: does each companion, given what it received, send what it sent? Ends with 1
-    if not, or if there are findings."""
+    """Replay a log: what would a companion have sent (--own), or a vehicle of ours around what is recorded
+    (--target)? Or a flight of ours: does each companion, given what it received, send what it sent? Ends with
+    1 if not, or if there are findings."""
     if listing and certify:
         raise InputError(f"replay {log}: both at once; allowed: one of --list, --certify")
     if listing:
         from outrider.logs.listing import listing as naming
 
         raise typer.Exit(naming(log, as_json))
-    from outrider.certify.command import certify as certifying
-    from outrider.replaying.command import replay as replaying
+    if certify:
+        from outrider.certify.command import certify as certifying
 
-    raise typer.Exit((certifying if certify else replaying)(log, as_json))
+        raise typer.Exit(certifying(log, as_json))
+    from outrider.replaying.request import Request
+
+    request = Request(log, own, neighbours, target, like, speed, to, out, as_json)
+    raise typer.Exit(request.run())
 
 
 @app.command()

@@ -150,11 +150,17 @@ def _cpu_of_all() -> float:
 def run_directory(out: Path | None, scenario: Scenario, seed: int) -> Path:
     """A new, empty directory: ``out``, or the first free ``runs/NAME-METHOD-seedN[-k]``. Nothing is
     overwritten."""
+    certified = scenario.companion.avoidance == "certified"
+    way = "certified" if certified else "+".join(scenario.companion.methods)
+    return new_directory(out, f"{scenario.name}-{way}-seed{seed}")
+
+
+def new_directory(out: Path | None, stem: str) -> Path:
+    """A new, empty directory: ``out``, or the first free ``runs/STEM[-k]``. Nothing is overwritten."""
     if out is not None:
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             raise InputError(f"--out {out}: exists and is not an empty directory")
         return _made(out)
-    stem = f"{scenario.name}-{'+'.join(scenario.companion.methods)}-seed{seed}"
     runs = _made(Path("runs"))
     number = 1
     while not _is_new(path := runs / (stem if number == 1 else f"{stem}-{number}")):

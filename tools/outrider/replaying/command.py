@@ -48,13 +48,16 @@ def _document(one: Reenacted) -> dict[str, object]:
 
 def _show(name: str, found: tuple[Reenacted, ...]) -> None:
     same = all(one.identical for one in found)
-    table = Table(title=Text(f"{name} · {'the same to the last bit' if same else 'not the same'}"))
+    table = Table()
     for head in ("vehicle", "steps", "frames sent again", "set-points", "different", "not at a step"):
         table.add_column(head, justify="right")
     for one in found:
         row = (one.system, one.steps, one.frames, one.setpoints, one.different, one.stray)
         table.add_row(*map(str, row))
     console = Console()
+    # Above the table, where a long name breaks no words.
+    heading = Text(f"{name} · {'the same to the last bit' if same else 'not the same'}")
+    console.print(heading, soft_wrap=True)
     console.print(table)
     for one in found:
         if one.first is not None:

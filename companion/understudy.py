@@ -1,0 +1,75 @@
+"""A companion that only rehearses: it plans as if it flew the vehicle it listens to, and commands nothing.
+
+For logs, and for looking on at a flight of others. The vehicle does not do what is planned, so every plan
+begins where the vehicle really is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from companion.config import CompanionConfig
+from companion.node import COMPONENT, Companion
+from companion.pilot import HEARTBEAT_LOST, Phase, Pilot
+from companion.world import View
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import Message, Source
+
+_ALWAYS_ANEW = 1e-6
+"""m: a plan that the vehicle is further from than that begins anew at the vehicle."""
+
+
+class _Onlooker(Pilot):
+    """A pilot that is ready as soon as it knows enough to plan, whoever steers the vehicle."""
+
+    @property
+    def guided(self) -> bool:
+        return self.phase is Phase.ESCORT
+
+    @property
+    def streaming(self) -> bool:
+        return self.phase is Phase.ESCORT
+
+    def step(self, now: int, view: View) -> list[Message]:
+        """No commands, ever."""
+        self._now = now
+        if self._heartbeat is not self._beaten:
+            self._beaten, self._beat_at = self._heartbeat, now
+        self.waiting_for = self._lacking(now, view)
+        self.phase = Phase.CONNECT if self.waiting_for else Phase.ESCORT
+        return []
+
+    def _lacking(self, now: int, view: View) -> str:
+        if self._heartbeat is None or now - self._beat_at > HEARTBEAT_LOST:
+            return "a heartbeat of the autopilot"
+        if self.profile is None:
+            return f"an autopilot that is known (ArduPilot 3, PX4 12; this is {self._heartbeat.autopilot})"
+        if view.local is None:
+            return "GPS_GLOBAL_ORIGIN"
+        if view.own is None or view.own.age > self._config.guard.own_stale_us:
+            return "LOCAL_POSITION_NED"
+        return "" if view.yaw is not None else "ATTITUDE"
+
+
+class Understudy(Companion):
+    """As ``Companion``, on the vehicle of ``system``; what it sends is what it would have sent."""
+
+    def __init__(
+        self,
+        config: CompanionConfig,
+        system: int,
+        target_system: int,
+        fleet: FleetFrame,
+        stopwatch: Callable[[], int],
+    ) -> None:
+        guard = config.guard.model_copy(update={"tube": _ALWAYS_ANEW})
+        config = config.model_copy(update={"guard": guard})
+        super().__init__(config, system, target_system, fleet, stopwatch)
+        self.pilot = _Onlooker(config, Source(system, COMPONENT), fleet.altitude)
+
+    @property
+    def lacking(self) -> str:
+        """What there is no set-point for want of; empty if there is one."""
+        if self.pilot.waiting_for:
+            return self.pilot.waiting_for
+        return "" if self.guard.horizon is not None else "a place to plan from"

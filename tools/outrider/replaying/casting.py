@@ -1,0 +1,158 @@
+"""Who plays whom in a log: own vehicle, neighbours, target; what each record is to the companion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+from companion.node import COMPONENT
+from companion.reception import AUTOPILOT
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.framing import START_V2
+from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, LocalPosition, Source
+from mavlink_bridge.tlog import Record
+from outrider.errors import InputError
+
+SETPOINT, LOCAL, GLOBAL, ORIGIN = 84, 32, 33, 49
+_SURVEYED = {LOCAL, GLOBAL, ORIGIN}
+
+
+class Part(Enum):
+    """What a record is."""
+
+    AUTOPILOT = "autopilot"
+    SWARM = "swarm"
+    TARGET = "target"
+    SENT = "sent"
+    """A set-point for the own vehicle, from whoever steered it."""
+    NOTHING = ""
+
+
+class Header(NamedTuple):
+    """Who says what."""
+
+    system: int
+    component: int
+    message_id: int
+
+
+def header(frame: bytes) -> Header:
+    """Of a whole frame."""
+    if frame[0] == START_V2:
+        return Header(frame[5], frame[6], int.from_bytes(frame[7:10], "little"))
+    return Header(frame[3], frame[4], frame[5])
+
+
+@dataclass(frozen=True)
+class Cast:
+    """System ids. ``neighbours`` None: everybody else that says where it is."""
+
+    own: int
+    neighbours: frozenset[int] | None = None
+    target: int | None = None
+
+    def part(self, frame: bytes) -> Part:
+        """What the record of ``frame`` is to the companion."""
+        system, component, message_id = header(frame)
+        if message_id == SETPOINT and (system, component) != (self.own, AUTOPILOT):
+            return Part.SENT
+        if system == self.own:
+            return Part.NOTHING if component == COMPONENT else Part.AUTOPILOT
+        if system == self.target:
+            return Part.TARGET
+        if self.neighbours is None or system in self.neighbours:
+            return Part.SWARM
+        return Part.NOTHING
+
+
+class Survey(NamedTuple):
+    """What a first look at the own vehicle's records shows: its first place (°, °, m above mean sea level)
+    and how high above its home that is, its GPS_GLOBAL_ORIGIN, and whether it says LOCAL_POSITION_NED.
+    ``systems`` are all that speak, ``placed`` those that say where they are; ``begin`` and ``end``, µs, of
+    the log."""
+
+    place: tuple[float, float, float]
+    above_home: float
+    origin: tuple[float, float, float] | None
+    local: bool
+    systems: frozenset[int]
+    placed: frozenset[int]
+    begin: int
+    end: int
+
+    @property
+    def seconds(self) -> float:
+        """How long the log is."""
+        return (self.end - self.begin) * 1e-6
+
+    @property
+    def fleet(self) -> FleetFrame:
+        """A fleet frame at the foot of the own first place."""
+        latitude, longitude, altitude = self.place
+        return FleetFrame(latitude, longitude, altitude - self.above_home)
+
+
+def survey(records: Iterable[Record], own: int, name: str) -> Survey:
+    """A look at all ``records`` of the log ``name``. InputError if the vehicle ``own`` is not in it or does
+    not say where it is."""
+    codec = Codec(lambda identifier, _system, _component: identifier in _SURVEYED)
+    systems: set[int] = set()
+    placed: set[int] = set()
+    place: GlobalPosition | None = None
+    first: LocalPosition | None = None
+    pair: tuple[GlobalPosition, LocalPosition] | None = None
+    origin: tuple[float, float, float] | None = None
+    begin: int | None = None
+    end = 0
+    for record in records:
+        begin = record.time if begin is None else begin
+        end = max(end, record.time)
+        systems.add(header(record.frame).system)
+        for message in codec.feed(record.frame):
+            if isinstance(message, GlobalPosition):
+                placed.add(message.source.system)
+            if message.source != Source(own, AUTOPILOT):
+                continue
+            match message:
+                case GlobalPosition():
+                    # Without a fix it is all zeros: that counts only where there is nothing better.
+                    if place is None or not (place.latitude or place.longitude):
+                        place = message
+                    if first is not None and pair is None:
+                        pair = message, first
+                case LocalPosition():
+                    first = message
+                case GpsGlobalOrigin() if origin is None:
+                    origin = message.latitude, message.longitude, message.altitude
+                case _:
+                    pass
+    if own not in systems:
+        said = ", ".join(map(str, sorted(systems))) or "nobody"
+        raise InputError(f"{name}: vehicle {own} is not in it; allowed: {said}")
+    if place is None:
+        said = ", ".join(map(str, sorted(placed))) or "nobody does"
+        raise InputError(
+            f"{name}: vehicle {own} never says where it is (GLOBAL_POSITION_INT); allowed: {said}"
+        )
+    if origin is None and pair is not None:
+        origin = _origin(*pair)
+    return Survey(
+        (place.latitude, place.longitude, place.altitude),
+        place.relative_altitude,
+        origin,
+        first is not None,
+        frozenset(systems),
+        frozenset(placed),
+        begin or 0,
+        end,
+    )
+
+
+def _origin(place: GlobalPosition, local: LocalPosition) -> tuple[float, float, float]:
+    """Where the own local frame begins, from one place in both."""
+    here = FleetFrame(place.latitude, place.longitude, place.altitude)
+    north, east, down = local.position_ned
+    return here.to_geodetic((-east, -north, down))

@@ -1,0 +1,155 @@
+"""``outrider replay LOG --own ID``: what a companion would have sent, beside what was sent."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from mavlink_bridge.errors import LogError
+from mavlink_bridge.tlog import Record, read_tlog
+from outrider.console import progress, share_progress
+from outrider.errors import Fault, InputError
+from outrider.replaying.casting import Cast, Survey, survey
+from outrider.replaying.chase import chase
+from outrider.replaying.picture import draw
+from outrider.replaying.rehearsal import Rehearsed, rehearse
+from outrider.replaying.setpoints import apart, course, facts
+from outrider.resources import find
+from outrider.scenario import Scenario
+from outrider.swarm import new_directory
+from outrider.yaml_file import load
+
+_COLUMNS = (
+    *("who", "time_us", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s"),
+    *("a_north_m_s2", "a_east_m_s2", "a_down_m_s2", "yaw_rad", "mask", "frame"),
+)
+
+
+Pacing = Callable[[Iterable[Record]], Iterable[Record]]
+"""Lets records through, when it is their time."""
+
+
+def rehearsal(log: Path, cast: Cast, like: str, out: Path | None, as_json: bool, pacing: Pacing) -> int:
+    """Let a companion with the settings of the scenario ``like`` listen to ``log``, and say what it would
+    have sent; leave ``setpoints.csv``, ``replay.json`` and ``replay.png`` in ``out``. The exit status: 0.
+
+    InputError for a log that cannot be read, and for ids that are not in it.
+    """
+    config = load(find("scenarios", like), Scenario).companion
+    try:
+        seen = survey(read_tlog(log), cast.own, str(log))
+        _check(log, cast, seen)
+        directory = _directory(out, f"{_stem(log)}-own-{cast.own}")
+        with share_progress() as watch:
+
+            def told(now: int, _read: int) -> None:
+                watch(log.name, (now - seen.begin) / max(seen.end - seen.begin, 1))
+
+            found = rehearse(config, cast, seen, pacing(read_tlog(log)), told)
+    except LogError as error:
+        raise InputError(str(error)) from None
+    _tell(f"{log.name} · vehicle {cast.own}", found, directory, as_json)
+    return 0
+
+
+def chasing(log: Path, target: int, like: str, out: Path | None, as_json: bool) -> int:
+    """Fly a vehicle of ours around ``target``, and say what it was sent; the run, and the same files, are
+    left in ``out``. The exit status: 0. InputError as for ``rehearsal``."""
+    try:
+        seconds = survey(read_tlog(log), target, str(log)).seconds
+        directory = _directory(out, f"{_stem(log)}-target-{target}")
+        with progress(seconds) as watch:
+            told = chase(log, target, like, directory, watch)
+    except LogError as error:
+        raise InputError(str(error)) from None
+    _tell(f"{log.name} · target {target}", Rehearsed(would=told), directory, as_json)
+    return 0
+
+
+def _tell(title: str, found: Rehearsed, directory: Path, as_json: bool) -> None:
+    document = document_of(found)
+    _leave(directory, title, found, document)
+    if as_json:
+        sys.stdout.write(json.dumps(document) + "\n")
+    else:
+        _show(title, document, directory)
+
+
+def document_of(found: Rehearsed) -> dict[str, object]:
+    """What a script reads: of the set-points that would have been sent, and under ``sent`` of those that
+    were; ``apart_m`` between the two."""
+    would, sent = facts(found.would), facts(found.sent)
+    off = apart(course(found.would), course(found.sent))
+    document: dict[str, object] = dict(would._asdict())
+    document["holds"] = found.holds
+    document["reasons"] = dict(found.reasons)
+    document["records"] = found.records
+    document["sent"] = sent._asdict()
+    document["apart_m"] = {
+        f"p{q}": round(float(np.percentile(off, q)), 3) if len(off) else None for q in (50, 95)
+    }
+    return document
+
+
+def _check(log: Path, cast: Cast, seen: Survey) -> None:
+    """InputError for somebody who says nothing of where it is."""
+    asked = {"--target": () if cast.target is None else (cast.target,), "--neighbours": cast.neighbours or ()}
+    allowed = ", ".join(map(str, sorted(seen.placed - {cast.own}))) or "nobody"
+    for option, systems in asked.items():
+        for system in sorted(set(systems) - seen.placed | set(systems) & {cast.own}):
+            wrong = "is the own vehicle" if system == cast.own else "never says where it is"
+            raise InputError(Fault(str(log), f"{option} {system} {wrong}; allowed: {allowed}"))
+
+
+def _directory(out: Path | None, stem: str) -> Path:
+    """A new, empty directory: ``out``, or the first free ``runs/replay-STEM``."""
+    return new_directory(out, f"replay-{stem}")
+
+
+def _stem(log: Path) -> str:
+    return log.name.split(".")[0]
+
+
+def _leave(directory: Path, name: str, found: Rehearsed, document: dict[str, object]) -> None:
+    (directory / "replay.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    with (directory / "setpoints.csv").open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(_COLUMNS)
+        for who, told in (("would", found.would), ("sent", found.sent)):
+            rows.writerows(
+                (who, t, *m.position, *m.velocity, *m.acceleration, m.yaw, m.type_mask, m.frame)
+                for t, m in told
+            )
+    draw(name, found, directory / "replay.png")
+
+
+def _show(title: str, document: dict[str, object], directory: Path) -> None:
+    sent = document["sent"]
+    table = Table("", "would have been sent", "was sent", title=Text(title))
+    for key in ("setpoints", "finite", "max_step_m", "max_speed_m_s", "max_acceleration_m_s2", "gaps"):
+        before = sent[key] if isinstance(sent, dict) else None
+        table.add_row(key, _text(document[key]), _text(before))
+    for key in ("mask_counts", "frames"):
+        before = sent[key] if isinstance(sent, dict) else None
+        table.add_row(key, _text(document[key]), _text(before))
+    console = Console()
+    console.print(table)
+    reasons = document["reasons"]
+    if isinstance(reasons, dict):
+        for words, steps in sorted(reasons.items(), key=lambda pair: -pair[1]):
+            console.print(Text(f"{steps * 0.01:8.2f} s without a set-point for want of {words}"))
+    console.print(Text(f"{directory}: replay.png, setpoints.csv, replay.json"), soft_wrap=True)
+
+
+def _text(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {count}" for key, count in value.items())
+    return "" if value is None else str(value)

@@ -1,0 +1,154 @@
+"""A companion listens to a log, and what it would have sent is kept beside what was sent."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+
+from companion.config import CompanionConfig
+from companion.understudy import Understudy
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import FleetFrame, enu_to_ned
+from mavlink_bridge.messages import (
+    GlobalPosition,
+    GpsGlobalOrigin,
+    LocalPosition,
+    Message,
+    SetpointLocal,
+    Source,
+)
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.tlog import Record
+from outrider.beacon import Beacon
+from outrider.paths import Motion
+from outrider.replaying.casting import GLOBAL, Cast, Part, Survey, header
+from outrider.scenario_part import TARGET_SYSTEM
+
+STEP = 10_000
+"""µs."""
+_IDLE = 5_000_000
+"""µs of a log in which nobody speaks that are gone through; what is longer is skipped."""
+_RATE_HZ = 5.0
+
+Told = tuple[int, SetpointLocal]
+
+
+@dataclass
+class Rehearsed:
+    """``would``: set-points that the companion would have sent; ``sent``: those that were, each with its time
+    (µs of the log); ``places``: (time, position (3,)) NED of the vehicle itself, local as the set-points are.
+    ``reasons``: steps of 10 ms without a set-point, by what was missing; ``holds``: plans that were held."""
+
+    would: list[Told] = field(default_factory=list)
+    sent: list[Told] = field(default_factory=list)
+    places: list[tuple[int, tuple[float, float, float]]] = field(default_factory=list)
+    reasons: Counter[str] = field(default_factory=Counter)
+    holds: int = 0
+    records: int = 0
+
+
+def rehearse(
+    config: CompanionConfig,
+    cast: Cast,
+    seen: Survey,
+    records: Iterable[Record],
+    on_step: Callable[[int, int], None] = lambda _now, _records: None,
+) -> Rehearsed:
+    """Step an understudy every 10 ms of the log's time with what was recorded until then. Without a target in
+    ``cast`` it is a point that stands where the own vehicle was first. ``on_step`` hears the time (µs) and
+    how many records have been read."""
+    fleet = seen.fleet
+    system = next(n for n in (TARGET_SYSTEM, 1, 2, 3) if n not in seen.systems and n != cast.own)
+    target = system if cast.target is None else cast.target
+    companion = Understudy(config, cast.own, target, fleet, lambda: 0)
+    standing = None if cast.target is not None else Beacon(system, "target", _RATE_HZ, fleet)
+    here = fleet.to_enu(*seen.place) * (1.0, 1.0, 0.0)
+    found, reader, stand_in = Rehearsed(), Codec(), _StandIn(cast.own, seen, fleet)
+    for now, batch in steps(records):
+        inbox = []
+        for record in batch:
+            inbox += _given(cast.part(record.frame), record, reader, found, stand_in)
+        if standing is not None and standing.due(now):
+            inbox += standing.say(now, Motion(here, here * 0.0))
+        for link, data in companion.step(now, inbox):
+            if link == "autopilot":
+                found.would += [(now, m) for m in reader.feed(data) if isinstance(m, SetpointLocal)]
+        if companion.lacking:
+            found.reasons[companion.lacking] += 1
+        found.records += len(batch)
+        on_step(now, found.records)
+    found.holds = companion.tally.held
+    return found
+
+
+def steps(records: Iterable[Record]) -> Iterator[tuple[int, list[Record]]]:
+    """Times (µs, multiples of 4) every 10 ms, each with the records since the last one. A record whose time
+    steps back comes with the one before it; long silence is skipped."""
+    now: int | None = None
+    batch: list[Record] = []
+    for record in records:
+        time = record.time - record.time % 4
+        if now is None:
+            now = time
+        if time > now + _IDLE:
+            yield now, batch
+            batch, now = [], time
+        while time > now:
+            yield now, batch
+            batch = []
+            now += STEP
+        batch.append(record)
+    if now is not None:
+        yield now, batch
+
+
+def _given(part: Part, record: Record, reader: Codec, found: Rehearsed, stand_in: _StandIn) -> list[Datagram]:
+    """What the companion gets of a record; set-points of others are kept, and where the vehicle is."""
+    if part is Part.NOTHING:
+        return []
+    if part is Part.SENT:
+        found.sent += [
+            (record.time, m)
+            for m in reader.feed(record.frame)
+            if isinstance(m, SetpointLocal) and m.target_system in (0, stand_in.own.system)
+        ]
+        return []
+    if part is not Part.AUTOPILOT:
+        return [Datagram(part.value, record.frame)]
+    given = [Datagram("autopilot", frame) for frame in stand_in.frames(record.frame)]
+    for _, data in given:
+        for message in reader.feed(data):
+            if isinstance(message, LocalPosition) and message.source == stand_in.own:
+                found.places.append((record.time, message.position_ned))
+    return given
+
+
+class _StandIn:
+    """Says in the own autopilot's place what the log lacks: its origin, once, and its local position from its
+    global one."""
+
+    def __init__(self, own: int, seen: Survey, fleet: FleetFrame) -> None:
+        self.own = Source(own, 1)
+        self._local = None if seen.local else fleet
+        self._codec = Codec()
+        self._reader = Codec(lambda identifier, _system, _component: identifier == GLOBAL)
+        latitude, longitude, altitude = seen.origin or (fleet.latitude, fleet.longitude, fleet.altitude)
+        self._origin: Message | None = GpsGlobalOrigin(self.own, latitude, longitude, altitude, 0)
+
+    def frames(self, frame: bytes) -> list[bytes]:
+        """``frame``, and what has to be said besides."""
+        found = [frame]
+        if self._origin is not None:
+            found.insert(0, self._codec.encode(self._origin))
+            self._origin = None
+        if self._local is not None and header(frame)[1:] == (1, GLOBAL):
+            for message in self._reader.feed(frame):
+                if isinstance(message, GlobalPosition):
+                    place = enu_to_ned(
+                        self._local.to_enu(message.latitude, message.longitude, message.altitude)
+                    )
+                    ned = (float(place[0]), float(place[1]), float(place[2]))
+                    local = LocalPosition(self.own, message.time_boot, ned, message.velocity_ned)
+                    found.append(self._codec.encode(local))
+        return found

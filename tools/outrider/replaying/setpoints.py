@@ -1,0 +1,111 @@
+"""What a row of set-points is like, and how it differs from another."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mavlink_bridge.messages import SetpointLocal
+
+Array = NDArray[np.float64]
+TOGETHER = 100_000
+"""µs. What is further apart is no step but a gap."""
+_TRIPLES = {"position": 0x007, "velocity": 0x038, "acceleration": 0x1C0}
+"""Bits of the type mask that say *ignored*."""
+
+
+class Course(NamedTuple):
+    """A row of n set-points: ``times`` (n,) µs; ``positions``, ``velocities``, ``accelerations`` (n, 3) NED,
+    SI, NaN where the mask ignores them; ``yaw`` (n,) rad, ``masks`` and ``frames`` (n,)."""
+
+    times: NDArray[np.int64]
+    positions: Array
+    velocities: Array
+    accelerations: Array
+    yaw: Array
+    masks: NDArray[np.int64]
+    frames: NDArray[np.int64]
+
+
+class Facts(NamedTuple):
+    """``finite``: whether all that is not ignored is; ``max_step_m``: between two that follow each other
+    within 0.1 s; ``gaps``: where longer passed. None where there is nothing to measure."""
+
+    setpoints: int
+    finite: bool
+    max_step_m: float | None
+    max_speed_m_s: float | None
+    max_acceleration_m_s2: float | None
+    gaps: int
+    mask_counts: dict[str, int]
+    frames: dict[str, int]
+
+
+def course(told: Sequence[tuple[int, SetpointLocal]]) -> Course:
+    """Set-points with their times, as arrays."""
+    count = len(told)
+    values = np.array(
+        [(*m.position, *m.velocity, *m.acceleration, m.yaw) for _, m in told], dtype=np.float64
+    ).reshape(count, 10)
+    masks = np.array([m.type_mask for _, m in told], dtype=np.int64)
+    for k, bits in enumerate(_TRIPLES.values()):
+        values[(masks & bits) != 0, 3 * k : 3 * k + 3] = np.nan
+    values[(masks & 0x400) != 0, 9] = np.nan
+    return Course(
+        np.array([time for time, _ in told], dtype=np.int64),
+        values[:, 0:3],
+        values[:, 3:6],
+        values[:, 6:9],
+        values[:, 9],
+        masks,
+        np.array([m.frame for _, m in told], dtype=np.int64),
+    )
+
+
+def facts(told: Sequence[tuple[int, SetpointLocal]]) -> Facts:
+    """Of set-points with their times, in order."""
+    of = course(told)
+    near = np.diff(of.times) <= TOGETHER
+    steps = np.linalg.norm(np.diff(of.positions, axis=0), axis=1)[near]
+    return Facts(
+        len(told),
+        all(_finite(m) for _, m in told),
+        _largest(steps),
+        _largest(np.linalg.norm(of.velocities, axis=1)),
+        _largest(np.linalg.norm(of.accelerations, axis=1)),
+        int((~near).sum()),
+        {f"0x{mask:03X}": n for mask, n in sorted(Counter(of.masks.tolist()).items())},
+        {str(frame): n for frame, n in sorted(Counter(of.frames.tolist()).items())},
+    )
+
+
+def apart(would: Course, sent: Course) -> Array:
+    """Distances (k,) m of set-points that were ``sent`` from the newest that ``would`` have been at that
+    time, where both have a position."""
+    if not len(would.times) or not len(sent.times):
+        return np.zeros(0)
+    newest = np.searchsorted(would.times, sent.times, side="right") - 1
+    fresh = (newest >= 0) & (sent.times - would.times[newest] <= TOGETHER)
+    off = np.linalg.norm(sent.positions[fresh] - would.positions[newest[fresh]], axis=1)
+    result: Array = off[np.isfinite(off)]
+    return result
+
+
+def _finite(message: SetpointLocal) -> bool:
+    """Whether all that the mask does not ignore is finite."""
+    parts = {"position": message.position, "velocity": message.velocity, "acceleration": message.acceleration}
+    used = [v for name, triple in parts.items() if not message.type_mask & _TRIPLES[name] for v in triple]
+    if not message.type_mask & 0x400:
+        used.append(message.yaw)
+    if not message.type_mask & 0x800:
+        used.append(message.yaw_rate)
+    return bool(np.isfinite(used).all())
+
+
+def _largest(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return round(float(known.max()), 4) if len(known) else None
