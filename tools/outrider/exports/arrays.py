@@ -102,7 +102,7 @@ def _arrays(path: Path) -> _Arrays | None:
     if not path.is_file():
         return None
     try:
-        with np.load(path) as file:
+        with path.open("rb") as raw, np.load(raw) as file:
             return {name: file[name] for name in file.files}
     except (ValueError, OSError, EOFError, BadZipFile, zlib.error, NotImplementedError) as error:
         raise InputError(Fault(str(path), f"cannot be read: {error}; allowed: what outrider left")) from None

@@ -31,6 +31,7 @@ class Result(NamedTuple):
     bytes: int
     topics: int
     messages: int
+    out_of_order: int
     damaged_records: int
     unknown_messages: int
     unread_logs: tuple[str, ...]
@@ -86,6 +87,7 @@ def show(result: Result) -> None:
         "size, MB": f"{result.bytes / 1e6:.2f}",
         "channels or tables": result.topics,
         "messages or rows": result.messages,
+        "messages left out, back in time": result.out_of_order,
         "damaged records left out": result.damaged_records,
         "messages that the dialect lacks": result.unknown_messages,
     }

@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Final
 
 from outrider.errors import InputError
@@ -22,7 +23,7 @@ def destination(source: Path, form: str, out: Path | None) -> Path:
         out = _default(source, form)
     if out.exists() and not (form in FOLDER and out.is_dir() and not any(out.iterdir())):
         allowed = "a new or empty directory" if form in FOLDER else "a new file"
-        raise InputError(f"--out {out}: exists, and nothing is overwritten; allowed: {allowed}")
+        raise InputError(f"{out}: exists, and nothing is overwritten; allowed: --out with {allowed}")
     return out
 
 
@@ -35,32 +36,23 @@ def _default(source: Path, form: str) -> Path:
 
 @contextmanager
 def fresh(path: Path, form: str) -> Iterator[Path]:
-    """Where to write: under another name, which becomes ``path`` when all is done, and vanishes when it is
-    not.
+    """Where to write: in a folder of its own beside ``path``, to which the result moves when all is done; the
+    folder vanishes in any case.
 
     Raises InputError if that cannot be made.
     """
-    part = path.with_name(f"{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _remove(part)
+        folder = Path(mkdtemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent))
+    except OSError as error:
+        raise InputError(f"{path.parent}: nothing can be made in it: {error.strerror}") from None
+    try:
+        part = folder / path.name
         if form in FOLDER:
             part.mkdir()
-        else:
-            part.touch()
-    except OSError as error:
-        raise InputError(f"{part}: cannot be made: {error.strerror}") from None
-    try:
         yield part
         if path.is_dir():
             path.rmdir()
         part.rename(path)
     finally:
-        _remove(part)
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+        shutil.rmtree(folder)

@@ -96,7 +96,9 @@ class Px4Topics:
     def attitude(self, values: Values) -> list[View]:
         angles = values["roll"], values["pitch"], values["yaw"]
         rates = values["rollspeed"], values["pitchspeed"], values["yawspeed"]
-        return [_view(ATTITUDE, *quaternion(*angles)), _view(RATES, *rates)]
+        known = all(map(math.isfinite, angles))
+        turned = quaternion(*angles) if known else (_NAN, _NAN, _NAN, _NAN)
+        return [_view(ATTITUDE, *turned), _view(RATES, *rates)]
 
     def local(self, values: Values) -> list[View]:
         place = tuple(values[name] for name in ("x", "y", "z", "vx", "vy", "vz"))

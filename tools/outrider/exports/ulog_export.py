@@ -48,11 +48,10 @@ def write(run: Run, folder: Path, watch: Watch) -> Written:
     zero = max(min((one.first for one in found), default=0) // SECOND * SECOND - SECOND, 0)
     if not any(_vehicles(log, one) for log, one in zip(logs, found, strict=True)):
         raise InputError(f"{run.source}: no vehicle speaks in it: no HEARTBEAT of an autopilot")
-    topics = messages = 0
+    parts = []
     for log, one, stream in zip(logs, found, watched(logs, watch, (_SURVEYED, 1.0)), strict=True):
-        part = _write(log, one, stream, folder, zero)
-        topics, messages = topics + part.topics, messages + part.messages
-    return Written(topics, messages)
+        parts += _write(log, one, stream, folder, zero)
+    return Written(*(sum(column) for column in zip(*parts, strict=True)))
 
 
 def survey(messages: Iterable[Spoken]) -> Survey:
@@ -78,7 +77,7 @@ def _vehicles(log: Log, found: Survey) -> list[int]:
     return sorted(found.vehicles) if log.owner is None else [log.owner]
 
 
-def _write(log: Log, found: Survey, messages: Iterable[Spoken], folder: Path, zero: int) -> Written:
+def _write(log: Log, found: Survey, messages: Iterable[Spoken], folder: Path, zero: int) -> list[Written]:
     vehicles = _vehicles(log, found)
     kinds = sorted(found.kinds, key=lambda kind: kind.id)
     with ExitStack() as files:
@@ -95,7 +94,7 @@ def _write(log: Log, found: Survey, messages: Iterable[Spoken], folder: Path, ze
             else:
                 books[spoken.system].add(spoken)
         written = [book.file for book in books.values()]
-        return Written(sum(file.subscriptions for file in written), sum(file.messages for file in written))
+        return [Written(file.subscriptions, file.messages, file.out_of_order) for file in written]
 
 
 def _file(folder: Path, system: int, zero: int, kinds: list[Kind]) -> UlogFile:
