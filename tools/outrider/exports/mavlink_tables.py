@@ -23,8 +23,8 @@ HEAD: Final = ("time_us", "log", "link", "system", "component")
 who said it."""
 _HEAD = Struct("<qBBBB")
 _HEAD_TYPES = [("time_us", "<i8"), ("log", "u1"), ("link", "u1"), ("system", "u1"), ("component", "u1")]
-_ROWS: Final = 65_536
-_BYTES: Final = 64 << 20
+_ROWS: Final = 32_768
+_BYTES: Final = 32 << 20
 """What waits in all tables together before it is written."""
 
 
