@@ -44,7 +44,8 @@ _ZERO.flags.writeable = False
 
 
 class Tally(NamedTuple):
-    """What a companion counted so far; ``plan_ns`` holds one stopwatch reading per plan, at most 4.29 s."""
+    """What a companion counted so far; ``plan_ns`` holds one stopwatch reading per plan, at most 4.29 s, and
+    ``plan_at`` when that plan was due (µs on its clock)."""
 
     plans: int
     relaxed: int
@@ -52,6 +53,7 @@ class Tally(NamedTuple):
     held: int
     anchored_anew: int
     plan_ns: Sequence[int]
+    plan_at: Sequence[int] = ()
 
 
 class Companion:
@@ -93,6 +95,7 @@ class Companion:
         self._next_plan = self._next_setpoint = 0
         self._plans = self._relaxed = 0
         self._plan_ns = array("I")
+        self._plan_at = array("q")
         self.plan_log = PlanLog()
 
     @property
@@ -103,7 +106,7 @@ class Companion:
             keeper = self._certified.keeper
             held, failures = sum(keeper.held.values()), keeper.held[Why.UNSOLVED]
             anchored = keeper.anchored_anew
-        return Tally(self._plans, self._relaxed, failures, held, anchored, self._plan_ns[:])
+        return Tally(self._plans, self._relaxed, failures, held, anchored, self._plan_ns[:], self._plan_at[:])
 
     @property
     def bad_frames(self) -> int:
@@ -240,7 +243,7 @@ class Companion:
                 flight.keeper.anchor(now, measured)
             else:
                 self._plans += flight.plan(now, aim, self.world, view)
-            self._took(started)
+            self._took(now, started)
         self.guard.horizon = horizon = flight.horizon()
         if horizon is not None and now >= self._next_plan:
             self._next_plan = now + self.config.rates.replan_us
@@ -267,7 +270,7 @@ class Companion:
             self.guard.hold(now, solver=True)
             return
         finally:
-            self._took(started)
+            self._took(now, started)
         self._plans += 1
         self.plan_log.add(now, self.plan.gradient)
         self._relaxed += self.plan.relaxed
@@ -282,8 +285,9 @@ class Companion:
         ahead: Array = 1e-6 * self.config.horizon.dt_us * np.arange(1.0, len(places) + 1.0)
         self._heading.plan(now, places, view.target.ahead(ahead).positions)
 
-    def _took(self, started: int) -> None:
-        """A plan that was begun when the stopwatch showed ``started`` is done."""
+    def _took(self, now: int, started: int) -> None:
+        """The plan that was due at ``now``, and begun when the stopwatch showed ``started``, is done."""
+        self._plan_at.append(now)
         self._plan_ns.append(min(max(self._stopwatch() - started, 0), _LONGEST_NS))
 
     def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:

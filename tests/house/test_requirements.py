@@ -13,7 +13,7 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LOCK = tomllib.loads((ROOT / "uv.lock").read_text(encoding="utf-8"))
-EXTRAS, GROUPS = ("sitl",), ("dev",)
+EXTRAS, GROUPS = ("sitl", "export"), ("dev",)
 
 
 class Pin(NamedTuple):

@@ -19,8 +19,9 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[2]
 OUR_OWN = {"companion", "sitl", "mavlink_bridge", "outrider"}
 CONFIG = ("scenarios", "vehicles", "sweeps", "scenes", "logs", "schemas")
-EXTRA = {"numba", "llvmlite", "jsbsim", "viser"}
+EXTRA = {"numba", "llvmlite", "jsbsim", "viser", "mcap", "pyarrow"}
 """What no core install has."""
+SITL = {"numba", "llvmlite", "jsbsim"}
 ADVICE = "pip install 'outrider[sitl]'"
 
 pytestmark = pytest.mark.slow
@@ -188,6 +189,7 @@ def test_a_core_install_has_neither_compiler_nor_simulator_nor_viewer(core: Inst
         "outrider.yaml_file",
         "outrider.scenario",
         "outrider.sweeps.grid",
+        "outrider.exports.ulog_export",
         "sitl.weather",
     ],
 )
@@ -234,8 +236,20 @@ def test_what_needs_the_sitl_says_how_to_get_it(core: Installed, words: tuple[st
     assert not list(core.folder.iterdir())
 
 
+def test_exports_need_the_core_alone_or_say_how_to_get_more(core: Installed) -> None:
+    log = str(ROOT / "config" / "logs" / "escort-target.tlog")
+    for form in ("mcap", "csv", "parquet"):
+        done = core.outrider("export", log, "--format", form, "--out", "out")
+        assert (done.returncode, done.stdout, done.stderr.count("\n")) == (3, "", 1)
+        assert "pip install 'outrider[export]'" in done.stderr
+    done = core.outrider("export", log, "--format", "ulog", "--out", "out")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert "no vehicle speaks in it" in done.stderr
+    assert not list(core.folder.iterdir())
+
+
 def test_a_full_install_flies_from_anywhere(full: Installed) -> None:
-    assert EXTRA - {"viser"} <= full.packages | ({"jsbsim"} if not_here("jsbsim") else set())
+    assert full.packages | ({"jsbsim"} if not_here("jsbsim") else set()) >= SITL
     words = ("swarm", "antipodal-8", "--vehicles", "2", "--replan-hz", "20", "--out", "flight")
     done = full.outrider(*words)
     assert done.returncode == 0, done.stderr

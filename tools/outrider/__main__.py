@@ -22,7 +22,13 @@ BAD_INPUT, FAULT = 2, 3
 _METHODS: Final = "baseline, swivel, approach_angle, tangential; joined by +."
 _INTERRUPTED = 130
 """What typer makes of Ctrl-C."""
-_EXTRAS: Final = {"numba": "sitl", "llvmlite": "sitl", "jsbsim": "sitl"}
+_EXTRAS: Final = {
+    "numba": "sitl",
+    "llvmlite": "sitl",
+    "jsbsim": "sitl",
+    "mcap": "export",
+    "pyarrow": "export",
+}
 """What only an extra of the package installs."""
 # Click's UsageError: typer has no name of its own for it, and newer ones bring their own click.
 _UsageError: Final = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
@@ -140,6 +146,19 @@ def replay(
 
     request = Request(log, own, neighbours, target, like, speed, to, out, as_json)
     raise typer.Exit(request.run())
+
+
+@app.command()
+def export(
+    source: Annotated[Path, typer.Argument(help="What a flight left, or a tlog.", metavar="RUN_DIR|LOG")],
+    form: Annotated[str, typer.Option("--format", help="mcap, csv, parquet or ulog.")],
+    out: Annotated[Optional[Path], typer.Option(help="File (mcap) or directory; new.")] = None,  # noqa: UP045
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Turn a run or a log into files for Foxglove, PlotJuggler, tables or PX4's tools."""
+    from outrider.exports.command import export as exporting
+
+    exporting(source, form, out, as_json)
 
 
 @app.command()

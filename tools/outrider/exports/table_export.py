@@ -1,0 +1,22 @@
+"""A run or a log as tables."""
+
+from __future__ import annotations
+
+from itertools import chain
+from pathlib import Path
+
+from outrider.exports import mavlink_tables, motion_tables
+from outrider.exports.log import Watch, watched
+from outrider.exports.run import Run
+from outrider.exports.table_files import TableFiles
+from outrider.exports.written import Written
+
+
+def write(run: Run, folder: Path, form: str, watch: Watch) -> Written:
+    """Everything of ``run`` into ``folder``; ``form`` is csv or parquet."""
+    messages = watched(list(run.logs), watch)
+    logs = ((log.owner or 0, spoken) for log, spoken in zip(run.logs, messages, strict=True))
+    with TableFiles(folder, form) as files:
+        for part in chain(motion_tables.parts(run), mavlink_tables.parts(logs)):
+            files.write(part)
+        return Written(files.tables, files.rows)

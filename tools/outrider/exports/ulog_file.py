@@ -1,0 +1,112 @@
+"""A ULog, written from its public specification (https://docs.px4.io/main/en/dev_log/ulog_file_format.html):
+header, flag bits, information, formats; then subscriptions, data and texts. Little endian, times in µs.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+from struct import Struct
+from types import TracebackType
+from typing import Final, NamedTuple, Self
+
+from outrider.errors import OutriderError
+
+MAGIC: Final = b"ULog\x01\x12\x35\x01"
+"""Its last byte is the version."""
+MOST_INSTANCES: Final = 256
+_HEADER = Struct("<HB")
+_FLAGS = bytes(40)
+"""No feature that a reader would have to know of, and no data appended."""
+_SUBSCRIBE = Struct("<BH")
+_DATA = Struct("<HQ")
+_TEXT = Struct("<BQ")
+
+
+class Topic(NamedTuple):
+    """A format: ``fields`` are (type, name) after the time stamp, which every message begins with."""
+
+    name: str
+    fields: tuple[tuple[str, str], ...]
+
+    @property
+    def format(self) -> str:
+        """As the file defines it."""
+        fields = (("uint64_t", "timestamp"), *self.fields)
+        return f"{self.name}:" + "".join(f"{kind} {name};" for kind, name in fields)
+
+
+class UlogFile:
+    """Writes the file at ``path``; a context manager. ``start``: when the log begins; all topics that may
+    come are told in advance. Same calls, same bytes."""
+
+    def __init__(
+        self, path: Path, start: int, information: dict[str, str | int], topics: Iterable[Topic]
+    ) -> None:
+        self.messages = 0
+        self.out_of_order = 0
+        self._subscriptions: dict[tuple[str, object], int] = {}
+        self._instances: dict[str, int] = defaultdict(int)
+        self._latest: list[int] = []
+        self._file = path.open("wb")
+        self._file.write(MAGIC + start.to_bytes(8, "little"))
+        self._write("B", _FLAGS)
+        for name, value in information.items():
+            self._inform(name, value)
+        for topic in topics:
+            self._write("F", topic.format.encode())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    @property
+    def subscriptions(self) -> int:
+        """How many there are so far."""
+        return len(self._subscriptions)
+
+    def data(self, time: int, topic: Topic, source: object, values: bytes) -> None:
+        """A message of ``topic``; each ``source`` has an instance of its own. One that is earlier than the
+        one before it is left out and counted: a series has to go forward. Raises OutriderError for the 257th
+        source."""
+        key = topic.name, source
+        number = self._subscriptions.get(key)
+        if number is None:
+            number = self._subscribe(topic, key)
+        if time < self._latest[number]:
+            self.out_of_order += 1
+            return
+        self._latest[number] = time
+        self._write("D", _DATA.pack(number, time) + values)
+        self.messages += 1
+
+    def say(self, time: int, severity: int, text: str) -> None:
+        """A text; ``severity`` 0…7 as of MAVLink, which is that of the Linux kernel."""
+        self._write("L", _TEXT.pack(ord("0") + min(severity, 7), time) + text.encode())
+
+    def _subscribe(self, topic: Topic, key: tuple[str, object]) -> int:
+        instance = self._instances[topic.name]
+        if instance >= MOST_INSTANCES:
+            raise OutriderError(f"{topic.name}: a ULog has room for {MOST_INSTANCES} senders")
+        self._instances[topic.name] += 1
+        number = len(self._subscriptions)
+        self._subscriptions[key] = number
+        self._latest.append(0)
+        self._write("A", _SUBSCRIBE.pack(instance, number) + topic.name.encode())
+        return number
+
+    def _inform(self, name: str, value: str | int) -> None:
+        if isinstance(value, int):
+            key, raw = f"uint64_t {name}", value.to_bytes(8, "little")
+        else:
+            raw = value.encode()
+            key = f"char[{len(raw)}] {name}"
+        self._write("I", bytes([len(key)]) + key.encode() + raw)
+
+    def _write(self, kind: str, body: bytes) -> None:
+        self._file.write(_HEADER.pack(len(body), ord(kind)) + body)
