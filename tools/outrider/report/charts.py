@@ -97,8 +97,7 @@ def histogram(times: PlanTimes | None) -> Histogram | None:
 def _lines(motions: Motions, values: Array) -> tuple[Line, ...]:
     """Of each vehicle; ``values`` (n, k), those that fly the task first."""
     return tuple(
-        Line(str(system), system, values[:, k])
-        for k, system in enumerate(motions.system[: values.shape[1]])
+        Line(str(system), system, values[:, k]) for k, system in enumerate(motions.system[: values.shape[1]])
     )
 
 

@@ -35,8 +35,10 @@ def offset(log: Log, motions: Motions) -> float:
     if float(np.abs(told).max()) < _STILL:
         return guess
     for width, grid in ((REACH, _COARSE), (_COARSE, _FINE)):
-        candidates = guess + np.arange(-width, width + 0.5 * grid, grid)
-        guess = float(candidates[np.argmin([_misfit(when + c, told, motions.time, true) for c in candidates])])
+        candidates: Array = guess + np.arange(-width, width + 0.5 * grid, grid)
+        guess = float(
+            candidates[np.argmin([_misfit(when + c, told, motions.time, true) for c in candidates])]
+        )
     return guess
 
 
@@ -50,7 +52,7 @@ def errors(logs: Sequence[Log], offsets: dict[int, float]) -> dict[int, float]:
 
 def _misfit(when: Array, told: Array, time: Array, true: Array) -> float:
     """Mean square (m²/s²) of told less true velocity where both are known; outside the flight is at rest."""
-    between = np.stack([np.interp(when, time, true[:, axis], 0.0, 0.0) for axis in range(3)], axis=1)
+    between = np.array([np.interp(when, time, true[:, axis], 0.0, 0.0) for axis in range(3)]).T
     return float(np.mean((told - between) ** 2))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import NamedTuple
@@ -14,12 +15,12 @@ from outrider.report import clocks
 from outrider.report.charts import charts, histogram
 from outrider.report.distances import encounters
 from outrider.report.events import Event, events
-from outrider.report.headline import headline
+from outrider.report.headline import Headline, headline
 from outrider.report.loss import Losses, losses
 from outrider.report.page import MARK, page
 from outrider.report.reading import Watch, read
 from outrider.report.replay import document
-from outrider.report.run import Run
+from outrider.report.run import Motions, Run
 from outrider.report.tables import event_table, fact_list, gap_list, loss_tables, summary_table
 from outrider.report.thinning import chosen
 
@@ -60,27 +61,42 @@ def report(directory: Path, out: Path | None = None, as_json: bool = False) -> i
 def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
     """The page of a run, not yet written. Raises InputError for what is no run."""
     run = read(directory, watch)
-    motions, scenario = run.motions, run.scenario
+    motions = run.motions
     ahead = {} if motions is None else {log.owner: clocks.offset(log, motions) for log in run.logs}
     lost = losses(run.logs, ahead)
-    replay, near, end = None, [], 0.0
-    if motions is not None:
-        d_min = run.summary.get("d_min_m", 0.0) if scenario is None else scenario.d_min
-        near = encounters(motions, float(d_min) if isinstance(d_min, int | float) else 0.0, scenario)
-        end = float(motions.time[-1])
-    happened = events(run, near, ahead, end)
-    if motions is not None:
-        shown = chosen(motions)
-        drawn = charts(run, motions, shown, lost, clocks.errors(run.logs, ahead))
-        replay = document(run, motions, shown, drawn, histogram(run.plan_times), happened)
-    method = run.summary.get("method")
-    words = [run.name, *([str(method)] if method else [])]
-    if run.seed is not None:
-        words.append(f"seed {run.seed}")
+    near = [] if motions is None else encounters(motions, _d_min(run), run.scenario)
+    happened = events(run, near, ahead, 0.0 if motions is None else float(motions.time[-1]))
+    replay = None if motions is None else _replay(run, motions, lost, ahead, happened)
+    said = headline(run, lost.share)
+    text = page(_title(run), said, _parts(run, said, happened, lost), replay)
+    return Made(text, run, tuple(happened), lost)
+
+
+def _d_min(run: Run) -> float:
+    """m; 0, below which nothing is, where nobody says."""
+    said = run.summary.get("d_min_m") if run.scenario is None else run.scenario.d_min
+    return float(said) if isinstance(said, int | float) else 0.0
+
+
+def _replay(
+    run: Run, motions: Motions, lost: Losses, ahead: dict[int, float], happened: Sequence[Event]
+) -> str:
+    shown = chosen(motions)
+    drawn = charts(run, motions, shown, lost, clocks.errors(run.logs, ahead))
+    return document(run, motions, shown, drawn, histogram(run.plan_times), happened)
+
+
+def _title(run: Run) -> str:
+    method, seed = run.summary.get("method"), run.seed
+    words = [run.name, str(method or ""), "" if seed is None else f"seed {seed}"]
+    return " · ".join(word for word in words if word)
+
+
+def _parts(run: Run, said: Headline, happened: Sequence[Event], lost: Losses) -> dict[str, str]:
+    """What the template has places for."""
     share = lost.share
-    told = headline(run, share)
-    parts = {
-        "facts": fact_list(told.facts),
+    return {
+        "facts": fact_list(said.facts),
         "gaps": gap_list(run.gaps),
         "summary": summary_table(run.summary) if run.summary else "<p>There is no summary.</p>",
         "events": event_table(happened),
@@ -88,7 +104,6 @@ def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
         "share": "" if share is None else f"In all, {100.0 * share:.1f} % did not arrive.",
         "configuration": escape(run.configuration or "There is no configuration."),
     }
-    return Made(page(" · ".join(words), told, parts, replay), run, tuple(happened), lost)
 
 
 def check(path: Path) -> None:

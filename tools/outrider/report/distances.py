@@ -12,7 +12,6 @@ from companion.obstacles import FixedObstacles
 from outrider.report.run import Array, Motions
 from outrider.scenario import Scenario
 
-
 _ALOFT = 0.2
 """m: lower, a vehicle may stand on the ground beside what it would keep away from."""
 _BESIDE = 0.1

@@ -13,7 +13,6 @@ from outrider.scenario import Scenario
 from outrider.scenario_faults import ClockFault, Freeze, GpsJump, GpsLoss, MotorFailure, Sudden, Vanish
 from outrider.scenario_places import FixedTarget
 
-
 TOGETHER = 0.5
 """s"""
 

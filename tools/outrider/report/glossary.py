@@ -25,7 +25,9 @@ TERMS = {
     "converged": Term("converged", "", "everybody where it should be, and slow, for one second"),
     "convergence_time_s": Term("time to converge", "s", "start of that second, after the goal event"),
     "failure": Term("failure", "", "why the flight did not come about, or who fell, or did not come down"),
-    "min_separation_m": Term("least separation", "m", "of two vehicles' centres, true, at every physics step"),
+    "min_separation_m": Term(
+        "least separation", "m", "of two vehicles' centres, true, at every physics step"
+    ),
     "min_target_distance_m": Term("least distance to the target", "m", "where the target is an obstacle"),
     "min_obstacle_distance_m": Term("least distance to an obstacle", "m", "from a centre to a surface"),
     "d_min_m": Term("d_min", "m", "two vehicles nearer than this are a violation"),
@@ -51,7 +53,9 @@ TERMS = {
     "held_epochs": Term("held plans", "", "times a plan was due and the old one was kept"),
     "anchored_anew": Term("anchored anew", "", "times a plan started anew from where the vehicle was"),
     "slack_max_m": Term("largest slack", "m", ""),
-    "messages": Term("messages", "", "datagrams between all nodes, counted per receiver; frames without sense"),
+    "messages": Term(
+        "messages", "", "datagrams between all nodes, counted per receiver; frames without sense"
+    ),
     "deadline_misses": Term("missed deadlines", "", "of a real-time run: no step began within 1 ms"),
     "deadline_steps": Term("of so many deadlines", "", ""),
     "lateness_ms": Term("lateness of steps", "ms", "how late they began"),

@@ -66,7 +66,9 @@ def _facts(summary: dict[str, object], lost: float | None) -> Iterator[Fact]:
         middle = _number(values.get("p50")) if isinstance(values, dict) else None
         if isinstance(values, dict) and middle is not None:
             high = next((name for name in ("p99", "p95") if _number(values.get(name)) is not None), None)
-            yield Fact(what, f"{middle:.2f} {unit}", "" if high is None else f"{high} {values[high]:.2f} {unit}")
+            yield Fact(
+                what, f"{middle:.2f} {unit}", "" if high is None else f"{high} {values[high]:.2f} {unit}"
+            )
     if lost is not None:
         yield Fact("messages lost", f"{100.0 * lost:.1f} %", "swarm link")
     misses, steps = _number(summary.get("deadline_misses")), _number(summary.get("deadline_steps"))

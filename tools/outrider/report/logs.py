@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from mavlink_bridge.codec import Codec
-from mavlink_bridge.errors import LogError
 from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.messages import CommandAck, Heartbeat, LocalPosition, Message, StatusText
 from mavlink_bridge.tlog import Record, TlogReport, read_tlog

@@ -94,8 +94,8 @@ def _by_second(told: list[Array], missed: list[Array]) -> tuple[int, Array]:
 def _exact(
     sender: Log, receiver: Log, streams: list[Stream], goal: float
 ) -> tuple[Way, Array, NDArray[np.bool_]]:
-    """By both logs; ``goal`` is µs on the receiver's clock. With when (n,) each message was told, µs since the sender's log began, and whether (n,)
-    it was lost."""
+    """By both logs; ``goal`` is µs on the receiver's clock. With when (n,) each message was told, µs since
+    the sender's log began, and whether (n,) it was lost."""
     told, heard = sender.told, _joined(streams)
     marks, first, copies = np.unique(heard.mark, return_index=True, return_counts=True)
     arrived = np.isin(told.mark, marks)
@@ -154,13 +154,15 @@ def _joined(streams: list[Stream]) -> Stream:
     return Stream(*(np.concatenate(column) for column in columns))
 
 
-def _silences(arrivals: Array | Times, told: Array | Times, since: float) -> tuple[float | None, float | None]:
+def _silences(
+    arrivals: Array | Times, told: Array | Times, since: float
+) -> tuple[float | None, float | None]:
     """From ``since`` on: the longest time (s) without an arrival until the last that was ``told``, and what
     95 % of the arrivals keep. Times are µs on one clock."""
     told = told[told >= since]
     if not len(told):
         return None, None
-    arrivals = np.sort(arrivals[arrivals >= since])
-    waits = np.diff(np.concatenate([told[:1], arrivals, told[-1:]]).astype(np.float64)) * 1e-6
+    heard = np.sort(arrivals[arrivals >= since])
+    waits = np.diff(np.concatenate([told[:1], heard, told[-1:]]).astype(np.float64)) * 1e-6
     usual = float(np.percentile(waits[1:-1], 95.0)) if len(waits) > 2 else None
     return max(0.0, float(waits.max())), usual

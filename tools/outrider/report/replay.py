@@ -74,12 +74,12 @@ def packed(values: Array, quantum: float) -> dict[str, Any]:
 
 def _chart(chart: Chart) -> dict[str, Any]:
     values = np.stack([line.values for line in chart.lines], axis=1)
-    most = float(np.abs(values[np.isfinite(values)]).max(initial=1e-3))
-    # Three digits after the point where 16 bits hold them; a chart is no higher than a few hundred pixels.
-    quantum = max(MILLIMETRE, 10.0 ** np.ceil(np.log10(most / 32_000.0)))
+    most = float(np.abs(values[np.isfinite(values)]).max(initial=1e-6))
+    # A chart is a few hundred pixels high; so many steps are not seen, and fit 16 bits.
+    quantum = most / 32_000.0
     return {
         **chart._replace(lines=(), levels=())._asdict(),
         "lines": [{"name": line.name, "system": line.system} for line in chart.lines],
         "levels": [level._asdict() for level in sorted(chart.levels, key=lambda level: -level.value)],
-        "values": packed(values, float(quantum)),
+        "values": packed(values, quantum),
     }

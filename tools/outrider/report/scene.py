@@ -25,7 +25,9 @@ def scene(run: Run, motions: Motions) -> dict[str, Any]:
         "span": float(span) if isinstance(span, int | float) and 0.0 < span < _MOST else SPAN,
         "dMin": float(d_min) if isinstance(d_min, int | float) else None,
         "fixed": [] if scenario is None else [dict(_fixed(one)) for one in scenario.obstacles],
-        "movers": [] if scenario is None else [dict(_mover(scenario, j)) for j in range(len(scenario.moving))],
+        "movers": []
+        if scenario is None
+        else [dict(_mover(scenario, j)) for j in range(len(scenario.moving))],
         "goals": _goals(run, motions),
         "surfaces": [] if scenario is None else _surfaces(scenario),
         "bystanders": 0 if scenario is None else len(scenario.bystanders),
@@ -59,7 +61,9 @@ def _surfaces(scenario: Scenario) -> list[dict[str, Any]]:
     if companion.task != "escort":
         return []
     own = {one.vehicle: one.surface.outline() for one in companion.surfaces}
-    shared = [] if len(own) >= scenario.vehicles else [{"of": None, "line": _rounded(companion.surface.outline())}]
+    shared = (
+        [] if len(own) >= scenario.vehicles else [{"of": None, "line": _rounded(companion.surface.outline())}]
+    )
     return shared + [{"of": system, "line": _rounded(line)} for system, line in sorted(own.items())]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 
 from outrider.report.events import Event
@@ -25,7 +25,7 @@ def summary_table(summary: Mapping[str, object]) -> str:
     rows = []
     for key in keys:
         term, value = TERMS.get(key, Term(key, "", "")), summary[key]
-        if value is None or value == {}:
+        if value is None or (isinstance(value, Mapping) and set(value.values()) <= {None}):
             continue
         unit = f" {term.unit}" if term.unit else ""
         rows.append(
@@ -83,9 +83,7 @@ def loss_tables(losses: Losses) -> str:
     return f"<div class=matrices>{shares}{silences}</div>{note}"
 
 
-def _matrix(ways: Mapping[tuple[int, int], Way], title: str, cell: object) -> str:
-    if not callable(cell):
-        raise TypeError(cell)
+def _matrix(ways: Mapping[tuple[int, int], Way], title: str, cell: Callable[[Way], str]) -> str:
     senders = sorted({sender for sender, _ in ways})
     receivers = sorted({receiver for _, receiver in ways})
     head = "".join(f"<th scope=col>{receiver}</th>" for receiver in receivers)

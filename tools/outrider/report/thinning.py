@@ -22,8 +22,7 @@ def chosen(motions: Motions) -> NDArray[np.intp]:
     span = float(motions.time[-1] - motions.time[0])
     usual = span / (count - 1) if count > 1 else PERIOD
     stride = max(1, round(PERIOD / usual), math.ceil(count * max(1, len(motions.system)) / MOST))
-    indices = np.arange(count - 1, -1, -stride)[::-1]
-    return indices
+    return np.arange(count - 1, -1, -stride)[::-1]
 
 
 def least(values: Array, indices: NDArray[np.intp]) -> Array:

@@ -1,6 +1,6 @@
 // Puts the page together, and paper in the place of the screen.
 
-const PAPER = 620;
+const PAPER = 430;
 const $ = (id) => document.getElementById(id);
 
 function start() {
@@ -123,7 +123,7 @@ function ontoPaper() {
   if (before) return;
   before = { trail: show.trail };
   play(false);
-  show.trail = 1e9;
+  show.trail = Infinity;
   document.documentElement.dataset.print = "";
   mix();
   vehicleButtons();

@@ -43,7 +43,14 @@ function extent(from, to) {
     if (time < from || time > to) return;
     const here = { index, next: index, share: 0 };
     flight.systems.forEach((_, k) => hold(vector(flight.position, k, here) ?? [0, 0, 0], 0.5));
-    hold(vector(flight.target, 0, here) ?? [0, 0, 0]);
+    const target = vector(flight.target, 0, here);
+    if (target) hold(target);
+    // Corners of what surrounds it are enough; it is round.
+    if (target && index % 10 === 0) {
+      for (const { line } of run.scene.surfaces) {
+        for (let i = 0; i < line.length; i += 9) hold(line[i].map((value, axis) => value + target[axis]));
+      }
+    }
     run.scene.movers.forEach((mover, j) => {
       const at = vector(flight.moving, j, here);
       if (at) hold(at, mover.radius);

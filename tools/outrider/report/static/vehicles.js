@@ -12,7 +12,7 @@ function trails(g, add, time) {
   const first = place(from).next;
   const step = Math.max(1, Math.round((until - first) / 500));
   for (let begin = first; begin < until; begin += CHUNK * step) {
-    const future = begin > last;
+    const future = begin > last && show.trail < Infinity;
     for (let k = -1; k < flight.systems.length; k++) {
       if (cursor.hidden.has(k)) continue;
       const points = [];
