@@ -35,7 +35,7 @@ def offset(log: Log, motions: Motions) -> float:
     if float(np.abs(told).max()) < _STILL:
         return guess
     for width, grid in ((REACH, _COARSE), (_COARSE, _FINE)):
-        candidates: Array = guess + np.arange(-width, width + 0.5 * grid, grid)
+        candidates = guess + grid * np.arange(-round(width / grid), round(width / grid) + 1.0)
         guess = float(
             candidates[np.argmin([_misfit(when + c, told, motions.time, true) for c in candidates])]
         )
@@ -58,5 +58,5 @@ def _misfit(when: Array, told: Array, time: Array, true: Array) -> float:
 
 def seconds(log: Log, times: Times | Sequence[int], ahead: float) -> Array:
     """``times`` (n,) µs of ``log`` as s after the goal event; ``ahead`` is its ``offset``."""
-    result: Array = (np.asarray(times, dtype=np.int64) - log.begin) * 1e-6 + ahead
-    return result
+    since = np.asarray(times, dtype=np.int64) - log.begin
+    return since.astype(np.float64) * 1e-6 + ahead

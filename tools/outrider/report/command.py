@@ -87,7 +87,8 @@ def _replay(
 
 
 def _title(run: Run) -> str:
-    method, seed = run.summary.get("method"), run.seed
+    certified = run.summary.get("avoidance") == "certified"
+    method, seed = "certified" if certified else run.summary.get("method"), run.seed
     words = [run.name, str(method or ""), "" if seed is None else f"seed {seed}"]
     return " · ".join(word for word in words if word)
 

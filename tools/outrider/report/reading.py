@@ -54,9 +54,12 @@ def read(directory: Path, watch: Watch = lambda _what, _share: None) -> Run:
     scenario = None if resolved is None else resolved.scenario
     logs = _logs(directory, () if scenario is None else scenario.systems, gaps, watch)
     if summary is None and resolved is None and motions is None and not logs:
-        present = [gap for gap in gaps if (directory / gap.what).exists()]
-        why = f"holds nothing of a run that can be read ({present[0].what}: {present[0].why})"
-        raise InputError(Fault(str(directory), f"{why if present else 'holds no run'}; {_ALLOWED}"))
+        why = "holds no run"
+        for gap in gaps:
+            if (directory / gap.what).exists():
+                why = f"holds nothing of a run that can be read ({gap.what}: {gap.why})"
+                break
+        raise InputError(Fault(str(directory), f"{why}; {_ALLOWED}"))
     return Run(
         directory,
         dict(summary or {}),

@@ -33,8 +33,8 @@ def document(
     begin, end = clock(run, motions)
     found = {
         "systems": motions.system,
-        "from": begin,
-        "to": end,
+        "from": round(begin, 4),
+        "to": round(end, 4),
         "time": packed(motions.time[shown], TENTH),
         "position": packed(motions.position[shown], MILLIMETRE),
         "velocity": packed(motions.velocity[shown], MILLIMETRE),

@@ -19,7 +19,6 @@ function start() {
   new ResizeObserver(() => {
     resize();
     renderAll();
-    redraw();
   }).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", relight);
   window.addEventListener("beforeprint", ontoPaper);
@@ -137,9 +136,8 @@ function offPaper() {
   show.trail = before.trail;
   before = null;
   delete document.documentElement.dataset.print;
-  relight();
   resize();
-  draw();
+  relight();
 }
 
 if (run) start();

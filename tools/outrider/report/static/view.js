@@ -34,13 +34,14 @@ function keepInMiddle() {
   camera.centre = [0, 1, 2].map((i) => places.reduce((sum, point) => sum + point[i], 0) / places.length);
 }
 
-// The canvas has as many points as the screen has, or more for paper.
+// The canvas has as many points as the screen has, or more for paper. A new size empties it: draw at once.
 function resize(density = window.devicePixelRatio || 1) {
-  const box = canvas.getBoundingClientRect();
-  if (!box.width) return;
-  [camera.width, camera.height] = [box.width, box.height];
-  canvas.width = Math.round(box.width * density);
-  canvas.height = Math.round(box.height * density);
+  const { clientWidth, clientHeight } = canvas;
+  const [width, height] = [Math.round(clientWidth * density), Math.round(clientHeight * density)];
+  if (!width || (width === canvas.width && height === canvas.height)) return;
+  [camera.width, camera.height] = [clientWidth, clientHeight];
+  [canvas.width, canvas.height] = [width, height];
+  if (bounds) draw();
 }
 
 function home() {
