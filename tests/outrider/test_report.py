@@ -223,6 +223,21 @@ def test_a_part_that_is_missing_is_named(name: str, damage: str, run: Run, tmp_p
     assert str(directory) not in text
 
 
+def test_no_damage_escapes(tmp_path: Path) -> None:
+    directory = leave(tmp_path, vehicles=2, seconds=1.0).directory
+    random = np.random.default_rng(1)
+    for path in sorted(directory.iterdir()):
+        good = path.read_bytes()
+        for _ in range(12):
+            data = bytearray(good)
+            for place in random.integers(len(data), size=random.integers(1, 20)).tolist():
+                data[place] = random.integers(256)
+            path.write_bytes(data)
+            page = make(directory).text
+            assert page.endswith("</html>\n")
+        path.write_bytes(good)
+
+
 def test_all_that_is_there_is_a_log(run: Run, tmp_path: Path) -> None:
     directory = leave(tmp_path).directory
     for name in PARTS[:-1]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
@@ -14,6 +15,10 @@ from outrider.report.run import Array, Motions, Plans, PlanTimes
 
 MOST_BYTES = 1 << 30
 """All arrays of a file together: an hour of a hundred vehicles at 50 Hz has half of it."""
+_LONGEST = 1e5
+"""s"""
+_FAR = 1e9
+"""m, m/s, rad: more is damage."""
 
 _MOTIONS = {
     "system": ("K",),
@@ -30,6 +35,21 @@ _MOTIONS = {
 _PLANS = {"system": ("n",), "time_s": ("n",), "gradient": ("n", 3)}
 _PLAN_TIMES = {"system": ("n",), "plan_ms": ("n",)}
 
+_DAMAGE = (
+    OSError,
+    ValueError,
+    TypeError,
+    KeyError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    RuntimeError,  # of zipfile: encrypted, or by a method that it does not know
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What reading a damaged archive of arrays may raise."""
+
 Shapes = Mapping[str, Sequence[int | str]]
 
 
@@ -39,17 +59,25 @@ def motions(path: Path) -> Motions:
     time = arrays["time_s"]
     if not len(time):
         raise InputError(f"{path.name}: holds no sample")
-    if not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
+    if not (np.abs(time) < _LONGEST).all():
+        raise InputError(f"{path.name}: time_s is not within {_LONGEST:g} s of the goal event")
+    if not (np.diff(time) > 0.0).all():
         raise InputError(f"{path.name}: time_s does not rise")
     system = tuple(arrays["system"].astype(int).tolist())
-    rest = [arrays[name] for name in _MOTIONS if name not in ("system", "time_s")]
+    # Where there is nothing separation is infinite; anything else is not known.
+    rest = [
+        arrays[name] if name == "separation" else np.where(np.abs(arrays[name]) < _FAR, arrays[name], np.nan)
+        for name in _MOTIONS
+        if name not in ("system", "time_s")
+    ]
     return Motions(system, time, *rest)
 
 
 def plans(path: Path) -> Plans:
     """``plans.npz``. Raises InputError."""
     arrays = _read(path, _PLANS)
-    size = np.linalg.norm(arrays["gradient"], axis=1)
+    gradient = arrays["gradient"]
+    size = np.linalg.norm(np.where(np.abs(gradient) < _FAR, gradient, np.nan), axis=1)
     return Plans(arrays["system"].astype(np.int64), arrays["time_s"], size)
 
 
@@ -71,7 +99,7 @@ def _read(path: Path, shapes: Shapes) -> dict[str, Array]:
             for name in shapes:
                 if name in file:
                     found[name] = np.asarray(file[name], dtype=np.float64)
-    except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except _DAMAGE as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise InputError(f"{path.name}: cannot be read: {reason or type(error).__name__}") from None
     _check(path.name, found, shapes)
@@ -91,5 +119,5 @@ def _check(name: str, found: Mapping[str, Array], shapes: Shapes) -> None:
         if not fits:
             wanted = ", ".join(str(sizes.get(str(axis), axis)) for axis in shape)
             raise InputError(f"{name}: {key} is of shape {has}; needed: ({wanted})")
-    if not np.isfinite(found["system"]).all():
-        raise InputError(f"{name}: system is not a number everywhere")
+    if not ((found["system"] >= 0) & (found["system"] <= 255)).all():
+        raise InputError(f"{name}: system is not a system id everywhere")

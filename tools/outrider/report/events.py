@@ -14,7 +14,9 @@ from outrider.scenario_faults import ClockFault, Freeze, GpsJump, GpsLoss, Motor
 from outrider.scenario_places import FixedTarget
 
 TOGETHER = 0.5
-"""s"""
+"""s within which several vehicles say the same."""
+_BACK = 64
+"""So many events are looked back at."""
 
 
 class Event(NamedTuple):
@@ -46,7 +48,7 @@ def together(found: Sequence[Event]) -> list[Event]:
     merged: list[Event] = []
     for event in found:
         place = len(merged) - 1
-        while place >= 0 and event.time - merged[place].time <= TOGETHER:
+        while place >= max(0, len(merged) - _BACK) and event.time - merged[place].time <= TOGETHER:
             other = merged[place]
             alike = (other.kind, other.text, other.until, other.bad) == event[1:2] + event[3:]
             if alike and not set(other.who) & set(event.who):

@@ -20,6 +20,8 @@ AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1."""
 _DECODED = {0, 32, 77, 253}
 """HEARTBEAT, LOCAL_POSITION_NED, COMMAND_ACK, STATUSTEXT."""
+_LATEST = 1 << 62
+"""µs. A damaged stamp may be later than integers of 64 bits hold."""
 _OFTEN = 4096
 """Records from one look at the progress to the next."""
 
@@ -76,7 +78,7 @@ class _Pass:
 
     def see(self, record: Record) -> None:
         """The next record."""
-        time = record.time
+        time = min(record.time, _LATEST)
         if self._first:
             self._begin = self._end = time
             self._first = False

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from outrider.report.run import Array, Log, Sender, Stream, Times
 
 MODULO = 256
+_LONGEST = 86_400.0
+"""s before and after the goal event: a damaged stamp may say anything."""
 _PAUSE = 2.0
 """s: within so long nobody tells 128 messages; after longer, whole rounds of numbers may be missing."""
 
@@ -82,6 +84,7 @@ def losses(logs: tuple[Log, ...], offsets: dict[int, float]) -> Losses:
 
 def _by_second(told: list[Array], missed: list[Array]) -> tuple[int, Array]:
     everything = np.concatenate([np.empty(0), *told])
+    everything = everything[np.abs(everything) < _LONGEST]
     if not len(everything):
         return 0, np.empty(0)
     since = int(np.floor(everything.min()))

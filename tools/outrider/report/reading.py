@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -21,6 +22,8 @@ SUMMARY, FLIGHT, PLANS, PLAN_TIMES = "summary.json", "flight.npz", "plans.npz", 
 _ALLOWED = "allowed: what outrider swarm leaves"
 _MOST_BYTES = 1 << 20
 """Of a summary or a configuration."""
+_DIGITS = 18
+"""More has no count, and no floating point number holds them."""
 
 Watch = Callable[[str, float], None]
 Value = TypeVar("Value")
@@ -93,12 +96,25 @@ def _text(path: Path) -> str:
 
 def _summary(path: Path) -> Mapping[str, object]:
     try:
-        found = json.loads(_text(path))
+        found = json.loads(_text(path), parse_float=_finite, parse_int=_moderate, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
         raise InputError(f"is not JSON: {error}") from None
     if not isinstance(found, dict):
         raise InputError("is no JSON object")
     return found
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no number")
+    return value
+
+
+def _moderate(text: str) -> int:
+    if len(text) > _DIGITS:
+        raise ValueError(f"a number of {len(text)} digits")
+    return int(text)
 
 
 def _logs(directory: Path, systems: range | tuple[()], gaps: list[Gap], watch: Watch) -> tuple[Log, ...]:

@@ -13,7 +13,7 @@ from outrider.starts import starts
 
 SPAN = 0.63
 """m from tip to tip where nothing says otherwise: the firefly's."""
-_MOST = 244
+_LARGEST = 100.0
 
 
 def scene(run: Run, motions: Motions) -> dict[str, Any]:
@@ -22,7 +22,7 @@ def scene(run: Run, motions: Motions) -> dict[str, Any]:
     scenario, span = run.scenario, run.summary.get("span_m")
     d_min = run.summary.get("d_min_m") if scenario is None else scenario.d_min
     return {
-        "span": float(span) if isinstance(span, int | float) and 0.0 < span < _MOST else SPAN,
+        "span": float(span) if isinstance(span, int | float) and 0.0 < span < _LARGEST else SPAN,
         "dMin": float(d_min) if isinstance(d_min, int | float) else None,
         "fixed": [] if scenario is None else [dict(_fixed(one)) for one in scenario.obstacles],
         "movers": []

@@ -72,9 +72,9 @@ function fit(low, high) {
       zoom(1.3);
       continue;
     }
-    const wide = (seen.right - seen.left) / (camera.width - 96);
-    const tall = (seen.bottom - seen.top) / (camera.height - 84);
-    pan(camera.width / 2 - (seen.left + seen.right) / 2, camera.height / 2 - (seen.top + seen.bottom) / 2);
+    const wide = (seen.right - seen.left) / (camera.width - 84);
+    const tall = (seen.bottom - seen.top) / (camera.height - 90);
+    pan(camera.width / 2 - (seen.left + seen.right) / 2, camera.height / 2 - 8 - (seen.top + seen.bottom) / 2);
     // Step by step: near corners grow faster than the box comes nearer.
     zoom(Math.min(Math.max(wide, tall, 0.9), 1.1));
   }

@@ -58,13 +58,9 @@ function extent(from, to) {
   });
   for (const one of run.scene.fixed) hold([one.at[0], one.at[1], one.kind === "sphere" ? one.at[2] : 0], one.radius);
   for (const goal of run.scene.goals) hold(goal);
-  // The ground is a whole number of squares, twelve or fewer to a side.
+  // Sixteen lines or fewer to a side.
   const size = Math.max(high[0] - low[0], high[1] - low[1]);
-  const square = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].find((width) => size / width <= 12) ?? 2000;
-  for (const axis of [0, 1]) {
-    low[axis] = Math.floor(low[axis] / square) * square;
-    high[axis] = Math.ceil(high[axis] / square) * square;
-  }
+  const square = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].find((width) => size / width <= 16) ?? 2000;
   return { low, high, square };
 }
 
@@ -72,32 +68,43 @@ let bounds = null;
 
 // A grid on the ground with its scale along two edges.
 function ground(g) {
-  const step = bounds.square;
-  const [[x0, y0], [x1, y1]] = [bounds.low, bounds.high];
+  const { low, high, square } = bounds;
+  const [[x0, y0], [x1, y1]] = [low, high];
+  const columns = lines(x0, x1, square);
+  const rows = lines(y0, y1, square);
   g.lineWidth = 1;
   const line = (a, b, zero) => {
     g.strokeStyle = zero ? ink.solid : ink.grid;
     polyline(g, [a, b]);
     g.stroke();
   };
-  for (let x = x0; x <= x1 + 1e-6; x += step) line([x, y0, 0], [x, y1, 0], Math.abs(x) < 1e-6);
-  for (let y = y0; y <= y1 + 1e-6; y += step) line([x0, y, 0], [x1, y, 0], Math.abs(y) < 1e-6);
-  const south = camera.azimuth % (2 * Math.PI);
-  const edgeY = Math.sin(south) < 0 ? y0 : y1;
-  const edgeX = Math.cos(south) < 0 ? x0 : x1;
+  for (const x of [x0, ...columns, x1]) line([x, y0, 0], [x, y1, 0], x === 0);
+  for (const y of [y0, ...rows, y1]) line([x0, y, 0], [x1, y, 0], y === 0);
+  // The edges that are nearer to the eye.
+  const [edgeX, edgeY] = [Math.cos(camera.azimuth) < 0 ? x0 : x1, Math.sin(camera.azimuth) < 0 ? y0 : y1];
+  const [offX, offY] = [edgeX === x0 ? -1 : 1, edgeY === y0 ? -1 : 1];
+  columns.forEach((x, i) => number(g, [x, edgeY, 0], [0, offY, 0], i === columns.length - 1 ? `${x} m E` : x));
+  rows.forEach((y, i) => number(g, [edgeX, y, 0], [offX, 0, 0], i === rows.length - 1 ? `${y} m N` : y));
+}
+
+function lines(from, to, step) {
+  const found = [];
+  for (let n = Math.ceil(from / step); n * step <= to; n++) found.push(n * step);
+  return found;
+}
+
+// A number a few pixels beside an edge, outwards.
+function number(g, at, out, text) {
+  const here = project(at);
+  const there = project(at.map((value, i) => value + 0.1 * out[i]));
+  if (!here || !there) return;
+  const [dx, dy] = [there[0] - here[0], there[1] - here[1]];
+  const length = Math.hypot(dx, dy) || 1;
   g.font = "11px system-ui, sans-serif";
   g.fillStyle = ink.soft;
-  g.textAlign = "center";
+  g.textAlign = dx / length > 0.5 ? "left" : dx / length < -0.5 ? "right" : "center";
   g.textBaseline = "middle";
-  const number = (point, text) => {
-    const seen = project(point);
-    if (seen) g.fillText(text, seen[0], seen[1]);
-  };
-  const out = 0.45 * step;
-  const offY = edgeY + (edgeY === y0 ? -out : out);
-  const offX = edgeX + (edgeX === x0 ? -out : out);
-  for (let x = x0; x <= x1 + 1e-6; x += step) number([x, offY, 0], x === x1 ? `${x} m east` : `${x}`);
-  for (let y = y0; y <= y1 + 1e-6; y += step) number([offX, y, 0], y === y1 ? `${y} m north` : `${y}`);
+  g.fillText(String(text), here[0] + (9 * dx) / length, here[1] + (13 * dy) / length);
 }
 
 function fixed(g, add) {

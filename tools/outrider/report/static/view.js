@@ -47,7 +47,7 @@ function resize(density = window.devicePixelRatio || 1) {
 function home() {
   chase(false);
   camera.azimuth = -1.15;
-  camera.elevation = 0.55;
+  camera.elevation = camera.height > camera.width ? 0.85 : 0.55;
   fit(bounds.low, bounds.high);
   redraw();
 }
