@@ -14,7 +14,7 @@ from struct import Struct
 from struct import error as StructError  # noqa: N812
 from typing import Any, NamedTuple
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
+from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge import fields as f
 from mavlink_bridge import messages as m

@@ -15,7 +15,7 @@ from struct import Struct
 from typing import NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
-from pymavlink.dialects.v20 import ardupilotmega as dialect
+from pymavlink.dialects.v20 import all as dialect
 
 START_V1, START_V2 = 0xFE, 0xFD
 _DATAGRAM = 2048
@@ -26,9 +26,11 @@ SIGNED_FLAG = 0x01
 STARTS = re.compile(b"[\xfd\xfe]")
 _HEADER_V1 = Struct("<6B")
 _HEADER_V2 = Struct("<7BHB")
-_CRC_EXTRA: dict[int, bytes] = {
+CRC_EXTRA: dict[int, bytes] = {
     number: bytes((kind.crc_extra,)) for number, kind in dialect.mavlink_map.items()
 }
+"""By message id. The dialect ``all`` is that of ardupilotmega and more: logs of PX4 hold messages of
+``development``, which could not be verified otherwise. No id means two things in it."""
 
 
 class Frame(NamedTuple):
@@ -85,7 +87,7 @@ def frame_at(data: bytes, start: int) -> Frame | Flaw:
         return Flaw.FALSE_START
     if stop > size:
         return Flaw.PARTIAL
-    extra = _CRC_EXTRA.get(message_id)
+    extra = CRC_EXTRA.get(message_id)
     if extra is not None and mcrf4xx(data[start + 1 : end] + extra) != data[end] | data[end + 1] << 8:
         return Flaw.FALSE_START
     return Frame(

@@ -155,5 +155,7 @@ class RealTime:
 
     def _show(self, now: int, direction: Direction, datagrams: Sequence[Datagram]) -> None:
         for tap in self._taps:
+            if direction == "in":
+                tap.begin(now, self._node.name)
             for datagram in datagrams:
                 tap(now, self._node.name, direction, datagram)

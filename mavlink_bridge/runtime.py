@@ -36,7 +36,12 @@ class Scheduled(NamedTuple):
 
 
 class Tap(Protocol):
-    """Sees every datagram as it enters (``in``) or leaves (``out``) a node; must not change anything."""
+    """Sees every step of a node, and every datagram as it enters (``in``) or leaves (``out``) it; must not
+    change anything."""
+
+    def begin(self, now: int, node: str, /) -> None:
+        """The node is stepped at ``now``; what enters and leaves it then follows."""
+        ...
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
         """At ``now`` µs, the time that the node is told; true time is the loop's ``now``."""
@@ -170,5 +175,7 @@ class LockStep:
     ) -> None:
         for tap in self._taps:
             for time, slot, box in zip(times, slots, boxes, strict=True):
+                if direction == "in":
+                    tap.begin(time, slot.name)
                 for datagram in box:
                     tap(time, slot.name, direction, datagram)

@@ -2,7 +2,7 @@
 
 Logs of real flights are damaged. The reader trusts a frame when its checksum holds, steps over a record that
 does not hold when a plausible record follows where it says it ends, and otherwise searches for the next frame
-that does.
+that does. Where nothing is wrong it reads many records at once (``tlog_stretch``).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import gzip
 import zlib
 from collections.abc import Generator, Iterator
 from contextlib import closing
-from io import BufferedIOBase
+from io import BufferedIOBase, BufferedReader
 from pathlib import Path
 from struct import Struct
 from types import TracebackType
@@ -19,23 +19,18 @@ from typing import NamedTuple, Self
 
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.framing import LONGEST_FRAME, STARTS, Flaw, claimed_length, frame_at, leading_frames
+from mavlink_bridge.tlog_stretch import Record, Stretch, leading_records
+
+__all__ = ["LINKS", "PLAUSIBLE_JUMP", "Record", "TlogReader", "TlogReport", "TlogWriter", "read_tlog"]
 
 LINKS = 4
 PLAUSIBLE_JUMP = 86_400_000_000
 """µs. A stamp next to damage is believed only within a day of the record before."""
 
 _STAMP = Struct(">Q")
-_CHUNK = 1 << 16
+_CHUNK = 1 << 15
 # A record, the stamp after it and the start byte behind that: what has to be seen to judge a record.
 _AHEAD = 8 + LONGEST_FRAME + 8 + 1
-
-
-class Record(NamedTuple):
-    """One whole frame of a log, ``time`` in µs (a multiple of 4), ``link`` 0…3."""
-
-    time: int
-    link: int
-    frame: bytes
 
 
 class TlogReport(NamedTuple):
@@ -133,20 +128,32 @@ class TlogReader:
         try:
             with self.path.open("rb") as raw:
                 compressed = _is_gzip(raw.peek(_CHUNK))
-                self._pass = _Pass(gzip.GzipFile(fileobj=raw) if compressed else raw)
+                self._pass = _Pass(raw, gzip.GzipFile(fileobj=raw) if compressed else raw)
                 yield from self._pass.records()
         except OSError as error:
             raise LogError(f"{self.path}: cannot be read: {error.strerror}") from None
 
     @property
     def report(self) -> TlogReport:
-        """What the latest iteration has found so far."""
+        """What the latest iteration has found so far; it may be some thousand records ahead of those handed
+        out."""
         if self._pass is None:
             return TlogReport(0, 0, 0, 0, 0, False)
         one = self._pass
         return TlogReport(
             one.good, one.bad, one.unknown, one.skipped_bytes, one.time_steps_back, one.truncated
         )
+
+    @property
+    def bytes_read(self) -> int:
+        """Bytes of the file, as it lies there, that the latest iteration has taken in."""
+        return 0 if self._pass is None else self._pass.bytes_read
+
+    @property
+    def record_bytes(self) -> int:
+        """Bytes, unpacked, of good and unknown records and their stamps. With ``skipped_bytes`` they are all
+        that the latest iteration has come by: at its end the whole log."""
+        return 0 if self._pass is None else self._pass.record_bytes
 
 
 def read_tlog(path: Path | str) -> TlogReader:
@@ -162,9 +169,11 @@ def read_tlog(path: Path | str) -> TlogReader:
 class _Pass:
     """One reading of the file: a window of bytes that slides along it, and the counts."""
 
-    def __init__(self, stream: BufferedIOBase) -> None:
+    def __init__(self, file: BufferedReader, stream: BufferedIOBase) -> None:
         self.good = self.bad = self.unknown = self.skipped_bytes = self.time_steps_back = 0
+        self.bytes_read = self.record_bytes = 0
         self.truncated = False
+        self._file = file
         self._stream = stream
         self._window = b""
         self._at = 0
@@ -174,12 +183,13 @@ class _Pass:
     def records(self) -> Iterator[Record]:
         """Every record with a good checksum."""
         while self._fill():
+            stretch = leading_records(self._window, self._at, (self._stamp or 0) & ~3)
+            if stretch.records:
+                self._advance(stretch)
+                yield from stretch.records
+                continue
             frame = frame_at(self._window, self._at + 8)
-            if not isinstance(frame, Flaw) and frame.known:
-                (stamp,) = _STAMP.unpack_from(self._window, self._at)
-                self._at += 8 + len(frame.data)
-                yield self._record(stamp, frame.data)
-            elif not self._step_over(sound=not isinstance(frame, Flaw)):
+            if not self._step_over(sound=not isinstance(frame, Flaw)):
                 record = self._search(cut=frame is Flaw.PARTIAL)
                 if record is not None:
                     yield record
@@ -195,10 +205,20 @@ class _Pass:
                 chunk = b""
                 self.truncated = True
             self._ended = not chunk
+            self.bytes_read = self._file.tell()
             done = max(self._at - 8, 0)
             self._window = self._window[done:] + chunk
             self._at -= done
         return self._at < len(self._window)
+
+    def _advance(self, stretch: Stretch) -> None:
+        """Go on behind ``stretch``."""
+        last = stretch.records[-1]
+        self.good += len(stretch.records)
+        self.time_steps_back += stretch.time_steps_back
+        self.record_bytes += stretch.end - self._at
+        self._stamp = last.time | last.link
+        self._at = stretch.end
 
     def _record(self, stamp: int, data: bytes) -> Record:
         before, self._stamp = self._stamp, stamp
@@ -227,6 +247,7 @@ class _Pass:
             return False
         if sound:
             self.unknown += 1
+            self.record_bytes += 8 + length
         else:
             self.bad += 1
             self.skipped_bytes += 8 + length
@@ -253,8 +274,10 @@ class _Pass:
             if skipped >= 8 and self._plausible(self._at - 8, self._stamp):
                 (stamp,) = _STAMP.unpack_from(self._window, self._at - 8)
                 skipped -= 8
+                self.record_bytes += 8
             self.bad += skipped > 0
             self.skipped_bytes += skipped
+            self.record_bytes += len(frame.data)
             self._at += len(frame.data)
             return self._record(stamp, frame.data)
         self.skipped_bytes += skipped

@@ -41,6 +41,12 @@ class CertifiedConfig(Settings):
     tube: Positive = Field(0.25, description="m, largest tracking error that the promise allows for")
     sigmas: float = Field(3.0, ge=0.0, le=6.0, description="k of k·σ of the position estimate")
     clock_us: int = Field(5_000, ge=0, le=100_000, description="µs that a clock may differ from fleet time")
+    helm_us: int = Field(
+        10_000_000,
+        ge=0,
+        le=600_000_000,
+        description="µs of hover at the end of a plan whose companion is gone",
+    )
     fleet: tuple[int, ...] = Field(
         (), max_length=255, description="system ids that take part: nobody moves before all are heard"
     )

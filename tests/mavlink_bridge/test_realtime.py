@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from link_pairs import HOST, frame, udp
+from watching import Watcher
 
 from mavlink_bridge.clock import SimulatedClock, WallClock
 from mavlink_bridge.errors import BridgeError, ScheduleError
@@ -232,10 +233,8 @@ def test_taps_see_all_with_the_time_that_the_node_was_told() -> None:
     clock = Sleeper(0, [100] * 50)
     worker = Worker(clock)
     near, far = memory_pair()
-    seen: list[tuple[int, str, str, Datagram]] = []
-    loop = RealTime(
-        Scheduled(worker, PERIOD, PHASE), {"swarm": near}, clock, [lambda *event: seen.append(event)]
-    )
+    watcher = Watcher()
+    loop = RealTime(Scheduled(worker, PERIOD, PHASE), {"swarm": near}, clock, [watcher])
 
     def on_step(now: int) -> bool:
         far.send(str(now).encode())
@@ -243,7 +242,8 @@ def test_taps_see_all_with_the_time_that_the_node_was_told() -> None:
 
     loop.run(never, on_step)
     ways = [("in", ""), ("out", "re: ")]
-    assert seen == [
+    assert watcher.steps == [(now, "worker") for now in worker.told]
+    assert watcher.events == [
         (now + PERIOD, "worker", way, Datagram("swarm", f"{before}{now}".encode()))
         for now in worker.told[:3]
         for way, before in ways
@@ -261,16 +261,16 @@ def test_a_fault_of_the_node_is_not_hidden_and_its_cause_is_logged() -> None:
     clock = Sleeper(0)
     near, far = memory_pair()
     far.send(b"1")
-    seen: list[Datagram] = []
+    watcher = Watcher()
     loop = RealTime(
         Scheduled(Fallen(clock), PERIOD, PHASE),
         {"swarm": near},
         clock,
-        [lambda *event: seen.append(event[3])],
+        [watcher],
     )
     with pytest.raises(ArithmeticError):
         loop.run(never)
-    assert seen == [Datagram("swarm", b"1")]
+    assert [event[3] for event in watcher.events] == [Datagram("swarm", b"1")]
     near.send(b"2")
     assert far.receive() == []
 

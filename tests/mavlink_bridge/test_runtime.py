@@ -8,10 +8,10 @@ import pytest
 from chatter import TICK, Chatter
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from watching import Event, Watcher
 
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.ether import Channel, Ether, Faults
-from mavlink_bridge.node import Datagram
 from mavlink_bridge.runtime import LockStep, Scheduled
 
 CLEAN = Faults()
@@ -55,18 +55,15 @@ def test_no_node_sees_what_another_sends_on_the_same_tick() -> None:
         assert [now - int.from_bytes(data[:8], "big") for now, data in node.heard] == [TICK] * 9
 
 
-Event = tuple[int, str, str, Datagram]
-
-
 def flight(order: list[int]) -> tuple[list[Event], tuple[int, ...]]:
     everyone = [
         Scheduled(Chatter(f"n{index}"), (1 + index % 3) * TICK, index % 2 * TICK) for index in range(6)
     ]
     scheduled = [everyone[index] for index in order]
-    seen: list[Event] = []
+    watcher = Watcher()
     ether = air(scheduled, Faults(delay=3000, jitter=9000, loss=0.1, duplication=0.1, reordering=0.1))
-    LockStep(scheduled, ether, TICK, [lambda *event: seen.append(event)]).run(60 * TICK)
-    return seen, tuple(ether.counters)
+    LockStep(scheduled, ether, TICK, [watcher]).run(60 * TICK)
+    return watcher.events, tuple(ether.counters)
 
 
 @given(st.permutations(range(6)))
@@ -77,10 +74,12 @@ def test_the_order_of_nodes_changes_no_byte(order: list[int]) -> None:
 
 def test_taps_see_all_that_enters_and_leaves() -> None:
     scheduled = crew("abc")
-    seen: list[Event] = []
-    LockStep(scheduled, air(scheduled), TICK, [lambda *event: seen.append(event)]).run(100 * TICK)
+    watcher = Watcher()
+    LockStep(scheduled, air(scheduled), TICK, [watcher]).run(100 * TICK)
+    seen = watcher.events
     for node, *_ in scheduled:
         assert isinstance(node, Chatter)
+        assert [now for now, name in watcher.steps if name == node.name] == node.steps
         mine = [event for event in seen if event[1] == node.name]
         assert [(now, datagram.data) for now, _, way, datagram in mine if way == "in"] == node.heard
         assert [now for now, _, way, _ in mine if way == "out"] == node.steps

@@ -4,45 +4,19 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from said import Ended, Run
 from shipped import LOGS, SCENARIOS
 
 from outrider import swarm
-from outrider.__main__ import main
 from outrider.errors import InputError, OutriderError
 from outrider.flight import Flight
 
 ANTIPODAL, ESCORT = SCENARIOS["antipodal-8"].read_text(), SCENARIOS["escort"].read_text()
-
-
-class Ended(NamedTuple):
-    status: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Ended]
-
-
-@pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Runs ``outrider`` with arguments in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str) -> Ended:
-        monkeypatch.setattr(sys, "argv", ["outrider", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        code = ended.value.code
-        assert code is None or isinstance(code, int)
-        return Ended(code or 0, *capsys.readouterr())
-
-    return call
 
 
 @pytest.fixture
@@ -270,6 +244,7 @@ def test_a_flight_ends_with_one_json_object_and_a_full_directory(run: Run, tmp_p
         "plan_times.npz",
         "plans.npz",
         "summary.json",
+        "vehicle-11.steps.npz",
         "vehicle-11.tlog",
     ]
     assert json.loads((tmp_path / "run" / "summary.json").read_text()) == summary

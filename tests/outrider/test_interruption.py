@@ -35,7 +35,9 @@ def test_a_stopped_flight_says_what_is_left_and_leaves_whole_logs(
     assert signal.getsignal(which) is before
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "configuration.yaml",
+        "vehicle-11.steps.npz",
         "vehicle-11.tlog",
+        "vehicle-12.steps.npz",
         "vehicle-12.tlog",
     ]
     for system in of.systems:

@@ -9,6 +9,8 @@ from random import Random
 from struct import pack as stamp
 from typing import NamedTuple
 
+from recorded_logs import PIECES
+
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_TYPE, TABLE
 from mavlink_bridge.messages import (
@@ -162,11 +164,13 @@ def log(chosen: Sequence[bytes], records: int = _LOG_RECORDS) -> bytes:
 
 
 def logs() -> tuple[bytes, ...]:
-    """Whole logs: the shipped one, synthetic ones, compressed ones."""
+    """Whole logs: the shipped one, pieces of others with the damage of their own, synthetic ones, compressed
+    ones."""
     mixed = log(frames(messages()))
     return (
         recorded(),
         recorded()[:1200],
+        *(path.read_bytes() for path in PIECES),
         mixed,
         gzip.compress(mixed, mtime=0),
         gzip.compress(recorded(), mtime=0),

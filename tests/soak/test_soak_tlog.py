@@ -4,6 +4,8 @@ of a log is read whatever came before."""
 from __future__ import annotations
 
 import gzip
+import json
+from itertools import pairwise
 from pathlib import Path
 
 from campaigns import Mutant, Mutants
@@ -18,6 +20,8 @@ from mavlink_bridge.framing import LONGEST_FRAME, Flaw, frame_at
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.tlog import LINKS, Record, TlogReader, read_tlog
 from outrider.errors import InputError
+from outrider.logs.listing import document
+from outrider.logs.tally import count
 from outrider.scenario_places import RecordedTarget
 from outrider.targets import load
 
@@ -70,12 +74,35 @@ def test_any_file_is_records_and_a_report(mutants: Mutants, tmp_path: Path) -> N
             found = records_of(reader)
             assert list(reader) == found
             report = reader.report
-            assert 0 <= report.time_steps_back < len(found)
+            times = [record.time for record in found]
+            assert report.time_steps_back == sum(later < earlier for earlier, later in pairwise(times))
+            assert reader.bytes_read <= len(data)
+            frames = sum(len(record.frame) for record in found)
+            # A frame without a stamp of its own takes no eight bytes.
+            assert frames <= reader.record_bytes
+            assert reader.record_bytes - frames <= (8 + LONGEST_FRAME) * report.unknown + 8 * len(found)
             if data[:2] != b"\x1f\x8b":
-                used = sum(len(record.frame) for record in found) + report.skipped_bytes
-                # A frame without a stamp of its own takes no eight bytes.
-                assert used <= len(data)
-                assert len(data) - used <= (8 + LONGEST_FRAME) * report.unknown + 8 * len(found)
+                assert reader.record_bytes + report.skipped_bytes == reader.bytes_read == len(data)
+
+
+def test_the_census_of_any_file_is_that_of_its_records(mutants: Mutants, tmp_path: Path) -> None:
+    for mutant in mutants:
+        with mutant:
+            path, _ = mutated(mutant, tmp_path)
+            census = count(path, lambda _share: None)
+            try:
+                reader = read_tlog(path)
+            except LogError:
+                assert census is None
+                continue
+            records = list(reader)
+            assert census is not None
+            assert census.report == reader.report
+            assert sum(vehicle.messages for vehicle in census.vehicles) == len(records)
+            assert (census.start, census.end) == (min(r.time for r in records), max(r.time for r in records))
+            said = json.dumps(document(census))
+            assert "NaN" not in said
+            assert "Infinity" not in said
 
 
 def test_the_good_end_of_a_log_is_read(mutants: Mutants, tmp_path: Path) -> None:

@@ -104,18 +104,30 @@ def paper(
 
 @app.command()
 def replay(
-    run_dir: Annotated[Path, typer.Argument(help="What a flight left: logs and configuration.yaml.")],
+    log: Annotated[
+        Path,
+        typer.Argument(metavar="LOG", help="A tlog, or what a flight left: logs and configuration.yaml."),
+    ],
+    listing: Annotated[
+        bool, typer.Option("--list", help="Show who is in the log, and what is damaged.")
+    ] = False,
     certify: Annotated[
         bool, typer.Option("--certify", help="Check from the plans on the wire that all kept apart.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
-    """Go through the logs of a run again. Ends with 1 if there are findings."""
-    from outrider.certify.command import certify as certifying
+    """Go through a flight again: does each companion, given what it received, send what it sent? Ends with 1
+    if not, or if there are findings."""
+    if listing and certify:
+        raise InputError(f"replay {log}: both at once; allowed: one of --list, --certify")
+    if listing:
+        from outrider.logs.listing import listing as naming
 
-    if not certify:
-        raise InputError(f"replay {run_dir}: what for is not said; allowed: --certify")
-    raise typer.Exit(certifying(run_dir, as_json))
+        raise typer.Exit(naming(log, as_json))
+    from outrider.certify.command import certify as certifying
+    from outrider.replaying.command import replay as replaying
+
+    raise typer.Exit((certifying if certify else replaying)(log, as_json))
 
 
 @app.command()

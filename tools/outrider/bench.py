@@ -24,8 +24,7 @@ from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import GlobalPosition, Source, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
-from mavlink_bridge.tlog import TlogWriter, read_tlog
-from outrider import bench_certified
+from outrider import bench_certified, bench_tlog
 from outrider.flight import Flight
 from outrider.resources import config_root, find
 from outrider.scenario import Scenario
@@ -65,7 +64,7 @@ def measure(progress: Progress, *, quick: bool) -> dict[str, object]:
     }
     progress("codec and tlog", 0.4)
     figures["codec_us"] = codec(rounds)
-    figures["tlog_messages_per_s"] = tlog(rounds)
+    figures.update(bench_tlog.reading(rounds))
     if not quick:
         progress("antipodal-8 at 100 Hz", 0.5)
         factor = {"antipodal-8": real_time_factor(None)}
@@ -151,25 +150,6 @@ def codec(rounds: int) -> dict[str, float]:
         pack_us.append(_per_call(lambda: sender.encode(message)))
         parse_us.append(_per_call(lambda: receiver.feed(frame)))
     return {"pack": round(float(np.median(pack_us)), 2), "parse": round(float(np.median(parse_us)), 2)}
-
-
-def tlog(rounds: int) -> float:
-    """Messages per CPU-second read from a log of 50 000 frames."""
-    sender = Codec()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "bench.tlog"
-        with TlogWriter(path) as writer:
-            for i in range(50_000):
-                message = GlobalPosition(
-                    Source(11, 1), i * 1000, 47.0, 8.0, 500.0, 5.0, (1.0, 2.0, 0.5), None
-                )
-                writer.write(i * 1000, 0, sender.encode(message))
-        rates = []
-        for _ in range(rounds):
-            started = time.process_time()
-            count = sum(1 for _ in read_tlog(path))
-            rates.append(count / (time.process_time() - started))
-    return round(float(np.median(rates)))
 
 
 def real_time_factor(replan_hz: float | None) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 
 from companion.bearings import bearing
 from companion.config import CompanionConfig
+from companion.helm import Helm
 from companion.node import Companion
 from mavlink_bridge.ether import Channel, Faults
 from mavlink_bridge.frames import FleetFrame
@@ -106,6 +107,16 @@ class Fleet:
         config = self.companion_config_of(k)
         return kind(config, self.systems[k], self.target_system, self.frame, stopwatch)
 
+    @property
+    def helmed(self) -> list[int]:
+        """The vehicles, by their index, that have a helm: those whose plans others count on."""
+        certified = self.scenario.companion.avoidance == "certified"
+        return list(range(self.scenario.vehicles)) if certified else []
+
+    def helm(self, k: int) -> Helm:
+        """The helm of vehicle ``k``."""
+        return Helm(self.companion_config_of(k), self.systems[k], self.frame)
+
     def autopilot(self, k: int) -> Autopilot:
         """The autopilot and vehicle ``k``: on the ground below its start, or hovering there."""
         start = self.starts.positions[k]
@@ -147,15 +158,22 @@ class Fleet:
         links = self.scenario.links
         companions = [(names.companion(system), ("companion", system)) for system in self.systems]
         channels = []
-        for system, (name, words) in zip(self.systems, companions, strict=True):
+        for k, (system, (name, words)) in enumerate(zip(self.systems, companions, strict=True)):
             ends = {
                 "autopilot": End(names.autopilot(system), "autopilot", ("autopilot", system)),
                 "target": End(names.TARGET, "target", ("target",)),
                 "ground": End(names.OPERATOR, "ground", ("operator",)),
             }
             for link, other in ends.items():
-                pair = [End(name, link, words), other]
-                channels.append(_channel(f"{link}-{name}", pair, getattr(links, link)))
+                ends_here = [End(name, link, words), other]
+                if link == "autopilot" and k in self.helmed:
+                    ends_here.append(End(names.helm(system), link, words))
+                channels.append(_channel(f"{link}-{name}", ends_here, getattr(links, link)))
+            if k in self.helmed:
+                # On the same computer nothing is lost.
+                channels.append(
+                    Channel(f"helm-{name}", {name: "swarm", names.helm(system): "swarm"}, Faults())
+                )
         swarm = [End(name, "swarm", words) for name, words in companions]
         swarm += [End(names.moving(s), "swarm", ("moving", s)) for s in self.scenario.moving_systems]
         channels.append(_channel("swarm", swarm, links.swarm))

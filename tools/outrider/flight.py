@@ -61,6 +61,7 @@ class Flight:
         self.moving = fleet.moving()
         self.autopilots = [fleet.autopilot(k) for k in range(scenario.size)]
         self.companions = [fleet.companion(k, stopwatch) for k in range(scenario.size)]
+        self.helms = [fleet.helm(k) for k in fleet.helmed]
         self.operator = fleet.operator()
         self.truth = truth_of(scenario)
         self.ether = Ether(fleet.channels(), seed, scenario.timing.base_tick_us)
@@ -112,6 +113,9 @@ class Flight:
         for k, (companion, phase) in enumerate(zip(self.companions, self.fleet.phases(), strict=True)):
             clock = self.fleet.clock(k, EPOCH)
             nodes.append(Scheduled(companion, timing.companion_us, EPOCH + phase, clock))
+        for k in self.fleet.helmed:
+            clock = self.fleet.clock(k, EPOCH)
+            nodes.append(Scheduled(self.helms[k], timing.companion_us, EPOCH, clock))
         nodes.append(Scheduled(self.target, timing.companion_us, EPOCH))
         nodes += [Scheduled(moving, timing.companion_us, EPOCH) for moving in self.moving]
         nodes.append(Scheduled(self.operator, timing.companion_us, EPOCH))

@@ -12,6 +12,11 @@ def companion(system: int) -> str:
     return f"companion-{system}"
 
 
+def helm(system: int) -> str:
+    """What carries its plan on when the companion is silent."""
+    return f"helm-{system}"
+
+
 def autopilot(system: int) -> str:
     """Its autopilot."""
     return f"sitl-{system}"
@@ -25,3 +30,8 @@ def moving(system: int) -> str:
 def log(system: int) -> str:
     """The file of its tlog."""
     return f"vehicle-{system}.tlog"
+
+
+def steps(system: int) -> str:
+    """The file that says when its companion was stepped."""
+    return f"vehicle-{system}.steps.npz"

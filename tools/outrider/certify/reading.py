@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict
-
 from companion.certified.reach import between
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError, PlanWireError
@@ -21,10 +19,9 @@ from outrider import names
 from outrider.certify.evidence import Evidence, Garbled, Log, Sighting, Terms, Word
 from outrider.companion_settings import settings_of
 from outrider.errors import Fault, InputError
+from outrider.resolved import CONFIGURATION, resolved
 from outrider.scenario import Scenario
-from outrider.yaml_file import load
 
-CONFIGURATION = "configuration.yaml"
 _TUNNEL = 385
 _ALLOWED = "allowed: what outrider swarm SCENARIO --avoidance certified --out leaves"
 _OFTEN = 4096
@@ -33,25 +30,13 @@ _OFTEN = 4096
 Watch = Callable[[str, float], None]
 
 
-class Resolved(BaseModel):
-    """The configuration that a run leaves beside its logs."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    seed: int
-    scenario: Scenario
-
-
 def read(directory: Path, watch: Watch) -> Evidence:
     """All evidence in ``directory``; ``watch`` hears which log is read, and the share that is done.
 
     Raises InputError where there is none.
     """
-    if not directory.is_dir():
-        wrong = "not a directory" if directory.exists() else "no such directory"
-        raise InputError(Fault(str(directory), f"{wrong}; {_ALLOWED}"))
     path = directory / CONFIGURATION
-    scenario = load(path, Resolved).scenario
+    scenario = resolved(directory, _ALLOWED).scenario
     if scenario.companion.avoidance != "certified":
         flown = scenario.companion.avoidance
         raise InputError(Fault(str(path), f"flown with scenario.companion.avoidance {flown!r}; {_ALLOWED}"))

@@ -75,7 +75,7 @@ class RealTimeFlight:
         # Compiled before forking, so that not every process has to.
         Vehicle(self.fleet.vehicle, np.zeros(3)).advance(1, None)
         board = Board(self.scenario.size)
-        wiring = wire(self.scenario.size, self._clock, len(self.scenario.moving))
+        wiring = wire(self.scenario.size, self._clock, len(self.scenario.moving), len(self.fleet.helmed))
         with TemporaryDirectory() as folder, self._interruptible():
             scratch = Path(folder)
             start = self._clock.now() + (_START_WITH_PRIORITY if self._priority else _START)

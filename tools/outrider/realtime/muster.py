@@ -57,6 +57,13 @@ def muster(
                 k, companion, system, logs, Seat(behind, every, wiring.companions[k], clock, board), cuts
             )
         )
+    for index, k in enumerate(fleet.helmed):
+        helm = fleet.helm(k)
+        # Both ends of its link to the autopilot count as the companion's: they are on one computer.
+        behind = rough(fleet, helm, {"autopilot": names.companion(fleet.systems[k]), "swarm": None})
+        turn = start + staggered(2 * len(fleet.systems) + index, _slots(fleet), timing.companion_us)
+        every = Scheduled(behind, timing.companion_us, turn, fleet.clock(k, start))
+        workers.append(Worker(Seat(behind, every, wiring.helms[index], clock, board)))
     phase = start + staggered(_slots(fleet) - 2, _slots(fleet), timing.companion_us)
     played: list[Target | MovingObstacle] = [fleet.target(), *fleet.moving()]
     for node, links in zip(played, [wiring.target, *wiring.moving], strict=True):
@@ -84,8 +91,8 @@ def operators_turn(fleet: Fleet, start: int) -> int:
 
 
 def _slots(fleet: Fleet) -> int:
-    """One for each autopilot and companion, one for what the harness plays, and the operator's."""
-    return 2 * len(fleet.systems) + 2
+    """One for each autopilot, companion and helm, one for what the harness plays, and the operator's."""
+    return 2 * len(fleet.systems) + len(fleet.helmed) + 2
 
 
 def staggered(k: int, count: int, period: int) -> int:

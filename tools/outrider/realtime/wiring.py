@@ -16,27 +16,29 @@ _HOST = "127.0.0.1"
 
 
 class Wiring(NamedTuple):
-    """Open links by node: of each autopilot and companion by link name; of target, moving obstacles and
+    """Open links by node: of each autopilot, companion and helm by link name; of target, moving obstacles and
     operator."""
 
     autopilots: list[dict[str, list[Link]]]
     companions: list[dict[str, list[Link]]]
+    helms: list[dict[str, list[Link]]]
     target: dict[str, list[Link]]
     moving: list[dict[str, list[Link]]]
     operator: dict[str, list[Link]]
 
     def close_others(self, own: dict[str, list[Link]]) -> None:
         """Close every link but ``own``: a process keeps its node's alone."""
-        for node in (*self.autopilots, *self.companions, self.target, *self.moving, self.operator):
+        nodes = (*self.autopilots, *self.companions, *self.helms, *self.moving, self.target, self.operator)
+        for node in nodes:
             if node is not own:
                 for links in node.values():
                     for link in links:
                         link.close()
 
 
-def wire(vehicles: int, clock: Clock, moving: int = 0) -> Wiring:
-    """Open all links, those of so many ``moving`` obstacles too, on ports that are free now. LinkError if one
-    cannot be opened; then none stays open."""
+def wire(vehicles: int, clock: Clock, moving: int = 0, helms: int = 0) -> Wiring:
+    """Open all links, those of so many ``moving`` obstacles and of the first vehicles' ``helms`` too, on free
+    ports. LinkError if one cannot be opened; then none stays open."""
     with ExitStack() as opened:
 
         def opening(endpoint: str) -> Link:
@@ -62,9 +64,16 @@ def wire(vehicles: int, clock: Clock, moving: int = 0) -> Wiring:
                 }
             )
             operator.append(opening(f"udpout:{_HOST}:{_port(ground)}"))
+        helmed = []
+        for autopilot, companion in list(zip(autopilots, companions, strict=True))[:helms]:
+            # What it carries on it tells the autopilot; that the companion speaks it hears from both.
+            ends = [opening(f"udpin:{_HOST}:0"), opening(f"udpin:{_HOST}:0")]
+            for node, end in zip((autopilot, companion), ends, strict=True):
+                node["autopilot"].append(opening(f"udpout:{_HOST}:{_port(end)}"))
+            helmed.append({"autopilot": ends, "swarm": [opening(swarm)]})
         obstacles = [{"swarm": [opening(swarm)]} for _ in range(moving)]
         wiring = Wiring(
-            autopilots, companions, {"target": [opening(target)]}, obstacles, {"ground": operator}
+            autopilots, companions, helmed, {"target": [opening(target)]}, obstacles, {"ground": operator}
         )
         opened.pop_all()
     return wiring

@@ -1,0 +1,154 @@
+"""The helm: carries a committed plan on when the companion that made it falls silent.
+
+A vehicle that is promised to keep to its plan has to be told so every 20 ms; without a word its autopilot
+flies on along the last set-point for a time-out and then brakes, beside its plan and in the way of others
+that count on it. So a second, small program listens to what its companion tells: plans on the swarm link,
+set-points on the autopilot's. While these flow it says nothing. When they stop, and the autopilot is still in
+the mode in which set-points steer, it sends those of the newest committed plan, to its end and for some
+seconds of hover; then it leaves the vehicle to the autopilot's own failsafe. When the companion is back, it
+is at the same plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from companion.autopilots import Profile, is_guided
+from companion.autopilots.ardupilot import ARDUPILOT
+from companion.autopilots.px4 import PX4
+from companion.certified.committed import horizon_of, rests
+from companion.config import CompanionConfig
+from companion.heading import Yaw
+from companion.horizon import Horizon
+from companion.node import COMPONENT
+from companion.pilot import ARMED, HEARTBEAT_LOST
+from companion.reception import AUTOPILOT
+from companion.setpoint import setpoint
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.frames import FleetFrame, LocalFrame
+from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, Message, SetpointLocal, Source, Tunnel
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE as PLAN
+from mavlink_bridge.plan_wire import WirePlan
+from mavlink_bridge.plan_wire import unpack as unpack_plan
+from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.roster_wire import unpack as unpack_roster
+
+HELM = 191
+"""MAV_COMP_ID_ONBOARD_COMPUTER."""
+_SILENT = 4
+"""Set-points missing on end after which the companion counts as silent."""
+_HEARTBEAT, _SETPOINT, _ORIGIN, _TUNNEL = 0, 84, 49, 385
+
+
+class Helm:
+    """A ``Node`` beside the companion of ``system``, on the same clock. Links: ``autopilot``, ``swarm``."""
+
+    def __init__(self, config: CompanionConfig, system: int, fleet: FleetFrame) -> None:
+        self.name = f"helm-{system}"
+        self._config, self._fleet = config, fleet
+        self._own = Source(system, HELM)
+        self._companion = Source(system, COMPONENT)
+        self._codecs = {
+            "autopilot": Codec(
+                lambda identifier, sender, component: (
+                    sender == system
+                    and (
+                        (component == AUTOPILOT and identifier in (_HEARTBEAT, _ORIGIN))
+                        or (component == COMPONENT and identifier == _SETPOINT)
+                    )
+                )
+            ),
+            "swarm": Codec(
+                lambda identifier, sender, component: (
+                    sender == system and component == COMPONENT and identifier == _TUNNEL
+                )
+            ),
+        }
+        self._plans: dict[int, WirePlan] = {}
+        self._flown: tuple[int, Horizon] | None = None
+        self._heard: tuple[int, SetpointLocal] | None = None
+        self._beat: tuple[int, Heartbeat] | None = None
+        self._local: LocalFrame | None = None
+        self._next = 0
+        self._boot: int | None = None
+        self.carried = 0
+        """Set-points sent in the companion's place."""
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Listen; and where the companion is silent, send what its plan says at ``now`` (µs)."""
+        self._boot = now if self._boot is None else self._boot
+        for link, data in inbox:
+            for message in self._codecs[link].feed(data):
+                self._hear(now, message)
+        profile = self._profile(now)
+        if now < self._next or profile is None or self._local is None or self._heard is None:
+            return []
+        period = self._config.rates.setpoint_us
+        since, last = self._heard
+        if now - since <= _SILENT * period:
+            return []
+        horizon = self._horizon(now)
+        if horizon is None or now > horizon.end + self._config.certified.helm_us:
+            return []
+        self._next = now + period
+        self.carried += 1
+        # The nose stays where it was: whom it faces is not known here.
+        yaw = Yaw(self._local.yaw_to_fleet(last.yaw), 0.0, 0.0)
+        time = now + self._config.setpoint_lead_us
+        mask = profile.setpoint_mask
+        message = setpoint(time, now - self._boot, horizon, yaw, self._local, self._own, mask)
+        return [Datagram("autopilot", self._codecs["autopilot"].encode(message))]
+
+    def _hear(self, now: int, message: Message) -> None:
+        match message:
+            case Heartbeat():
+                self._beat = now, message
+                if self._profile(now) is None:
+                    # Somebody else has the vehicle: what was planned before that counts no more.
+                    self._plans.clear()
+                    self._heard = None
+            case GpsGlobalOrigin():
+                self._local = self._fleet.local(message.latitude, message.longitude, message.altitude)
+            case SetpointLocal():
+                self._heard = now, message
+            case Tunnel():
+                self._file(now, message)
+            case _:
+                pass
+
+    def _file(self, now: int, message: Tunnel) -> None:
+        """A plan of the companion's; or, with a farewell, the end of its plans: it lands."""
+        try:
+            if message.payload_type == ROSTER and unpack_roster(message.payload).farewell:
+                self._plans.clear()
+            if message.payload_type != PLAN:
+                return
+            plan = unpack_plan(message.payload)
+        except PlanWireError:
+            return
+        if plan.origin != self._fleet.fingerprint or not rests(plan):
+            return
+        self._plans[plan.epoch] = plan
+        # The one that is flown, and what follows it.
+        flown = max((epoch for epoch in self._plans if epoch <= now), default=plan.epoch)
+        self._plans = {epoch: kept for epoch, kept in self._plans.items() if epoch >= flown}
+
+    def _horizon(self, now: int) -> Horizon | None:
+        """The committed plan at ``now`` (µs): the newest that has begun."""
+        epoch = max((epoch for epoch in self._plans if epoch <= now), default=None)
+        if epoch is None:
+            return None
+        if self._flown is None or self._flown[0] != epoch:
+            self._flown = epoch, horizon_of(self._plans[epoch])
+        return self._flown[1]
+
+    def _profile(self, now: int) -> Profile | None:
+        """What the autopilot wants, where it is armed and follows set-points."""
+        if self._beat is None or now - self._beat[0] > HEARTBEAT_LOST:
+            return None
+        beat = self._beat[1]
+        profile = {p.autopilot: p for p in (ARDUPILOT, PX4)}.get(beat.autopilot)
+        steers = profile is not None and beat.base_mode & ARMED and is_guided(profile, beat)
+        return profile if steers else None

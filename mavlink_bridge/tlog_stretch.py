@@ -1,0 +1,78 @@
+"""The healthy stretch of a log: whole records right behind one another, each with a checksum that holds.
+
+Nearly all of a log is such a stretch, so this is where the time of reading goes. It reads no more of a header
+than length, flags and message id; what is not clean is left to the search in ``tlog``, which takes its time.
+"""
+
+from __future__ import annotations
+
+from struct import Struct
+from typing import NamedTuple
+
+from fastcrc.crc16 import mcrf4xx
+
+from mavlink_bridge.framing import CRC_EXTRA, SIGNATURE_LENGTH, SIGNED_FLAG, START_V1, START_V2
+
+SHORTEST_RECORD = 16
+"""Bytes: a stamp and a version 1 frame without payload."""
+
+_HEAD = Struct(">QBB")
+_EXTRA_V1 = tuple(CRC_EXTRA.get(number) for number in range(256))
+_EXTRA_V2 = {number.to_bytes(3, "little"): extra for number, extra in CRC_EXTRA.items() if number < 1 << 24}
+
+
+class Record(NamedTuple):
+    """One whole frame of a log, ``time`` in µs (a multiple of 4), ``link`` 0…3."""
+
+    time: int
+    link: int
+    frame: bytes
+
+
+class Stretch(NamedTuple):
+    """``records`` in their order; ``end``: where the last one ends; ``time_steps_back``: how many have a time
+    before that of the one before."""
+
+    records: list[Record]
+    end: int
+    time_steps_back: int
+
+
+def leading_records(data: bytes, start: int, before: int) -> Stretch:
+    """The records that ``data`` has from ``start`` on, up to the first that is damaged, cut off, or of a
+    message that the dialect lacks. ``before``: time (µs) of the record before, 0 if there is none."""
+    records: list[Record] = []
+    back, at, last = 0, start, len(data) - SHORTEST_RECORD
+    # Each name that is local here saves a look-up for each record.
+    add, make, head, checksum = records.append, tuple.__new__, _HEAD.unpack_from, mcrf4xx
+    extra_v1, extra_v2 = _EXTRA_V1, _EXTRA_V2.get
+    while at <= last:
+        stamp, mark, length = head(data, at)
+        if mark == START_V2:
+            end = at + 18 + length
+            stop = end + 2
+            if data[at + 10]:
+                if data[at + 10] != SIGNED_FLAG:
+                    break
+                stop += SIGNATURE_LENGTH
+            extra = extra_v2(data[at + 15 : at + 18])
+        elif mark == START_V1:
+            end = at + 14 + length
+            stop = end + 2
+            extra = extra_v1[data[at + 13]]
+        else:
+            break
+        if (
+            extra is None
+            or stop > len(data)
+            or checksum(data[at + 9 : end] + extra) != data[end] | data[end + 1] << 8
+        ):
+            break
+        time = stamp & ~3
+        if time < before:
+            back += 1
+        before = time
+        # Half the price of Record(…), which would put the same three together.
+        add(make(Record, (time, stamp & 3, data[at + 8 : stop])))
+        at = stop
+    return Stretch(records, at, back)

@@ -1,0 +1,187 @@
+"""The helm says nothing while its companion speaks, and what the committed plan says when it is silent."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.certified.committed import committed, horizon_of
+from companion.config import CompanionConfig
+from companion.helm import Helm
+from companion.node import COMPONENT
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import (
+    GpsGlobalOrigin,
+    Heartbeat,
+    Message,
+    SetpointLocal,
+    Source,
+    Tunnel,
+)
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, WirePlan, pack, quantise
+from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.roster_wire import Roster
+from mavlink_bridge.roster_wire import pack as pack_roster
+
+SYSTEM = 11
+FLEET = FleetFrame(47.397742, 8.545594, 488.0)
+CONFIG = CompanionConfig.model_validate({"task": "goto", "avoidance": "certified"})
+DT, STEPS, TICK = 200_000, 16, 10_000
+BEGIN = 1_767_225_600_000_000
+AUTOPILOT, COMPANION = Source(SYSTEM, 1), Source(SYSTEM, COMPONENT)
+GUIDED, LOITER = 4, 5
+YAW = 0.7
+
+
+class Bench:
+    """A helm, and a companion that speaks until it is told not to."""
+
+    def __init__(self) -> None:
+        self.helm = Helm(CONFIG, SYSTEM, FLEET)
+        self.codec, self.reader = Codec(), Codec()
+        self.now = BEGIN
+        self.speaks = self.beats = True
+        self.mode, self.armed = GUIDED, True
+        self.plans = [plan_from(BEGIN)]
+        self.sent: list[tuple[int, SetpointLocal]] = []
+
+    def run(self, seconds: float) -> list[tuple[int, SetpointLocal]]:
+        """Go on for so long; what the helm sent meanwhile."""
+        before = len(self.sent)
+        for _ in range(round(seconds * 1e6 / TICK)):
+            for link, data in self.helm.step(self.now, self._inbox()):
+                assert link == "autopilot"
+                for message in self.reader.feed(data):
+                    assert isinstance(message, SetpointLocal)
+                    self.sent.append((self.now, message))
+            self.now += TICK
+        return self.sent[before:]
+
+    def tell(self, link: str, message: Message) -> Datagram:
+        return Datagram(link, self.codec.encode(message))
+
+    def _inbox(self) -> list[Datagram]:
+        since, inbox = self.now - BEGIN, []
+        if since == 0:
+            origin = GpsGlobalOrigin(AUTOPILOT, FLEET.latitude, FLEET.longitude, FLEET.altitude, 0)
+            inbox.append(self.tell("autopilot", origin))
+        if self.beats and since % 1_000_000 == 0:
+            base = 0x81 if self.armed else 0x01
+            inbox.append(self.tell("autopilot", Heartbeat(AUTOPILOT, 13, 3, base, self.mode, 4)))
+        if self.speaks and since % 20_000 == 0:
+            inbox.append(self.tell("autopilot", spoken(since)))
+        if self.speaks and since % 50_000 == 0:
+            inbox += [self.tell("swarm", told(plan)) for plan in self.plans]
+        return inbox
+
+
+def plan_from(epoch: int, seed: int = 1) -> WirePlan:
+    random = np.random.default_rng(seed)
+    start = quantise(epoch, DT, [1.0, 2.0, 5.0], [1.5, -0.5, 0.1], np.zeros((STEPS, 3)), FLEET.fingerprint)
+    return committed(start, random.uniform(-1.0, 1.0, (STEPS, 3)))
+
+
+def told(plan: WirePlan, source: Source = COMPANION) -> Tunnel:
+    return Tunnel(source, 0, 0, PAYLOAD_TYPE, pack(plan))
+
+
+def spoken(since: int) -> SetpointLocal:
+    zero = (0.0, 0.0, 0.0)
+    return SetpointLocal(COMPANION, since, SYSTEM, 1, 1, 0, zero, zero, zero, YAW, 0.0)
+
+
+def silent(bench: Bench) -> Bench:
+    """After a second of talk the companion is silent."""
+    assert bench.run(1.0) == []
+    bench.speaks = False
+    return bench
+
+
+def test_while_the_companion_speaks_it_is_silent() -> None:
+    assert Bench().run(5.0) == []
+
+
+def test_it_sends_the_committed_plan_to_its_end_and_some_seconds_of_hover() -> None:
+    bench = silent(Bench())
+    sent = bench.run(30.0)
+    since = sent[0][0] - bench.now + round(30.0 * 1e6)
+    assert since <= 120_000
+    horizon = horizon_of(bench.plans[0])
+    assert abs(sent[-1][0] - horizon.end - CONFIG.certified.helm_us) <= TICK
+    times = [time for time, _ in sent]
+    assert set(np.diff(times)) == {CONFIG.rates.setpoint_us}
+    for time, message in sent:
+        motion = horizon.at(time + CONFIG.setpoint_lead_us)
+        east_north_up = np.array([message.position[1], message.position[0], -message.position[2]])
+        np.testing.assert_allclose(east_north_up, motion.position, atol=2e-3)
+        velocity = np.array([message.velocity[1], message.velocity[0], -message.velocity[2]])
+        np.testing.assert_allclose(velocity, motion.velocity, atol=1e-5)
+        assert message.source == Source(SYSTEM, 191)
+        assert (message.target_system, message.type_mask) == (SYSTEM, 0)
+        assert message.yaw == pytest.approx(YAW, abs=1e-3)
+
+
+def test_the_newest_plan_that_has_begun_is_flown() -> None:
+    """Both that the companion has told: the next one from its epoch on."""
+    bench = Bench()
+    bench.plans = [plan_from(BEGIN + 800_000), plan_from(BEGIN + 1_200_000, 2)]
+    assert bench.run(1.0) == []
+    bench.speaks = False
+    for time, message in bench.run(1.0):
+        chosen = bench.plans[time >= BEGIN + 1_200_000]
+        assert message.position[1] == pytest.approx(
+            horizon_of(chosen).at(time + CONFIG.setpoint_lead_us).position[0], abs=2e-3
+        )
+
+
+def test_when_the_companion_is_back_it_is_silent_again() -> None:
+    bench = silent(Bench())
+    assert bench.run(1.0)
+    bench.speaks = True
+    bench.run(0.02)
+    assert bench.run(3.0) == []
+
+
+@pytest.mark.parametrize("how", ["another mode", "disarmed", "no heartbeat"])
+def test_a_vehicle_that_somebody_else_has_is_left_alone(how: str) -> None:
+    bench = silent(Bench())
+    assert bench.run(0.5)
+    bench.mode = LOITER if how == "another mode" else GUIDED
+    bench.armed = how != "disarmed"
+    bench.beats = how != "no heartbeat"
+    # A heartbeat is a second old at most; without any it counts for three.
+    bench.run(3.1)
+    assert bench.run(2.0) == []
+    # Given back, it is at nobody's plan: the old one would be somewhere else.
+    bench.mode, bench.armed, bench.beats = GUIDED, True, True
+    if how != "no heartbeat":
+        assert bench.run(3.0) == []
+
+
+def test_after_a_farewell_it_is_silent() -> None:
+    """The companion lands: no set-point may come in between."""
+    bench = Bench()
+    bench.run(1.0)
+    farewell = Tunnel(COMPANION, 0, 0, ROSTER, pack_roster(Roster(BEGIN, frozenset(), True)))
+    bench.helm.step(bench.now, [bench.tell("swarm", farewell)])
+    bench.speaks = False
+    assert bench.run(3.0) == []
+
+
+def test_another_companions_plan_is_not_flown() -> None:
+    bench = Bench()
+    bench.plans = []
+    for source in (Source(12, COMPONENT), Source(SYSTEM, 1)):
+        bench.helm.step(bench.now, [bench.tell("swarm", told(plan_from(BEGIN), source))])
+    assert silent(bench).run(3.0) == []
+
+
+@given(st.lists(st.tuples(st.sampled_from(["autopilot", "swarm"]), st.binary(max_size=300)), max_size=6))
+def test_garbage_is_harmless(garbage: list[tuple[str, bytes]]) -> None:
+    bench = silent(Bench())
+    bench.helm.step(bench.now, [Datagram(link, data) for link, data in garbage])
+    assert bench.run(0.5)

@@ -1,0 +1,82 @@
+"""How fast a tlog is read, beside pymavlink's own reader on the same log."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, LocalPosition, Message, Source
+from mavlink_bridge.tlog import TlogWriter, read_tlog
+from outrider.logs.tally import count
+
+_FRAMES = 20_000
+_SOURCE = Source(11, 1)
+
+
+def reading(rounds: int) -> dict[str, float]:
+    """Messages per CPU-second, one core: of the reader, of the census that ``replay --list`` takes, and of
+    pymavlink's mavlogfile (which decodes them too: it has no other way). Interleaved, medians."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bench.tlog"
+        _write(path)
+        ways: dict[str, Callable[[], int]] = {
+            "tlog_messages_per_s": lambda: sum(1 for _ in read_tlog(path)),
+            "tlog_census_messages_per_s": lambda: _census(path),
+            "tlog_messages_per_s_pymavlink": lambda: _by_pymavlink(path),
+        }
+        rates: dict[str, list[float]] = {name: [] for name in ways}
+        for _ in range(rounds):
+            for name, read in ways.items():
+                started = time.process_time()
+                if read() != _FRAMES:
+                    raise RuntimeError("the benchmark's log is not what it says")
+                rates[name].append(_FRAMES / (time.process_time() - started))
+    figures = {name: round(float(np.median(values))) for name, values in rates.items()}
+    ours, theirs = (np.array(rates[f"tlog_messages_per_s{of}"]) for of in ("", "_pymavlink"))
+    return {**figures, "tlog_times_pymavlink": round(float(np.median(ours / theirs)), 1)}
+
+
+def _census(path: Path) -> int:
+    census = count(path, lambda _share: None)
+    return 0 if census is None else census.report.good
+
+
+def _by_pymavlink(path: Path) -> int:
+    # Otherwise it begins as MAVLink 1.
+    os.environ["MAVLINK20"] = "1"
+    from pymavlink import mavutil
+
+    log = mavutil.mavlogfile(str(path))
+    try:
+        messages = 0
+        while log.recv_msg() is not None:
+            messages += 1
+    finally:
+        log.close()
+    return messages
+
+
+def _write(path: Path) -> None:
+    """Telemetry as an autopilot sends it: short messages and longer ones."""
+    codec = Codec()
+    with TlogWriter(path) as log:
+        for number in range(_FRAMES):
+            log.write(1000 * number, 0, codec.encode(_message(number)))
+
+
+def _message(number: int) -> Message:
+    now = 1000 * number
+    position, velocity = (1.0, 2.0, -5.0), (1.0, 2.0, 0.5)
+    if number % 100 == 0:
+        return Heartbeat(_SOURCE, 2, 3, 81, 4, 4)
+    if number % 3 == 0:
+        return GlobalPosition(_SOURCE, now, 47.0, 8.0, 500.0, 5.0, velocity, None)
+    if number % 3 == 1:
+        return Attitude(_SOURCE, now, 0.1, -0.2, 3.0, (0.0, 0.1, 0.2))
+    return LocalPosition(_SOURCE, now, position, velocity)

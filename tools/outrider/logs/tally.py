@@ -1,0 +1,154 @@
+"""The counting that leads to a census: a look at each header, in room that does not grow with the log."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from itertools import islice
+from pathlib import Path
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.errors import LogError
+from mavlink_bridge.framing import SIGNED_FLAG, START_V2
+from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.tlog import Record, TlogReader
+from outrider.logs.census import NO_AUTOPILOT, Census, Gaps, Vehicle
+
+SHORTEST_GAP = 1 << 21
+"""µs, 2.1 s: a silence of less is never a gap. Whoever is there sends a HEARTBEAT every second."""
+UNUSUAL = 8
+"""A silence of so many usual intervals is a gap."""
+_HEARTBEAT = 0
+_OFTEN = 1 << 12
+"""Records from one look at the progress to the next."""
+
+
+def count(path: Path, progress: Callable[[float], None]) -> Census | None:
+    """Who is in the log at ``path``; None if it holds no whole record. ``progress`` hears the share that is
+    read.
+
+    Raises LogError if it cannot be read.
+    """
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}") from None
+    reader, tally = TlogReader(path), _Tally()
+    records = iter(reader)
+    while piece := list(islice(records, _OFTEN)):
+        tally.add(piece)
+        progress(reader.bytes_read / max(size, 1))
+    vehicles = tally.vehicles()
+    return Census(vehicles, reader.report) if vehicles else None
+
+
+class _Stream:
+    """One message of one component in one version of MAVLink."""
+
+    __slots__ = ("count", "frame", "speaker")
+
+    def __init__(self, speaker: _Speaker) -> None:
+        self.speaker = speaker
+        self.count = 0
+        self.frame = b""
+
+
+class _Speaker:
+    """One system id. ``silences``: those that may be gaps, by the bits of their µs, so that a log of any
+    length takes no more room."""
+
+    __slots__ = ("before", "first", "last", "links", "longest", "signed", "silences")
+
+    def __init__(self, time: int) -> None:
+        self.before = self.first = self.last = time
+        self.longest = self.signed = 0
+        self.links: set[int] = set()
+        self.silences: Counter[int] = Counter()
+
+    def gaps(self, messages: int) -> Gaps:
+        """Of so many messages. The limit is a power of two, as what is known of the silences is."""
+        usual = (self.last - self.first) // max(messages - 1, 1)
+        limit = max(SHORTEST_GAP, 1 << (UNUSUAL * usual - 1).bit_length() if usual else 0)
+        number = sum(many for bits, many in self.silences.items() if 1 << bits > limit)
+        return Gaps(limit, number, self.longest if number else 0)
+
+
+class _Tally:
+    """The counting. A stream is told by the bytes of its header, which differ in length by version."""
+
+    def __init__(self) -> None:
+        self._streams: dict[bytes, _Stream] = {}
+        self._speakers: dict[int, _Speaker] = {}
+
+    def add(self, records: Iterable[Record]) -> None:
+        """Count ``records``, in the order of the log."""
+        known = self._streams.get
+        for time, link, frame in records:
+            if frame[0] == START_V2:
+                key = frame[5:10]
+                signed = frame[2] == SIGNED_FLAG
+            else:
+                key, signed = frame[3:6], False
+            stream = known(key) or self._meet(key, time)
+            stream.count += 1
+            stream.frame = frame
+            speaker = stream.speaker
+            if time != speaker.before:
+                self._pass_time(speaker, time)
+            if link not in speaker.links:
+                speaker.links.add(link)
+            if signed:
+                speaker.signed += 1
+
+    def _meet(self, key: bytes, time: int) -> _Stream:
+        speaker = self._speakers.setdefault(key[0], _Speaker(time))
+        self._streams[key] = stream = _Stream(speaker)
+        return stream
+
+    def _pass_time(self, speaker: _Speaker, time: int) -> None:
+        silence = time - speaker.before
+        speaker.before = time
+        if time > speaker.last:
+            speaker.last = time
+        elif time < speaker.first:
+            speaker.first = time
+        if silence > SHORTEST_GAP:
+            # The silence of exactly a power of two belongs below it.
+            speaker.silences[(silence - 1).bit_length()] += 1
+            speaker.longest = max(speaker.longest, silence)
+
+    def vehicles(self) -> tuple[Vehicle, ...]:
+        """Everyone met so far."""
+        return tuple(self._vehicle(system) for system in sorted(self._speakers))
+
+    def _vehicle(self, system: int) -> Vehicle:
+        speaker = self._speakers[system]
+        streams = {key: stream for key, stream in self._streams.items() if key[0] == system}
+        counts: Counter[int] = Counter()
+        for key, stream in streams.items():
+            counts[_message_id(key)] += stream.count
+        beats = [stream.frame for key, stream in sorted(streams.items()) if _message_id(key) == _HEARTBEAT]
+        beat = _spokesman(beats)
+        return Vehicle(
+            system,
+            tuple(sorted({key[1] for key in streams})),
+            None if beat is None else beat.type,
+            None if beat is None else beat.autopilot,
+            tuple(sorted(counts.items(), key=lambda one: (-one[1], one[0]))),
+            tuple(sorted({1 if len(key) == 3 else 2 for key in streams})),
+            tuple(sorted(speaker.links)),
+            speaker.signed,
+            speaker.first,
+            speaker.last,
+            speaker.gaps(counts.total()),
+        )
+
+
+def _message_id(key: bytes) -> int:
+    return int.from_bytes(key[2:], "little")
+
+
+def _spokesman(frames: list[bytes]) -> Heartbeat | None:
+    """Of the components' heartbeats that of the autopilot, or else the first."""
+    beats = [message for frame in frames for message in Codec().feed(frame) if isinstance(message, Heartbeat)]
+    return min(beats, key=lambda beat: (beat.autopilot == NO_AUTOPILOT, beat.source.component), default=None)

@@ -1,0 +1,35 @@
+"""What MAVLink calls the numbers of a census."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from pymavlink.dialects.v20 import all as dialect
+
+from outrider.logs.census import NO_AUTOPILOT, Vehicle
+
+MILLION: Final = 1_000_000
+"""µs of a second."""
+
+
+def rates(vehicle: Vehicle) -> Mapping[str, float]:
+    """Messages per second, by name, the most frequent first."""
+    return {dialect.mavlink_map[number].msgname: vehicle.rate(many) for number, many in vehicle.counts}
+
+
+def enumerated(enumeration: str, number: int | None) -> str | None:
+    """The word of ``enumeration`` for it, or its number behind the enumeration's name if there is none."""
+    if number is None:
+        return None
+    entry = dialect.enums[enumeration].get(number)
+    return f"{enumeration}_{number}" if entry is None else str(entry.name)
+
+
+def kind(vehicle: Vehicle) -> str:
+    """Type and autopilot, for people."""
+    autopilot = None if vehicle.autopilot == NO_AUTOPILOT else vehicle.autopilot
+    named = (("MAV_TYPE", vehicle.kind), ("MAV_AUTOPILOT", autopilot))
+    names = [(enumeration, enumerated(enumeration, number)) for enumeration, number in named]
+    words = [name.removeprefix(f"{before}_").lower().replace("_", " ") for before, name in names if name]
+    return ", ".join(words) or "no heartbeat"
