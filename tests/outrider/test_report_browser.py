@@ -154,13 +154,15 @@ def test_clicks_and_keys(made: Made, browse: Browse) -> None:
 
 
 def test_it_plays(made: Made, browse: Browse) -> None:
+    # A browser without a screen shows as few pictures as it likes.
     also = """
+      window.requestAnimationFrame = (show) => setTimeout(() => show(performance.now()), 20);
       document.getElementById("speed").value = "4";
       document.getElementById("speed").dispatchEvent(new Event("change"));
       document.getElementById("play").click();
     """
     page = browse(made.directory / "report.html", "#5", also)
-    assert float(within(page, "clock").removesuffix(" s")) > 5.1
+    assert float(within(page, "clock").removesuffix(" s")) > 7.0
 
 
 def test_the_policy_stops_what_would_get_in(made: Made, browse: Browse, tmp_path: Path) -> None:

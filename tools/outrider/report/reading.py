@@ -11,11 +11,11 @@ from typing import TypeVar
 
 from mavlink_bridge.errors import LogError
 from outrider import names
-from outrider.certify.reading import CONFIGURATION, Resolved
 from outrider.errors import Fault, InputError
 from outrider.report import arrays
 from outrider.report.logs import read_log
 from outrider.report.run import Gap, Log, Run
+from outrider.resolved import CONFIGURATION, Resolved
 from outrider.yaml_file import load
 
 SUMMARY, FLIGHT, PLANS, PLAN_TIMES = "summary.json", "flight.npz", "plans.npz", "plan_times.npz"
