@@ -169,6 +169,8 @@ def test_the_wheel_holds_the_house_and_nothing_else(wheel: Path) -> None:
         folder = ROOT / ("tools" if package == "outrider" else "") / package
         modules = {f"{package}/{path.relative_to(folder)}" for path in folder.rglob("*.py")}
         assert {name for name in names if name.startswith(f"{package}/") and name.endswith(".py")} == modules
+    page = ROOT / "tools" / "outrider" / "report" / "static"
+    assert {f"outrider/report/static/{path.name}" for path in page.iterdir()} <= set(names)
     assert not any("__pycache__" in name or name.startswith("tests") for name in names)
 
 
@@ -185,6 +187,7 @@ def test_a_core_install_has_neither_compiler_nor_simulator_nor_viewer(core: Inst
         "mavlink_bridge.realtime",
         "mavlink_bridge.links.opening",
         "mavlink_bridge.tlog",
+        "outrider.report.command",
         "outrider.resources",
         "outrider.yaml_file",
         "outrider.scenario",

@@ -162,6 +162,18 @@ def export(
 
 
 @app.command()
+def report(
+    run_dir: Annotated[Path, typer.Argument(help="What a flight left.")],
+    out: Annotated[Optional[Path], typer.Option(help="The page; RUN_DIR/report.html if not said.")] = None,  # noqa: UP045
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Make one HTML page of a run: summary, replay, charts, events and message loss. It needs no network."""
+    from outrider.report.command import report as reporting
+
+    raise typer.Exit(reporting(run_dir, out, as_json))
+
+
+@app.command()
 def bench(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer rounds, no flight.")] = False,

@@ -1,0 +1,141 @@
+"""``outrider report``: from a run directory to its page."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import NamedTuple
+
+from outrider.errors import InputError
+from outrider.report import clocks
+from outrider.report.charts import charts, histogram
+from outrider.report.distances import encounters
+from outrider.report.events import Event, events
+from outrider.report.headline import Headline, headline
+from outrider.report.loss import Losses, losses
+from outrider.report.page import MARK, page
+from outrider.report.reading import Watch, read
+from outrider.report.replay import document
+from outrider.report.run import Motions, Run
+from outrider.report.tables import event_table, fact_list, gap_list, loss_tables, summary_table
+from outrider.report.thinning import chosen
+
+NAME = "report.html"
+
+
+class Made(NamedTuple):
+    """A page, and what is on it."""
+
+    text: str
+    run: Run
+    events: tuple[Event, ...]
+    losses: Losses
+
+
+def report(directory: Path, out: Path | None = None, as_json: bool = False) -> int:
+    """Write the page of the run in ``directory`` there, or to ``out``, and say so; the exit status.
+
+    Raises InputError for what is no run, and for a file that is there and no report.
+    """
+    from outrider.console import share_progress
+
+    path = directory / NAME if out is None else out
+    if directory.is_dir():
+        check(path)
+    with share_progress() as watch:
+        made = make(directory, watch)
+    write(path, made.text)
+    if as_json:
+        sys.stdout.write(json.dumps(_document(path, made)) + "\n")
+    else:
+        for gap in made.run.gaps:
+            sys.stderr.write(f"{gap.what}: {gap.why}\n")
+        sys.stdout.write(f"{path}\n")
+    return 0
+
+
+def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
+    """The page of a run, not yet written. Raises InputError for what is no run."""
+    run = read(directory, watch)
+    motions = run.motions
+    ahead = {} if motions is None else {log.owner: clocks.offset(log, motions) for log in run.logs}
+    lost = losses(run.logs, ahead)
+    near = [] if motions is None else encounters(motions, _d_min(run), run.scenario)
+    happened = events(run, near, ahead, 0.0 if motions is None else float(motions.time[-1]))
+    replay = None if motions is None else _replay(run, motions, lost, ahead, happened)
+    said = headline(run, lost.share)
+    text = page(_title(run), said, _parts(run, said, happened, lost), replay)
+    return Made(text, run, tuple(happened), lost)
+
+
+def _d_min(run: Run) -> float:
+    """m; 0, below which nothing is, where nobody says."""
+    said = run.summary.get("d_min_m") if run.scenario is None else run.scenario.d_min
+    return float(said) if isinstance(said, int | float) else 0.0
+
+
+def _replay(
+    run: Run, motions: Motions, lost: Losses, ahead: dict[int, float], happened: Sequence[Event]
+) -> str:
+    shown = chosen(motions)
+    drawn = charts(run, motions, shown, lost, clocks.errors(run.logs, ahead))
+    return document(run, motions, shown, drawn, histogram(run.plan_times), happened)
+
+
+def _title(run: Run) -> str:
+    certified = run.summary.get("avoidance") == "certified"
+    method, seed = "certified" if certified else run.summary.get("method"), run.seed
+    words = [run.name, str(method or ""), "" if seed is None else f"seed {seed}"]
+    return " · ".join(word for word in words if word)
+
+
+def _parts(run: Run, said: Headline, happened: Sequence[Event], lost: Losses) -> dict[str, str]:
+    """What the template has places for."""
+    share = lost.share
+    return {
+        "facts": fact_list(said.facts),
+        "gaps": gap_list(run.gaps),
+        "summary": summary_table(run.summary) if run.summary else "<p>There is no summary.</p>",
+        "events": event_table(happened),
+        "loss": loss_tables(lost),
+        "share": "" if share is None else f"In all, {100.0 * share:.1f} % did not arrive.",
+        "configuration": escape(run.configuration or "There is no configuration."),
+    }
+
+
+def check(path: Path) -> None:
+    """InputError if there is something at ``path`` that is no report of ours."""
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}")
+    if path.is_symlink() or path.exists():
+        if not path.is_file():
+            raise InputError(f"{path}: is there, and no report; nothing is overwritten")
+        with path.open("rb") as file:
+            if MARK.encode() not in file.read(1024):
+                raise InputError(f"{path}: is there, and no report; nothing is overwritten")
+
+
+def write(path: Path, text: str) -> None:
+    """Put the page there at once, or not at all."""
+    check(path)
+    new = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        new.write_text(text, encoding="utf-8")
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)
+
+
+def _document(path: Path, made: Made) -> dict[str, object]:
+    share = made.losses.share
+    return {
+        "report": str(path),
+        "bytes": path.stat().st_size,
+        "events": len(made.events),
+        "lost": None if share is None else round(share, 4),
+        "missing": [gap._asdict() for gap in made.run.gaps],
+    }

@@ -1,0 +1,100 @@
+"""How far apart everything was: pairs of vehicles, the target, obstacles."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.moving import MovingObstacles
+from companion.obstacles import FixedObstacles
+from outrider.report.run import Array, Motions
+from outrider.scenario import Scenario
+
+_ALOFT = 0.2
+"""m: lower, a vehicle may stand on the ground beside what it would keep away from."""
+_BESIDE = 0.1
+"""s: what lies so near to an encounter is part of it."""
+
+
+class Encounter(NamedTuple):
+    """Two that were nearer than they may be, from ``begin`` to ``end`` (s after the goal event); ``least``
+    (m) at ``time``. ``who``: system ids, or what the second is called."""
+
+    begin: float
+    end: float
+    time: float
+    least: float
+    limit: float
+    who: tuple[int, int | str]
+
+
+def to_target(motions: Motions) -> Array:
+    """Of each vehicle to the target (T, K), m."""
+    result: Array = np.linalg.norm(motions.position - motions.target[:, None], axis=-1)
+    return result
+
+
+def to_obstacles(motions: Motions, scenario: Scenario) -> Array:
+    """Of each vehicle's centre to the nearest surface of an obstacle (T, K), m; inf without obstacles."""
+    found = np.full(motions.position.shape[:2], np.inf)
+    fixed, moving = FixedObstacles(scenario.obstacles), MovingObstacles(scenario.moving_known)
+    if len(fixed):
+        found = np.minimum(found, fixed.distance(motions.position).min(axis=-1))
+    if len(moving) and motions.moving.shape[1] == len(moving):
+        found = np.fmin(found, np.fmin.reduce(moving.distance(motions.position, motions.moving), axis=-1))
+    return found
+
+
+def encounters(motions: Motions, d_min: float, scenario: Scenario | None) -> list[Encounter]:
+    """All below their limits, in the order of time: vehicles below ``d_min`` (m), and what else the scenario
+    limits. Only samples at which somebody flies count."""
+    flies = np.isfinite(motions.separation)
+    found = []
+    for (j, one), (k, other) in combinations(enumerate(motions.system), 2):
+        apart = np.linalg.norm(motions.position[:, j] - motions.position[:, k], axis=-1)
+        # Samples are 20 ms apart: what was nearer in between is in ``separation`` only.
+        found += _below(motions.time, np.where(flies, apart, np.inf), d_min, (one, other))
+    for index in np.flatnonzero(motions.separation < d_min).tolist():
+        time = float(motions.time[index])
+        if not any(one.begin - _BESIDE <= time <= one.end + _BESIDE for one in found):
+            least = float(motions.separation[index])
+            found.append(Encounter(time, time, time, least, d_min, _nearest(motions, index)))
+    if scenario is not None:
+        found += _others(motions, scenario)
+    return sorted(found, key=lambda one: (one.begin, str(one.who)))
+
+
+def _others(motions: Motions, scenario: Scenario) -> list[Encounter]:
+    found = []
+    limit, surface = scenario.d_min_target, scenario.d_min_obstacle
+    near_target, near_obstacle = to_target(motions), to_obstacles(motions, scenario)
+    for k, system in enumerate(motions.system):
+        aloft = motions.position[:, k, 2] > _ALOFT
+        if limit is not None:
+            apart = np.where(aloft, near_target[:, k], np.inf)
+            found += _below(motions.time, apart, limit, (system, "the target"))
+        apart = np.where(aloft, near_obstacle[:, k], np.inf)
+        found += _below(motions.time, apart, surface, (system, "an obstacle"))
+    return found
+
+
+def _below(time: Array, distance: Array, limit: float, who: tuple[int, int | str]) -> list[Encounter]:
+    below = np.concatenate([[False], distance < limit, [False]])
+    edges = np.flatnonzero(below[1:] != below[:-1])
+    found = []
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        at = begin + int(np.argmin(distance[begin:end]))
+        least = float(distance[at])
+        found.append(Encounter(float(time[begin]), float(time[end - 1]), float(time[at]), least, limit, who))
+    return found
+
+
+def _nearest(motions: Motions, index: int) -> tuple[int, int]:
+    """The two vehicles that are nearest to each other at a sample."""
+    place = motions.position[index]
+    pairs = list(combinations(range(len(place)), 2))
+    apart = [float(np.linalg.norm(place[j] - place[k])) for j, k in pairs]
+    j, k = pairs[int(np.argmin(apart))]
+    return motions.system[j], motions.system[k]

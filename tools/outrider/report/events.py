@@ -1,0 +1,121 @@
+"""What happened when: by the configuration, the summary, the true motions and the logs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from outrider.report.clocks import seconds
+from outrider.report.distances import Encounter
+from outrider.report.run import Log, Run
+from outrider.report.sayings import sayings
+from outrider.scenario import Scenario
+from outrider.scenario_faults import ClockFault, Freeze, GpsJump, GpsLoss, MotorFailure, Sudden, Vanish
+from outrider.scenario_places import FixedTarget
+
+TOGETHER = 0.5
+"""s within which several vehicles say the same."""
+_BACK = 64
+"""So many events are looked back at."""
+
+
+class Event(NamedTuple):
+    """At ``time`` s after the goal event, until ``until`` if it lasts. ``who``: system ids, none for all;
+    ``bad``: somebody should look."""
+
+    time: float
+    kind: str
+    who: tuple[int, ...]
+    text: str
+    until: float | None = None
+    bad: bool = False
+
+
+def events(run: Run, near: Sequence[Encounter], offsets: dict[int, float], end: float) -> list[Event]:
+    """All of a run up to its ``end`` (s after the goal event), in the order of time."""
+    found = [*_goal(run), *_encounters(near)]
+    if run.scenario is not None:
+        found += [event for event in _scenario(run.scenario) if event.time <= end]
+    for log in run.logs:
+        if log.owner in offsets:
+            found += _told(log, offsets[log.owner])
+    return together(sorted(found, key=lambda event: (event.time, event.kind, event.who)))
+
+
+def together(found: Sequence[Event]) -> list[Event]:
+    """What several vehicles say alike within ``TOGETHER`` s is one event; ``found`` is in the order of
+    time."""
+    merged: list[Event] = []
+    for event in found:
+        place = len(merged) - 1
+        while place >= max(0, len(merged) - _BACK) and event.time - merged[place].time <= TOGETHER:
+            other = merged[place]
+            alike = (other.kind, other.text, other.until, other.bad) == event[1:2] + event[3:]
+            if alike and not set(other.who) & set(event.who):
+                merged[place] = other._replace(who=tuple(sorted(other.who + event.who)))
+                break
+            place -= 1
+        else:
+            merged.append(event)
+    return merged
+
+
+def _goal(run: Run) -> Iterator[Event]:
+    has_goal = run.summary.get("converged") is not None
+    if run.scenario is not None:
+        has_goal = run.scenario.has_goal
+    if run.motions is None or run.motions.time[-1] >= 0.0:
+        yield Event(0.0, "goal", (), "the goal event" if has_goal else "the clock starts")
+    converged = run.summary.get("convergence_time_s")
+    if isinstance(converged, int | float):
+        yield Event(float(converged), "converged", (), "everybody is where it should be, and stays")
+
+
+def _encounters(near: Sequence[Encounter]) -> Iterator[Event]:
+    for one in near:
+        first, second = one.who
+        who = (first, second) if isinstance(second, int) else (first,)
+        whom = second if isinstance(second, str) else "each other"
+        text = f"{one.least:.2f} m from {whom} at {one.time:.2f} s, nearer than {one.limit:g} m"
+        yield Event(one.begin, "too near", who, text, one.end, bad=True)
+
+
+def _scenario(scenario: Scenario) -> Iterator[Event]:
+    """What its file lets happen."""
+    for fault in scenario.faults:
+        if not isinstance(fault, ClockFault):
+            until = getattr(fault, "for_s", None)
+            end = None if until is None else fault.at_s + until
+            yield Event(fault.at_s, "fault", (fault.vehicle,), _words(fault), end, bad=True)
+    for cut in scenario.partitions:
+        text = f"the swarm link is cut around {', '.join(map(str, cut.members))}"
+        yield Event(cut.at_s, "partition", cut.members, text, cut.at_s + cut.for_s, bad=True)
+    for gust in scenario.weather.gusts:
+        text = "a gust of {:g}, {:g}, {:g} m/s east, north, up".format(*gust.velocity)
+        yield Event(gust.at_s, "gust", (), text, gust.at_s + gust.length_s)
+    if isinstance(scenario.target, FixedTarget):
+        for jump in scenario.target.jumps:
+            yield Event(jump.after_s, "target", (), "the target jumps to {:g}, {:g}, {:g} m".format(*jump.to))
+    for system, other in zip(scenario.systems[scenario.vehicles :], scenario.bystanders, strict=True):
+        if other.goal is not None:
+            yield Event(other.after_s, "bystander", (system,), "sets out, and gives way to nobody")
+
+
+def _words(fault: Sudden) -> str:
+    if isinstance(fault, Freeze):
+        return "its companion hangs"
+    if isinstance(fault, Vanish):
+        return "its companion is gone for good"
+    if isinstance(fault, GpsLoss):
+        return "its position fix is lost"
+    if isinstance(fault, GpsJump):
+        return "its position fix is {:g}, {:g}, {:g} m off".format(*fault.offset)
+    if isinstance(fault, MotorFailure):
+        return f"rotor {fault.rotor} gives {100.0 * fault.left:g} % of its thrust from now on"
+    raise TypeError(fault)
+
+
+def _told(log: Log, ahead: float) -> Iterator[Event]:
+    for saying in sayings(log):
+        (time,) = seconds(log, [saying.time], ahead).tolist()
+        yield Event(time, saying.kind, (log.owner,), saying.text, bad=saying.bad)

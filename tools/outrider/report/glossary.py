@@ -1,0 +1,68 @@
+"""What the keys of a summary mean, for its table."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Term(NamedTuple):
+    """In words, its unit, and what it means."""
+
+    words: str
+    unit: str
+    meaning: str
+
+
+TERMS = {
+    "scenario": Term("scenario", "", ""),
+    "method": Term("method", "", "the way out of the field's local minima"),
+    "avoidance": Term("avoidance", "", "field: the paper's; certified: committed plans, apart by proof"),
+    "planar": Term("planar", "", "whether heights were fixed"),
+    "turning_sense": Term("turning sense", "", "own: each by its own approach; right, left: one for all"),
+    "seed": Term("seed", "", "of starts, noise, clocks and link faults"),
+    "vehicles": Term("vehicles", "", "with bystanders"),
+    "sensors": Term("sensors", "", "what the autopilots flew on"),
+    "converged": Term("converged", "", "everybody where it should be, and slow, for one second"),
+    "convergence_time_s": Term("time to converge", "s", "start of that second, after the goal event"),
+    "failure": Term("failure", "", "why the flight did not come about, or who fell, or did not come down"),
+    "min_separation_m": Term(
+        "least separation", "m", "of two vehicles' centres, true, at every physics step"
+    ),
+    "min_target_distance_m": Term("least distance to the target", "m", "where the target is an obstacle"),
+    "min_obstacle_distance_m": Term("least distance to an obstacle", "m", "from a centre to a surface"),
+    "d_min_m": Term("d_min", "m", "two vehicles nearer than this are a violation"),
+    "d_min_target_m": Term("d_min to the target", "m", ""),
+    "d_min_obstacle_m": Term("d_min to obstacles", "m", ""),
+    "span_m": Term("vehicle, tip to tip", "m", "two level vehicles nearer than this may touch"),
+    "d_min_violations": Term("violations of d_min", "", "encounters, not samples"),
+    "max_speed_m_s": Term("largest speed", "m/s", ""),
+    "max_acceleration_m_s2": Term("largest acceleration", "m/s²", ""),
+    "max_tilt_deg": Term("largest tilt", "°", ""),
+    "standoff_error_m": Term("stand-off error", "m", "distance from the surface around the true target"),
+    "yaw_error_deg": Term("yaw error", "°", "between the nose and the bearing of the true target"),
+    "tracking_error_m": Term(
+        "tracking error", "m", "between where the autopilot believes to be and what it follows"
+    ),
+    "estimate_error_m": Term(
+        "error of the estimate", "m", "between where the autopilot believes to be and is"
+    ),
+    "plan_ms": Term("CPU time of a plan", "ms", "neighbours to plan"),
+    "plans": Term("plans", "", "made while the clock ran"),
+    "solver_failures": Term("solver failures", "", "the old plan is held, then the vehicle brakes"),
+    "relaxed_qps": Term("relaxed QPs", "", "plans in which a state limit had to give way"),
+    "held_epochs": Term("held plans", "", "times a plan was due and the old one was kept"),
+    "anchored_anew": Term("anchored anew", "", "times a plan started anew from where the vehicle was"),
+    "slack_max_m": Term("largest slack", "m", ""),
+    "messages": Term(
+        "messages", "", "datagrams between all nodes, counted per receiver; frames without sense"
+    ),
+    "deadline_misses": Term("missed deadlines", "", "of a real-time run: no step began within 1 ms"),
+    "deadline_steps": Term("of so many deadlines", "", ""),
+    "lateness_ms": Term("lateness of steps", "ms", "how late they began"),
+    "simulated_s": Term("flown", "s", "from take-off to landing"),
+    "wall_s": Term("wall time", "s", ""),
+    "cpu_s": Term("CPU time", "s", ""),
+    "real_time_factor": Term("real-time factor", "", "simulated seconds per second of wall time"),
+}
+HIDDEN = frozenset({"run_dir"})
+"""Where the run lay when it was flown says nothing to who reads of it elsewhere."""

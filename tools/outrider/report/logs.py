@@ -1,0 +1,117 @@
+"""One pass over a vehicle's tlog, for all that the report takes from it."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import ned_to_enu
+from mavlink_bridge.messages import CommandAck, Heartbeat, LocalPosition, Message, StatusText
+from mavlink_bridge.tlog import Record, TlogReport, read_tlog
+from outrider import names
+from outrider.report.run import Log, Sender, Stream, Times, Utterance
+
+SWARM = names.LINK_NUMBERS["swarm"]
+AUTOPILOT = 1
+"""MAV_COMP_ID_AUTOPILOT1."""
+_DECODED = {0, 32, 77, 253}
+"""HEARTBEAT, LOCAL_POSITION_NED, COMMAND_ACK, STATUSTEXT."""
+_LATEST = 1 << 62
+"""µs. A damaged stamp may be later than integers of 64 bits hold."""
+_OFTEN = 4096
+"""Records from one look at the progress to the next."""
+
+
+def read_log(owner: int, path: Path, at: Callable[[int], None] = lambda _bytes: None) -> Log:
+    """The log of vehicle ``owner``; ``at`` hears how many bytes have been read. Raises LogError."""
+    pass_ = _Pass(owner)
+    reader, size = read_tlog(path), 0
+    for number, record in enumerate(reader):
+        size += 8 + len(record.frame)
+        if number % _OFTEN == 0:
+            at(size)
+        pass_.see(record)
+    return pass_.log(reader.report)
+
+
+def sequence_and_sender(frame: bytes) -> tuple[int, Sender]:
+    """From the header of a whole frame: its number 0…255, and who sent it."""
+    if frame[0] == 0xFD:
+        return frame[4], Sender(frame[5], frame[6])
+    return frame[2], Sender(frame[3], frame[4])
+
+
+class _Growing:
+    """A stream while it grows: 17 bytes a message, whatever its length."""
+
+    def __init__(self) -> None:
+        self._time, self._sequence, self._mark = array("q"), array("B"), array("q")
+
+    def add(self, time: int, sequence: int, frame: bytes) -> None:
+        self._time.append(time)
+        self._sequence.append(sequence)
+        self._mark.append(hash(frame))
+
+    def stream(self) -> Stream:
+        return Stream(_whole(self._time), _whole(self._sequence), _whole(self._mark))
+
+
+def _whole(values: Iterable[int]) -> Times:
+    return np.array(values, dtype=np.int64)
+
+
+class _Pass:
+    def __init__(self, owner: int) -> None:
+        self._owner = owner
+        self._begin = self._end = 0
+        self._first = True
+        self._told = _Growing()
+        self._heard: dict[Sender, _Growing] = {}
+        self._codec = Codec(lambda identifier, system, _component: identifier in _DECODED and system == owner)
+        self._moments = array("q")
+        self._speeds = array("d")
+        self._utterances: list[Utterance] = []
+
+    def see(self, record: Record) -> None:
+        """The next record."""
+        time = min(record.time, _LATEST)
+        if self._first:
+            self._begin = self._end = time
+            self._first = False
+        self._end = max(self._end, time)
+        if record.link == SWARM:
+            sequence, sender = sequence_and_sender(record.frame)
+            if sender.system == self._owner:
+                self._told.add(time, sequence, record.frame)
+            else:
+                self._heard.setdefault(sender, _Growing()).add(time, sequence, record.frame)
+            return
+        for message in self._codec.feed(record.frame):
+            self._hear(time, message)
+
+    def _hear(self, time: int, message: Message) -> None:
+        """Of the own vehicle. What its companion answers the operator comes from another component than the
+        autopilot, and counts too."""
+        if isinstance(message, LocalPosition):
+            if message.source.component == AUTOPILOT:
+                self._moments.append(time)
+                self._speeds.extend(message.velocity_ned)
+        elif isinstance(message, Heartbeat):
+            if message.source.component == AUTOPILOT:
+                self._utterances.append(Utterance(time, message))
+        elif isinstance(message, CommandAck | StatusText):
+            self._utterances.append(Utterance(time, message))
+
+    def log(self, report: TlogReport) -> Log:
+        """All of it, with what the reader says of the file."""
+        heard = {sender: growing.stream() for sender, growing in sorted(self._heard.items())}
+        speeds = ned_to_enu(np.array(self._speeds, dtype=np.float64).reshape(-1, 3))
+        moments = _whole(self._moments)
+        said = tuple(self._utterances)
+        return Log(
+            self._owner, self._begin, self._end, self._told.stream(), heard, moments, speeds, said, report
+        )

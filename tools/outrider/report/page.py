@@ -1,0 +1,71 @@
+"""The page: a template, its looks and its program from ``static/``, and the parts made of a run.
+
+Nothing on it comes from elsewhere. Its content security policy says so to the browser, and lets no program
+run but the one whose hash it names: what a log brings in stays text.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from collections.abc import Mapping
+from html import escape
+from importlib.resources import files
+
+from outrider.report.headline import Headline
+
+MARK = '<meta name="generator" content="outrider report">'
+"""By which a page is known as one of ours."""
+STYLES = ("page.css", "charts.css", "print.css")
+SCRIPTS = (
+    "data.js",
+    "cursor.js",
+    "camera.js",
+    "glyphs.js",
+    "scene.js",
+    "vehicles.js",
+    "view.js",
+    "axes.js",
+    "charts.js",
+    "histogram.js",
+    "main.js",
+)
+
+
+def static(name: str) -> str:
+    """A file of the page."""
+    return (files("outrider.report") / "static" / name).read_text(encoding="utf-8")
+
+
+def page(title: str, headline: Headline, parts: Mapping[str, str], document: str | None) -> str:
+    """The whole page. ``parts`` are HTML, by their names in the template; ``document`` is the replay's JSON,
+    or None if there is nothing to replay."""
+    style = "\n".join(static(name) for name in STYLES)
+    script = '"use strict";\n(() => {\n' + "\n".join(static(name) for name in SCRIPTS) + "\n})();"
+    values = {
+        "mark": MARK,
+        "policy": policy(style, script),
+        "title": escape(title),
+        "verdict": headline.verdict,
+        "outcome": escape(headline.outcome),
+        "style": style,
+        "script": script,
+        "document": "null" if document is None else document,
+        "hidden": "" if document is not None else "hidden",
+        **parts,
+    }
+    # In one pass: what is put in is not looked through again.
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], static("page.html"))
+
+
+def policy(style: str, script: str) -> str:
+    """The content security policy: no request of any kind, this style, this program."""
+    return (
+        f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _hash(text: str) -> str:
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}"

@@ -1,0 +1,85 @@
+"""All that the page's own program draws, as one JSON document."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from outrider.conductor import HOLD
+from outrider.report.charts import Chart, Histogram
+from outrider.report.events import Event
+from outrider.report.packing import pack
+from outrider.report.run import Array, Motions, Run
+from outrider.report.scene import scene
+
+MILLIMETRE, TENTH = 1e-3, 1e-4
+"""Quanta: of lengths and speeds; of angles, a tenth of a milliradian, and times, of a millisecond."""
+_AFTER = 5.0
+"""s for which a run goes on after convergence."""
+
+
+def document(
+    run: Run,
+    motions: Motions,
+    shown: np.ndarray,
+    charts: Sequence[Chart],
+    spent: Histogram | None,
+    events: Sequence[Event],
+) -> str:
+    """Over the samples ``shown`` (n,). JSON that may stand in a script element: no ``<`` is left in it."""
+    begin, end = clock(run, motions)
+    found = {
+        "systems": motions.system,
+        "from": round(begin, 4),
+        "to": round(end, 4),
+        "time": packed(motions.time[shown], TENTH),
+        "position": packed(motions.position[shown], MILLIMETRE),
+        "velocity": packed(motions.velocity[shown], MILLIMETRE),
+        "reference": packed(motions.reference[shown], MILLIMETRE),
+        "yaw": packed(motions.yaw[shown], TENTH),
+        "tilt": packed(motions.tilt[shown], TENTH),
+        "target": packed(motions.target[shown], MILLIMETRE),
+        "moving": packed(motions.moving[shown], MILLIMETRE),
+        "scene": scene(run, motions),
+        "charts": [_chart(chart) for chart in charts],
+        "spent": None if spent is None else spent._asdict(),
+        "events": [event._asdict() for event in events if event.until is not None or event.kind in _MARKED],
+    }
+    text = json.dumps(found, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+_MARKED = ("goal", "converged", "fault", "target", "bystander", "too near")
+
+
+def clock(run: Run, motions: Motions) -> tuple[float, float]:
+    """From when to when (s) the flight counts: the page begins with this part of it."""
+    first, last = float(motions.time[0]), float(motions.time[-1])
+    seconds = run.summary.get("convergence_time_s")
+    end = last
+    if isinstance(seconds, int | float):
+        end = seconds + HOLD * 1e-6 + _AFTER
+    elif run.scenario is not None:
+        end = run.scenario.duration_s
+    return (max(first, -1.0), min(last, end)) if last > 0.0 else (first, last)
+
+
+def packed(values: Array, quantum: float) -> dict[str, Any]:
+    """As the page reads it."""
+    return pack(values, quantum)._asdict()
+
+
+def _chart(chart: Chart) -> dict[str, Any]:
+    values = np.stack([line.values for line in chart.lines], axis=1)
+    most = float(np.abs(values[np.isfinite(values)]).max(initial=1e-6))
+    # A chart is a few hundred pixels high; so many steps are not seen, and fit 16 bits.
+    quantum = most / 32_000.0
+    return {
+        **chart._replace(lines=(), levels=())._asdict(),
+        "lines": [{"name": line.name, "system": line.system} for line in chart.lines],
+        "levels": [level._asdict() for level in sorted(chart.levels, key=lambda level: -level.value)],
+        "values": packed(values, quantum),
+    }

@@ -1,0 +1,72 @@
+"""What stands and moves around the vehicles in the replay, as plain values for the page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from outrider.report.run import Array, Motions, Run
+from outrider.scenario import Scenario
+from outrider.starts import starts
+
+SPAN = 0.63
+"""m from tip to tip where nothing says otherwise: the firefly's."""
+_LARGEST = 100.0
+
+
+def scene(run: Run, motions: Motions) -> dict[str, Any]:
+    """Lengths in m, fleet-local ENU. ``posts`` and ``spheres``, ``movers`` in the order of the moving
+    obstacles, ``goals``, and ``surfaces``: closed lines as offsets from the target."""
+    scenario, span = run.scenario, run.summary.get("span_m")
+    d_min = run.summary.get("d_min_m") if scenario is None else scenario.d_min
+    return {
+        "span": float(span) if isinstance(span, int | float) and 0.0 < span < _LARGEST else SPAN,
+        "dMin": float(d_min) if isinstance(d_min, int | float) else None,
+        "fixed": [] if scenario is None else [dict(_fixed(one)) for one in scenario.obstacles],
+        "movers": []
+        if scenario is None
+        else [dict(_mover(scenario, j)) for j in range(len(scenario.moving))],
+        "goals": _goals(run, motions),
+        "surfaces": [] if scenario is None else _surfaces(scenario),
+        "bystanders": 0 if scenario is None else len(scenario.bystanders),
+    }
+
+
+def _fixed(obstacle: Any) -> Iterator[tuple[str, object]]:
+    yield from (("kind", obstacle.kind), ("at", list(obstacle.at)), ("radius", obstacle.radius))
+    if obstacle.kind == "post":
+        yield "height", obstacle.height
+
+
+def _mover(scenario: Scenario, j: int) -> Iterator[tuple[str, object]]:
+    moving = scenario.moving[j]
+    yield from (("kind", moving.kind), ("radius", moving.radius), ("id", scenario.moving_systems[j]))
+    if moving.kind == "post":
+        yield "height", moving.height
+
+
+def _goals(run: Run, motions: Motions) -> list[list[float]]:
+    scenario = run.scenario
+    if scenario is None or len(motions.system) != scenario.size:
+        return []
+    goals = starts(scenario, run.seed or 0, scenario.companion.planar).goals
+    return [] if goals is None else _rounded(goals)
+
+
+def _surfaces(scenario: Scenario) -> list[dict[str, Any]]:
+    """The fleet's, and those of vehicles that have their own. A companion that flies to a goal has none."""
+    companion = scenario.companion
+    if companion.task != "escort":
+        return []
+    own = {one.vehicle: one.surface.outline() for one in companion.surfaces}
+    shared = (
+        [] if len(own) >= scenario.vehicles else [{"of": None, "line": _rounded(companion.surface.outline())}]
+    )
+    return shared + [{"of": system, "line": _rounded(line)} for system, line in sorted(own.items())]
+
+
+def _rounded(values: Array) -> list[list[float]]:
+    rounded: list[list[float]] = np.round(values, 3).tolist()
+    return rounded

@@ -1,0 +1,132 @@
+// Shapes in the picture: each is given the canvas, and places in the world.
+
+let ink = {};
+
+// The colours of the page as they are now: light, dark or on paper.
+function mix() {
+  const style = getComputedStyle(document.documentElement);
+  const names = ["paper", "ink", "soft", "line", "grid", "bad", "accent", "solid"];
+  ink = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+}
+
+// Joined places; it breaks where one is missing or behind the eye.
+function polyline(g, places, close = false) {
+  g.beginPath();
+  let down = false;
+  for (const point of places) {
+    const seen = point && project(point);
+    if (!seen) {
+      down = false;
+    } else if (down) {
+      g.lineTo(seen[0], seen[1]);
+    } else {
+      g.moveTo(seen[0], seen[1]);
+      down = true;
+    }
+  }
+  if (close && down) g.closePath();
+}
+
+function ring(centre, radius, across, along, count = 28) {
+  const places = [];
+  for (let i = 0; i <= count; i++) {
+    const turn = (2 * Math.PI * i) / count;
+    const [c, s] = [radius * Math.cos(turn), radius * Math.sin(turn)];
+    places.push(centre.map((value, axis) => value + c * across[axis] + s * along[axis]));
+  }
+  return places;
+}
+
+function level(centre, radius) {
+  return ring(centre, radius, [1, 0, 0], [0, 1, 0]);
+}
+
+function words(g, text, x, y, colour, align = "center") {
+  g.font = "600 12px system-ui, sans-serif";
+  g.textAlign = align;
+  g.textBaseline = "middle";
+  g.lineWidth = 3;
+  g.lineJoin = "round";
+  g.strokeStyle = ink.paper;
+  g.strokeText(text, x, y);
+  g.fillStyle = colour;
+  g.fillText(text, x, y);
+}
+
+function cross(a, b) {
+  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+}
+
+// A multirotor: rotors around the axis of thrust, and a nose. Small ones are drawn larger than they are.
+function multirotor(g, centre, { yaw, axis }, span, colour) {
+  const seen = project(centre);
+  if (!seen) return;
+  const size = Math.max((span * camera.focus) / seen[2], Math.min(24, camera.width / 26)) * (seen[2] / camera.focus);
+  const forward = [Math.cos(yaw), Math.sin(yaw), 0];
+  const lean = dot(forward, axis);
+  let nose = forward.map((value, i) => value - lean * axis[i]);
+  const length = Math.hypot(...nose) || 1;
+  nose = nose.map((value) => value / length);
+  const left = cross(axis, nose);
+  const rotor = size * 0.2;
+  const at = (turn, reach) =>
+    centre.map((value, i) => value + reach * (Math.cos(turn) * nose[i] + Math.sin(turn) * left[i]));
+  g.strokeStyle = ink.ink;
+  g.lineWidth = 1.4;
+  for (let arm = 0; arm < 6; arm++) {
+    polyline(g, [centre, at(((arm + 0.5) * Math.PI) / 3, size * 0.34)]);
+    g.stroke();
+  }
+  g.fillStyle = colour;
+  g.lineWidth = 0.8;
+  for (let arm = 0; arm < 6; arm++) {
+    polyline(g, ring(at(((arm + 0.5) * Math.PI) / 3, size * 0.34), rotor * 0.8, nose, left, 14), true);
+    g.globalAlpha = 0.82;
+    g.fill();
+    g.globalAlpha = 1;
+    g.stroke();
+  }
+  polyline(g, [at(0.9, size * 0.16), at(0, size * 0.72), at(-0.9, size * 0.16)], true);
+  g.fill();
+  g.stroke();
+}
+
+// As large as a ball of this radius (m) looks.
+function ball(g, centre, radius, fill, edge, alpha) {
+  const seen = project(centre);
+  if (!seen) return;
+  g.beginPath();
+  g.arc(seen[0], seen[1], (radius * camera.focus) / seen[2], 0, 2 * Math.PI);
+  g.globalAlpha = alpha;
+  g.fillStyle = fill;
+  g.fill();
+  g.globalAlpha = Math.min(1, alpha * 4);
+  g.strokeStyle = edge;
+  g.lineWidth = 1;
+  g.stroke();
+  g.globalAlpha = 1;
+}
+
+// A post: its sides are the quads between two rings, the far ones first.
+function post(g, [x, y], radius, top) {
+  const [low, high] = [level([x, y, 0], radius), level([x, y, top], radius)];
+  const sides = low.slice(1).map((_, i) => [low[i], low[i + 1], high[i + 1], high[i]]);
+  sides.sort((a, b) => depth(b[0]) - depth(a[0]));
+  for (const side of [...sides, high]) {
+    polyline(g, side, true);
+    g.fillStyle = g.strokeStyle = ink.solid;
+    g.lineWidth = 0.7;
+    g.fill();
+    g.stroke();
+  }
+  g.strokeStyle = ink.soft;
+  polyline(g, high, true);
+  g.stroke();
+}
+
+function depth(point) {
+  return dot(
+    point.map((value, i) => camera.eye[i] - value),
+    camera.back,
+  );
+}
