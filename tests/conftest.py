@@ -12,6 +12,8 @@ import os
 import pytest
 from hypothesis import is_hypothesis_test, settings
 
+pytest_plugins = ["pytester"]
+
 ROUNDS = 20
 """So often ``--soak`` runs each law, every time with other examples."""
 

@@ -1,0 +1,128 @@
+"""A flight of a scenario in a test, and a log that drove a companion, with assertions in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.tlog import read_tlog
+from outrider import names
+from outrider.replaying.chase import setpoints
+from outrider.replaying.rehearsal import Rehearsed
+from outrider.replaying.runs import again
+from outrider.report.sayings import mode
+from outrider.summary import Value
+from outrider.testing.golden import Golden
+from outrider.testing.setpoints import Setpoints
+
+_HEARTBEAT = 0
+
+
+class Transition(NamedTuple):
+    """From ``time`` (µs) on an autopilot is in ``mode``."""
+
+    time: int
+    mode: str
+
+
+class Flown:
+    """A finished flight: its ``summary``, and what it left in ``directory``."""
+
+    def __init__(
+        self, directory: Path, summary: dict[str, Value], systems: Sequence[int], golden: Golden
+    ) -> None:
+        self.directory, self.summary, self.systems = directory, summary, tuple(systems)
+        self._golden = golden
+
+    def setpoints(self, system: int | None = None) -> Setpoints:
+        """What a vehicle, the first if none is named, was told by its companion."""
+        system = self.systems[0] if system is None else system
+        return Setpoints(f"vehicle {system}", setpoints(self.log(system)), self._golden)
+
+    def log(self, system: int) -> Path:
+        """The tlog of a vehicle. AssertionError if there is none of that id."""
+        if system not in self.systems:
+            raise AssertionError(
+                f"there is no vehicle {system}; there are {', '.join(map(str, self.systems))}"
+            )
+        return self.directory / names.log(system)
+
+    def modes(self, system: int | None = None) -> list[Transition]:
+        """The modes that a vehicle's autopilot went through, by its HEARTBEATs."""
+        return modes(self.log(self.systems[0] if system is None else system), system or self.systems[0])
+
+    def assert_separation(self, at_least: float) -> None:
+        """No two vehicles came nearer than that (m between centres, on true positions), and there is no
+        violation of any d_min."""
+        __tracebackhide__ = True
+        least, violations = self.summary["min_separation_m"], self.summary["d_min_violations"]
+        if isinstance(least, float) and least < at_least:
+            raise AssertionError(f"two vehicles came to {least:.3f} m; at least {at_least:g} m are asked for")
+        if violations:
+            raise AssertionError(f"{violations} violations of d_min")
+
+    def assert_converged(self, within: float) -> None:
+        """Everybody was where it should be within so many s of the goal event."""
+        __tracebackhide__ = True
+        seconds = self.summary["convergence_time_s"]
+        if not isinstance(seconds, float):
+            raise AssertionError(
+                "not converged" if self.summary["converged"] is False else "there is no goal"
+            )
+        if seconds > within:
+            raise AssertionError(f"converged after {seconds:g} s; {within:g} s are allowed")
+
+    def assert_standoff(self, p95: float) -> None:
+        """Distances from the destination surface are within so many m, 95 of 100."""
+        __tracebackhide__ = True
+        found = self.summary["standoff_error_m"]
+        value = found["p95"] if isinstance(found, dict) else None
+        if value is None:
+            raise AssertionError("there is no surface to be on: this scenario has goals")
+        if value > p95:
+            raise AssertionError(f"the stand-off error is {value:g} m at p95; {p95:g} m are allowed")
+
+    def assert_modes(self, *expected: str, system: int | None = None) -> None:
+        """The autopilot went through these modes, in this order and no others."""
+        __tracebackhide__ = True
+        found = [transition.mode for transition in self.modes(system)]
+        if found != list(expected):
+            raise AssertionError(f"the modes were {' → '.join(found)}, not {' → '.join(expected)}")
+
+    def assert_reenacts(self) -> None:
+        """From its log alone every companion sends the same bytes again."""
+        __tracebackhide__ = True
+        for one in again(self.directory):
+            if not one.identical:
+                raise AssertionError(
+                    f"vehicle {one.system}: {one.different} frames differ, first {one.first}"
+                )
+
+
+class Replayed(Setpoints):
+    """What a companion would have sent to a log's vehicle. ``sent``: what it was sent; ``reasons``: steps of
+    10 ms without a set-point, by what was missing."""
+
+    def __init__(self, name: str, found: Rehearsed, golden: Golden) -> None:
+        super().__init__(name, found.would, golden)
+        self.sent = Setpoints(f"{name}, as it was sent", found.sent, golden)
+        self.reasons = dict(found.reasons)
+        self.holds = found.holds
+
+
+def modes(log: Path, system: int) -> list[Transition]:
+    """The modes of the autopilot of ``system``, by its HEARTBEATs in ``log``."""
+    codec = Codec(
+        lambda identifier, sender, component: (identifier, sender, component) == (_HEARTBEAT, system, 1)
+    )
+    found: list[Transition] = []
+    for record in read_tlog(log):
+        for message in codec.feed(record.frame):
+            if isinstance(message, Heartbeat):
+                name = mode(message)
+                if not found or found[-1].mode != name:
+                    found.append(Transition(record.time, name))
+    return found

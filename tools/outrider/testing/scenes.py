@@ -1,0 +1,75 @@
+"""Scenarios with changes, flown or listened to."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from mavlink_bridge.tlog import read_tlog
+from outrider import swarm
+from outrider.errors import InputError
+from outrider.replaying.casting import Cast, survey
+from outrider.replaying.rehearsal import rehearse
+from outrider.resources import find
+from outrider.scenario import Scenario
+from outrider.testing.flown import Flown, Replayed
+from outrider.testing.golden import Golden
+from outrider.yaml_file import load
+from sitl.config import VehicleConfig
+
+
+def flown(scenario: str | Path, seed: int, changes: dict[str, Any], folder: Path, golden: Golden) -> Flown:
+    """Fly it; the run directory is made in ``folder``."""
+    of = changed(str(scenario), changes)
+    vehicle = load(find("vehicles", of.vehicle), VehicleConfig)
+    number = 1
+    while (directory := folder / f"{of.name}-{seed}-{number}").exists():
+        number += 1
+    directory.mkdir()
+    summary = swarm.fly(swarm.Prepared(of, vehicle), seed, directory, lambda _stage, _seconds: None)
+    return Flown(directory, summary, of.systems, golden)
+
+
+def replayed(
+    log: Path,
+    own: int,
+    neighbours: tuple[int, ...] | None,
+    target: int | None,
+    like: str,
+    changes: dict[str, Any],
+    golden: Golden,
+) -> Replayed:
+    """Let a companion listen to it."""
+    config = changed(like, {"companion": changes}).companion
+    cast = Cast(own, None if neighbours is None else frozenset(neighbours), target)
+    seen = survey(read_tlog(log), own, str(log))
+    return Replayed(f"{log.name}, vehicle {own}", rehearse(config, cast, seen, read_tlog(log)), golden)
+
+
+def changed(name: str, changes: dict[str, Any]) -> Scenario:
+    """A scenario, by name or file, with ``changes`` merged in, mapping by mapping. InputError for what makes
+    no sense."""
+    document = _merged(load(find("scenarios", name), Scenario).model_dump(), changes)
+    try:
+        return Scenario.model_validate(document)
+    except ValidationError as error:
+        faults = [f"{'.'.join(map(str, one['loc'])) or name}: {one['msg']}" for one in error.errors()]
+        raise InputError(*(f"{name}, changed: {fault}" for fault in faults)) from None
+
+
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    result = deepcopy(base)
+    for key, value in changes.items():
+        inner = result.get(key)
+        # What is of another kind has other keys: it replaces the old one.
+        if (
+            isinstance(inner, dict)
+            and isinstance(value, dict)
+            and value.get("kind", inner.get("kind")) == inner.get("kind")
+        ):
+            value = _merged(inner, value)
+        result[key] = value
+    return result

@@ -1,0 +1,103 @@
+"""What a vehicle was told, or would have been, with assertions in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mavlink_bridge.messages import SetpointLocal
+from outrider.replaying.setpoints import Course, Facts, course, facts
+from outrider.testing.golden import Golden
+
+_MEAN = 1_000_000
+"""µs over which a rate is meant."""
+
+
+class Setpoints:
+    """A row of SET_POSITION_TARGET_LOCAL_NED with its times (µs), of the vehicle called ``name``. ``golden``
+    is where its files are."""
+
+    def __init__(self, name: str, told: Sequence[tuple[int, SetpointLocal]], golden: Golden) -> None:
+        self.name, self.told, self._golden = name, tuple(told), golden
+
+    def __len__(self) -> int:
+        return len(self.told)
+
+    @property
+    def course(self) -> Course:
+        """As arrays: NED, SI."""
+        return course(self.told)
+
+    @property
+    def facts(self) -> Facts:
+        """Largest step, speed and acceleration, masks, frames, gaps."""
+        return facts(self.told)
+
+    def assert_continuous(
+        self, *, step: float = 0.3, speed: float | None = None, acceleration: float | None = None
+    ) -> None:
+        """All is finite, no position is further than ``step`` (m) from the one before (where they follow each
+        other within 0.1 s), and none exceeds ``speed`` (m/s) or ``acceleration`` (m/s²)."""
+        __tracebackhide__ = True
+        found = self.facts
+        if not found.setpoints:
+            raise AssertionError(f"{self.name}: no set-points")
+        if not found.finite:
+            time, _ = next((t, m) for t, m in self.told if not facts([(t, m)]).finite)
+            raise AssertionError(
+                f"{self.name}: a set-point is not finite, {self._since(time):.2f} s after the first"
+            )
+        self._below("m from one position to the next", self._steps(), step)
+        of = self.course
+        self._below("m/s", np.linalg.norm(of.velocities, axis=1), speed)
+        self._below("m/s²", np.linalg.norm(of.accelerations, axis=1), acceleration)
+
+    def assert_rate(self, *, at_least: float, gap: float = 0.5) -> None:
+        """In every second between the first and the last ``at_least`` so many a second, and nowhere none for
+        longer than ``gap`` (s)."""
+        __tracebackhide__ = True
+        times = self.course.times
+        if len(times) < 2:
+            raise AssertionError(f"{self.name}: {len(times)} set-points have no rate")
+        longest = int(np.diff(times).argmax())
+        seconds = (times[longest + 1] - times[longest]) * 1e-6
+        if seconds > gap:
+            begins = self._since(times[longest])
+            raise AssertionError(
+                f"{self.name}: no set-point for {seconds:.2f} s, from {begins:.2f} s after the first on; "
+                f"{gap:g} s are allowed"
+            )
+        counts = np.bincount((times - times[0]) // _MEAN)[:-1]
+        if len(counts) and counts.min() < at_least:
+            raise AssertionError(
+                f"{self.name}: {counts.min()} set-points in the second that begins {counts.argmin()} s "
+                f"after the first; at least {at_least:g} are asked for"
+            )
+
+    def assert_golden(self, name: str, *, within: float = 0.01) -> None:
+        """The same set-points as the golden file ``name`` beside the test: positions ``within`` so many m,
+        velocities within so many m/s, yaw within so many rad, at the same times. With ``--update-golden`` the
+        file is written instead."""
+        __tracebackhide__ = True
+        self._golden.check(name, self.name, self.course, within)
+
+    def _steps(self) -> np.ndarray:
+        of = self.course
+        steps = np.linalg.norm(np.diff(of.positions, axis=0, prepend=of.positions[:1]), axis=1)
+        steps[np.diff(of.times, prepend=of.times[:1]) > 100_000] = 0.0
+        result: np.ndarray = steps
+        return result
+
+    def _below(self, what: str, values: np.ndarray, bound: float | None) -> None:
+        __tracebackhide__ = True
+        known = np.where(np.isfinite(values), values, 0.0)
+        if bound is not None and len(known) and known.max() > bound:
+            at = int(known.argmax())
+            raise AssertionError(
+                f"{self.name}: {known[at]:.3f} {what}, {self._since(self.told[at][0]):.2f} s after the first "
+                f"set-point; {bound:g} are allowed"
+            )
+
+    def _since(self, time: int) -> float:
+        return (time - self.told[0][0]) * 1e-6
