@@ -243,6 +243,7 @@ def test_a_flight_ends_with_one_json_object_and_a_full_directory(run: Run, tmp_p
         "flight.png",
         "plan_times.npz",
         "plans.npz",
+        "report.html",
         "summary.json",
         "vehicle-11.steps.npz",
         "vehicle-11.tlog",

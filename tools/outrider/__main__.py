@@ -65,6 +65,7 @@ def swarm(
     directory."""
     from outrider import swarm as flying
     from outrider.console import progress, show
+    from outrider.report.command import NAME, make, write
     from outrider.summary import exit_status
 
     options = flying.Options(method, avoidance, planar, vehicles, loss, delay_ms, sensors, replan_hz, wind)
@@ -73,6 +74,7 @@ def swarm(
     with progress(prepared.scenario.duration_s) as watch:
         pace = flying.Pace(real_time or realtime, realtime)
         summary = flying.fly(prepared, seed, directory, watch, pace)
+    write(directory / NAME, make(directory).text)
     if as_json:
         sys.stdout.write(json.dumps(summary) + "\n")
     else:
