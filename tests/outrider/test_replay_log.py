@@ -17,6 +17,7 @@ from shipped import FIREFLY, LOGS, scenario
 from companion.config import CompanionConfig
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
+from mavlink_bridge.errors import LogError
 from mavlink_bridge.links.link import memory_pair
 from mavlink_bridge.messages import CommandLong, GlobalPosition, Heartbeat, SetpointLocal, Source
 from mavlink_bridge.tlog import Record, TlogWriter, read_tlog
@@ -253,3 +254,35 @@ def test_parts_are_given_by_who_speaks() -> None:
     }
     assert parts == {7: Part.AUTOPILOT, 8: Part.SWARM, 9: Part.TARGET, 10: Part.NOTHING}
     assert Cast(7).part(codec.encode(Heartbeat(Source(10, 1), 2, 3, 0, 0, 4))) is Part.SWARM
+
+
+PIECE = Path(__file__).resolve().parents[1] / "data" / "logs" / "copter-whole.tlog"
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 1 << 30), st.binary(min_size=1, max_size=12)), max_size=30),
+    st.integers(0, 1 << 30),
+)
+@settings(max_examples=25)
+def test_a_damaged_log_is_listened_to_all_the_same(damage: list[tuple[int, bytes]], cut: int) -> None:
+    """Whatever is left of it: finite set-points within the limits, or a line that says what is missing."""
+    from tempfile import TemporaryDirectory
+
+    from outrider.errors import InputError
+
+    data = bytearray(PIECE.read_bytes()[:60_000])
+    for at, noise in damage:
+        place = at % len(data)
+        data[place : place + len(noise)] = noise
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "damaged.tlog"
+        path.write_bytes(data[: max(cut % len(data), 1)] if damage else data)
+        config = CompanionConfig()
+        try:
+            seen = survey(read_tlog(path), 9, "damaged")
+        except (InputError, LogError):
+            return
+        found = facts(rehearse(config, Cast(9), seen, read_tlog(path)).would)
+    assert found.finite
+    assert (found.max_speed_m_s or 0.0) <= np.linalg.norm(config.limits.v_max)
+    assert (found.max_acceleration_m_s2 or 0.0) <= config.limits.a_total + 1e-3
