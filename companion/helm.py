@@ -7,11 +7,18 @@ set-points on the autopilot's. While these flow it says nothing. When they stop,
 the mode in which set-points steer, it sends those of the newest committed plan, to its end and for some
 seconds of hover; then it leaves the vehicle to the autopilot's own failsafe. When the companion is back, it
 is at the same plan.
+
+It carries on only what it knows to be flown: the companion's last set-point has to agree with the plan that
+the helm holds, by its own clock and in its own local frame. It starts before the companion steers, or else it
+waits for the next plan; and an order to land, a farewell, another mode, a disarmed vehicle or three seconds
+without a heartbeat make it forget all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+
+import numpy as np
 
 from companion.autopilots import Profile, is_guided
 from companion.autopilots.ardupilot import ARDUPILOT
@@ -21,13 +28,22 @@ from companion.config import CompanionConfig
 from companion.heading import Yaw
 from companion.horizon import Horizon
 from companion.node import COMPONENT
-from companion.pilot import ARMED, HEARTBEAT_LOST
+from companion.pilot import ARMED, HEARTBEAT_LOST, NAV_LAND
 from companion.reception import AUTOPILOT
 from companion.setpoint import setpoint
+from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, LocalFrame
-from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, Message, SetpointLocal, Source, Tunnel
+from mavlink_bridge.messages import (
+    CommandLong,
+    GpsGlobalOrigin,
+    Heartbeat,
+    Message,
+    SetpointLocal,
+    Source,
+    Tunnel,
+)
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.plan_wire import WirePlan
@@ -37,9 +53,15 @@ from mavlink_bridge.roster_wire import unpack as unpack_roster
 
 HELM = 191
 """MAV_COMP_ID_ONBOARD_COMPUTER."""
+_AGREES = 0.3
+"""m between a set-point of the companion and the own plan: what is flown in the time that it takes to
+arrive."""
+_EPOCHS = 4
+"""A plan that begins further from now is none of this time."""
+_SECOND = 1_000_000
 _SILENT = 4
 """Set-points missing on end after which the companion counts as silent."""
-_HEARTBEAT, _SETPOINT, _ORIGIN, _TUNNEL = 0, 84, 49, 385
+_HEARTBEAT, _SETPOINT, _ORIGIN, _COMMAND, _TUNNEL = 0, 84, 49, 76, 385
 
 
 class Helm:
@@ -56,7 +78,7 @@ class Helm:
                     sender == system
                     and (
                         (component == AUTOPILOT and identifier in (_HEARTBEAT, _ORIGIN))
-                        or (component == COMPONENT and identifier == _SETPOINT)
+                        or (component == COMPONENT and identifier in (_SETPOINT, _COMMAND))
                     )
                 )
             ),
@@ -67,11 +89,11 @@ class Helm:
             ),
         }
         self._plans: dict[int, WirePlan] = {}
-        self._flown: tuple[int, Horizon] | None = None
+        self._flown: tuple[WirePlan, Horizon] | None = None
         self._heard: tuple[int, SetpointLocal] | None = None
         self._beat: tuple[int, Heartbeat] | None = None
         self._local: LocalFrame | None = None
-        self._next = 0
+        self._next = self._next_beat = 0
         self._boot: int | None = None
         self.carried = 0
         """Set-points sent in the companion's place."""
@@ -82,16 +104,20 @@ class Helm:
         for link, data in inbox:
             for message in self._codecs[link].feed(data):
                 self._hear(now, message)
+        beat = self._heartbeat(now)
         profile = self._profile(now)
+        if profile is None:
+            # Somebody else has the vehicle, or may have it: what was planned before that counts no more.
+            self._forget()
         if now < self._next or profile is None or self._local is None or self._heard is None:
-            return []
+            return beat
         period = self._config.rates.setpoint_us
         since, last = self._heard
         if now - since <= _SILENT * period:
-            return []
+            return beat
         horizon = self._horizon(now)
         if horizon is None or now > horizon.end + self._config.certified.helm_us:
-            return []
+            return beat
         self._next = now + period
         self.carried += 1
         # The nose stays where it was: whom it faces is not known here.
@@ -99,20 +125,26 @@ class Helm:
         time = now + self._config.setpoint_lead_us
         mask = profile.setpoint_mask
         message = setpoint(time, now - self._boot, horizon, yaw, self._local, self._own, mask)
-        return [Datagram("autopilot", self._codecs["autopilot"].encode(message))]
+        return [*beat, Datagram("autopilot", self._codecs["autopilot"].encode(message))]
+
+    def _heartbeat(self, now: int) -> list[Datagram]:
+        """Once a second: so that routers know the way to it, and people that it is there."""
+        if now < self._next_beat:
+            return []
+        self._next_beat = now + _SECOND
+        beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+        return [Datagram("autopilot", self._codecs["autopilot"].encode(beat))]
 
     def _hear(self, now: int, message: Message) -> None:
         match message:
             case Heartbeat():
                 self._beat = now, message
-                if self._profile(now) is None:
-                    # Somebody else has the vehicle: what was planned before that counts no more.
-                    self._plans.clear()
-                    self._heard = None
             case GpsGlobalOrigin():
                 self._local = self._fleet.local(message.latitude, message.longitude, message.altitude)
             case SetpointLocal():
-                self._heard = now, message
+                self._heard = (now, message) if self._agrees(now, message) else None
+            case CommandLong(command=command) if command == NAV_LAND:
+                self._forget()
             case Tunnel():
                 self._file(now, message)
             case _:
@@ -122,13 +154,14 @@ class Helm:
         """A plan of the companion's; or, with a farewell, the end of its plans: it lands."""
         try:
             if message.payload_type == ROSTER and unpack_roster(message.payload).farewell:
-                self._plans.clear()
+                self._forget()
             if message.payload_type != PLAN:
                 return
             plan = unpack_plan(message.payload)
         except PlanWireError:
             return
-        if plan.origin != self._fleet.fingerprint or not rests(plan):
+        near = abs(plan.epoch - now) <= _EPOCHS * self._config.certified.epoch_us
+        if plan.origin != self._fleet.fingerprint or not rests(plan) or not near:
             return
         self._plans[plan.epoch] = plan
         # The one that is flown, and what follows it.
@@ -140,9 +173,24 @@ class Helm:
         epoch = max((epoch for epoch in self._plans if epoch <= now), default=None)
         if epoch is None:
             return None
-        if self._flown is None or self._flown[0] != epoch:
-            self._flown = epoch, horizon_of(self._plans[epoch])
+        plan = self._plans[epoch]
+        if self._flown is None or self._flown[0] is not plan:
+            self._flown = plan, horizon_of(plan)
         return self._flown[1]
+
+    def _agrees(self, now: int, message: SetpointLocal) -> bool:
+        """Whether the companion sends what the own plan says."""
+        horizon = self._horizon(now)
+        if horizon is None or self._local is None:
+            return False
+        planned = self._local.position_to_local(horizon.at(now + self._config.setpoint_lead_us).position)
+        off = planned - np.array(message.position)
+        # Asked so that a NaN does not agree.
+        return bool(off @ off <= _AGREES**2)
+
+    def _forget(self) -> None:
+        self._plans.clear()
+        self._heard = None
 
     def _profile(self, now: int) -> Profile | None:
         """What the autopilot wants, where it is armed and follows set-points."""

@@ -1,7 +1,8 @@
-"""A companion that only rehearses: it plans as if it flew the vehicle it listens to, and commands nothing.
+"""A companion that only rehearses: it plans as if it flew the vehicle it listens to, and sends nothing at
+all.
 
 For logs, and for looking on at a flight of others. The vehicle does not do what is planned, so every plan
-begins where the vehicle really is.
+begins where the vehicle really is; committed plans, which begin where the last one said, are not for it.
 """
 
 from __future__ import annotations
@@ -9,11 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from companion.config import CompanionConfig
+from companion.errors import CompanionError
 from companion.node import COMPONENT, Companion
 from companion.pilot import HEARTBEAT_LOST, Phase, Pilot
 from companion.world import View
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, Source
+from mavlink_bridge.messages import Message, SetpointLocal, Source
+from mavlink_bridge.node import Datagram
 
 _ALWAYS_ANEW = 1e-6
 """m: a plan that the vehicle is further from than that begins anew at the vehicle."""
@@ -52,7 +55,11 @@ class _Onlooker(Pilot):
 
 
 class Understudy(Companion):
-    """As ``Companion``, on the vehicle of ``system``; what it sends is what it would have sent."""
+    """As ``Companion``, on the vehicle of ``system``. ``would``: the set-points that it would have sent since
+    they were last taken away.
+
+    CompanionError for ``avoidance: certified``.
+    """
 
     def __init__(
         self,
@@ -62,10 +69,20 @@ class Understudy(Companion):
         fleet: FleetFrame,
         stopwatch: Callable[[], int],
     ) -> None:
+        if config.avoidance == "certified":
+            raise CompanionError("committed plans cannot be rehearsed; allowed: avoidance 'field'")
         guard = config.guard.model_copy(update={"tube": _ALWAYS_ANEW})
         config = config.model_copy(update={"guard": guard})
         super().__init__(config, system, target_system, fleet, stopwatch)
         self.pilot = _Onlooker(config, Source(system, COMPONENT), fleet.altitude)
+        self.would: list[SetpointLocal] = []
+
+    def _encode(self, **links: list[Message]) -> list[Datagram]:
+        """Nothing leaves it, on any link."""
+        self.would += [
+            message for message in links.get("autopilot", ()) if isinstance(message, SetpointLocal)
+        ]
+        return []
 
     @property
     def lacking(self) -> str:

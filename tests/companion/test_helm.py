@@ -14,6 +14,7 @@ from companion.node import COMPONENT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import (
+    CommandLong,
     GpsGlobalOrigin,
     Heartbeat,
     Message,
@@ -46,6 +47,10 @@ class Bench:
         self.now = BEGIN
         self.speaks = self.beats = True
         self.mode, self.armed = GUIDED, True
+        self.origin = np.zeros(3)
+        """Of the vehicle's local frame, as the helm hears it; the companion's is the fleet's."""
+        self.ahead = 0
+        """µs by which the companion's clock is ahead of the helm's."""
         self.plans = [plan_from(BEGIN)]
         self.sent: list[tuple[int, SetpointLocal]] = []
 
@@ -56,8 +61,10 @@ class Bench:
             for link, data in self.helm.step(self.now, self._inbox()):
                 assert link == "autopilot"
                 for message in self.reader.feed(data):
-                    assert isinstance(message, SetpointLocal)
-                    self.sent.append((self.now, message))
+                    if isinstance(message, SetpointLocal):
+                        self.sent.append((self.now, message))
+                    else:
+                        assert isinstance(message, Heartbeat)
             self.now += TICK
         return self.sent[before:]
 
@@ -67,16 +74,25 @@ class Bench:
     def _inbox(self) -> list[Datagram]:
         since, inbox = self.now - BEGIN, []
         if since == 0:
-            origin = GpsGlobalOrigin(AUTOPILOT, FLEET.latitude, FLEET.longitude, FLEET.altitude, 0)
+            latitude, longitude, altitude = FLEET.to_geodetic(self.origin)
+            origin = GpsGlobalOrigin(AUTOPILOT, latitude, longitude, altitude, 0)
             inbox.append(self.tell("autopilot", origin))
         if self.beats and since % 1_000_000 == 0:
             base = 0x81 if self.armed else 0x01
             inbox.append(self.tell("autopilot", Heartbeat(AUTOPILOT, 13, 3, base, self.mode, 4)))
         if self.speaks and since % 20_000 == 0:
-            inbox.append(self.tell("autopilot", spoken(since)))
+            inbox.append(self.tell("autopilot", self._spoken()))
         if self.speaks and since % 50_000 == 0:
             inbox += [self.tell("swarm", told(plan)) for plan in self.plans]
         return inbox
+
+    def _spoken(self) -> SetpointLocal:
+        """What the companion sends: its plan, by its own clock."""
+        now = self.now + self.ahead
+        plan = max((p for p in self.plans if p.epoch <= now), default=plan_from(BEGIN), key=lambda p: p.epoch)
+        place = horizon_of(plan).at(now + CONFIG.setpoint_lead_us).position
+        ned, zero = (float(place[1]), float(place[0]), -float(place[2])), (0.0, 0.0, 0.0)
+        return SetpointLocal(COMPANION, self.now - BEGIN, SYSTEM, 1, 1, 0, ned, zero, zero, YAW, 0.0)
 
 
 def plan_from(epoch: int, seed: int = 1) -> WirePlan:
@@ -87,11 +103,6 @@ def plan_from(epoch: int, seed: int = 1) -> WirePlan:
 
 def told(plan: WirePlan, source: Source = COMPANION) -> Tunnel:
     return Tunnel(source, 0, 0, PAYLOAD_TYPE, pack(plan))
-
-
-def spoken(since: int) -> SetpointLocal:
-    zero = (0.0, 0.0, 0.0)
-    return SetpointLocal(COMPANION, since, SYSTEM, 1, 1, 0, zero, zero, zero, YAW, 0.0)
 
 
 def silent(bench: Bench) -> Bench:
@@ -158,8 +169,38 @@ def test_a_vehicle_that_somebody_else_has_is_left_alone(how: str) -> None:
     assert bench.run(2.0) == []
     # Given back, it is at nobody's plan: the old one would be somewhere else.
     bench.mode, bench.armed, bench.beats = GUIDED, True, True
-    if how != "no heartbeat":
-        assert bench.run(3.0) == []
+    assert bench.run(3.0) == []
+
+
+def test_what_the_companion_does_not_fly_is_not_carried_on() -> None:
+    """Another clock, another origin, another plan: then what the helm knows is not what others count on."""
+    late, elsewhere, other = Bench(), Bench(), Bench()
+    late.ahead = 1_500_000
+    elsewhere.origin = np.array([0.5, 0.0, 0.0])
+    for bench in (late, elsewhere):
+        assert silent(bench).run(3.0) == []
+    other.run(1.0)
+    # The last set-point is of a plan that was never told.
+    strange = SetpointLocal(COMPANION, 0, SYSTEM, 1, 1, 0, (9.0, 9.0, -5.0), (0.0,) * 3, (0.0,) * 3, YAW, 0.0)
+    other.helm.step(other.now, [other.tell("autopilot", strange)])
+    other.speaks = False
+    assert other.run(3.0) == []
+
+
+def test_a_plan_of_another_time_is_none() -> None:
+    bench = Bench()
+    bench.plans = [plan_from(BEGIN + 60_000_000), plan_from(BEGIN - 60_000_000)]
+    assert silent(bench).run(3.0) == []
+
+
+def test_after_an_order_to_land_it_is_silent() -> None:
+    """It goes out before the farewell, and before the autopilot says that it has left the mode."""
+    bench = Bench()
+    bench.run(1.0)
+    land = CommandLong(COMPANION, SYSTEM, 1, 21, 0, (0.0,) * 7)
+    bench.helm.step(bench.now, [bench.tell("autopilot", land)])
+    bench.speaks = False
+    assert bench.run(3.0) == []
 
 
 def test_after_a_farewell_it_is_silent() -> None:

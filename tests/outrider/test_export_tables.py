@@ -14,7 +14,7 @@ import pyarrow.csv
 import pyarrow.parquet
 import pytest
 from export_runs import SYSTEMS, Heard, all_same, everything, heard, run  # noqa: F401
-from pymavlink.dialects.v20 import ardupilotmega
+from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.tlog import read_tlog
 from outrider.exports import mavlink_tables
@@ -115,7 +115,7 @@ def rows_of(found: dict[str, pa.Table]) -> list[tuple[Any, ...]]:
 
 def expected_row(message: Heard) -> dict[str, Any]:
     """A message as a row, by pymavlink's own account of it."""
-    definition = getattr(ardupilotmega, f"MAVLink_{message.name.lower()}_message")
+    definition = getattr(dialect, f"MAVLink_{message.name.lower()}_message")
     row: dict[str, Any] = {}
     for name, of in zip(definition.fieldnames, definition.fieldtypes, strict=True):
         unit = definition.fieldunits_by_name.get(name)

@@ -99,20 +99,20 @@ def test_the_first_and_the_worst_difference_are_told(k: int, axis: int, off: flo
     said = difference(golden, found, 0.01)
     assert f"{found[k, 0] * 1e-3:.2f} s after the first: {('north', 'east', 'down')[axis]}" in said
     assert "1 of 300 differ" in said
-    assert f"{off:.3f} m apart" in said
+    assert f"{off:.4f} m apart" in said
     assert difference(golden, found, 51.0) == ""
     assert difference(golden, golden, 0.0) == ""
 
 
 def test_a_turn_over_the_end_of_angles_is_none() -> None:
-    golden = np.zeros((1, 8))
+    golden = np.zeros((1, 13))
     found = golden.copy()
-    golden[0, 7], found[0, 7] = 3.141, -3.141
+    golden[0, 10], found[0, 10] = 3.141, -3.141
     assert difference(golden, found, 0.01) == ""
 
 
 def test_other_times_and_another_count_are_told() -> None:
-    golden = np.zeros((5, 8))
+    golden = np.zeros((5, 13))
     golden[:, 0] = 20.0 * np.arange(5)
     assert "there are 4 set-points, the golden file has 5" in difference(golden, golden[:4], 0.01)
     later = golden.copy()
@@ -120,8 +120,26 @@ def test_other_times_and_another_count_are_told() -> None:
     assert "3th set-point comes 0.060 s after" in difference(golden, later, 0.01)
 
 
+@pytest.mark.parametrize("fields", [{"frame": 7}, {"type_mask": 0x1C0}, {"acceleration": (9.0, 9.0, 9.0)}])
+def test_so_are_another_frame_mask_and_acceleration(fields: dict[str, object], tmp_path: Path) -> None:
+    setpoints(row(every()), tmp_path, update=True).assert_golden("course")
+    of = setpoints(changed(row(every()), 100, **fields), tmp_path)
+    with pytest.raises(AssertionError, match=r"part 2\.00 s after the first"):
+        of.assert_golden("course")
+
+
+def test_nothing_is_no_flight(tmp_path: Path) -> None:
+    with pytest.raises(AssertionError, match="no set-points"):
+        setpoints([], tmp_path, update=True).assert_golden("course")
+    with pytest.raises(AssertionError, match=r"3\.0 set-points a second|2\.5 set-points a second"):
+        setpoints(row(every(400_000, 3)), tmp_path).assert_rate(at_least=45)
+    for within in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match="within"):
+            setpoints(row(every()), tmp_path).assert_golden("course", within=within)
+
+
 def test_a_golden_file_comes_back_as_it_was(tmp_path: Path) -> None:
-    values = np.round(np.random.default_rng(1).normal(size=(40, 8)), 4)
+    values = np.round(np.random.default_rng(1).normal(size=(40, 13)), 4)
     values[:, 0] = np.arange(40)
     values[3, 4] = np.nan
     (tmp_path / "file").write_bytes(packed(values))

@@ -26,6 +26,7 @@ from outrider.replaying.casting import Cast, Part, survey
 from outrider.replaying.rehearsal import STEP, rehearse, steps
 from outrider.replaying.setpoints import facts
 from outrider.replaying.telemetry import TELEMETRY, Forwarder, paced
+from outrider.replaying.timeline import on_one_line
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "tlogs"
 REAL = [("ap_copter463_guided_full", 9), ("ap_copter463_guided_pvy", 1), ("px4_1161_offboard_pvay", 1)]
@@ -138,7 +139,7 @@ times = st.lists(st.integers(0, 60_000_000), max_size=60)
 def test_time_goes_on_by_steps_and_every_record_comes_once(stamps: list[int]) -> None:
     records = [Record(stamp - stamp % 4, 0, bytes([k])) for k, stamp in enumerate(stamps)]
     given_ = list(steps(records))
-    assert [record for _, batch in given_ for record in batch] == records
+    assert [record.frame for _, batch in given_ for record in batch] == [record.frame for record in records]
     assert all(now > before for (before, _), (now, _) in pairwise(given_))
     for now, batch in given_:
         # Nobody hears of what is yet to come; and what is late comes at once.
@@ -201,11 +202,41 @@ def test_nothing_that_asks_or_orders_is_telemetry() -> None:
 @settings(max_examples=30)
 def test_records_come_at_their_times(stamps: list[int], speed: float) -> None:
     clock = SimulatedClock(5_000_000)
-    latest = 0
-    for record in paced([Record(stamp, 0, b"") for stamp in stamps], clock, speed):
-        latest = max(latest, record.time)
-        passed = clock.now() - 5_000_000
-        assert passed == pytest.approx((latest - stamps[0]) / speed, abs=1.0)
+    first, gone, before = None, 0, 0
+    for record in paced([Record(stamp, 0, b"") for stamp in sorted(stamps)], clock, speed):
+        first = record.time if first is None else first
+        # Long silence is cut short.
+        gone += min(record.time - before, 5_000_000) if record.time > first else 0
+        before = record.time
+        assert clock.now() - 5_000_000 == pytest.approx(gone / speed, abs=len(stamps))
+
+
+@given(
+    st.lists(st.integers(0, 20_000), min_size=4, max_size=60), st.integers(1, 58), st.sampled_from([-3, 3])
+)
+def test_stamps_that_jump_lose_nothing(gaps: list[int], where: int, hours: int) -> None:
+    """A clock that was set in the middle: what comes after follows what came before."""
+    times = np.cumsum([0, *gaps]) + 10**15
+    where = min(where, len(times) - 2)
+    jumped = times.copy()
+    jumped[where:] += hours * 24 * 3_600_000_000
+    line = [record.time for record in on_one_line(Record(int(t), 0, b"") for t in jumped)]
+    assert line == sorted(line)
+    assert len(line) == len(times)
+    np.testing.assert_allclose(np.diff(line[where:]), np.diff(times[where:]), atol=8)
+    assert line[-1] - line[0] <= times[-1] - times[0] + 8
+
+
+@given(st.integers(0, 40), st.sampled_from([-(10**11), 10**9, 10**14]))
+def test_one_wrong_stamp_moves_no_other(where: int, off: int) -> None:
+    times = 10**15 + 20_000 * np.arange(42)
+    wrong = times.copy()
+    wrong[where] += off
+    line = [record.time for record in on_one_line(Record(int(t), 0, b"") for t in wrong)]
+    others = np.arange(42) != where
+    if where > 0:
+        np.testing.assert_array_equal(np.array(line)[others], times[others])
+    assert line == sorted(line)
 
 
 @pytest.mark.parametrize(

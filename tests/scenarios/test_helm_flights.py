@@ -41,3 +41,12 @@ def test_a_plan_is_kept_whose_companion_is_silent(
     assert isinstance(separation, float)
     assert separation > 1.0
     assert flown.summary["converged"] is (fault["kind"] == "freeze")
+
+
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_in_a_sound_flight_it_never_speaks(flavour: str, tmp_path: Path) -> None:
+    """From the ground to the ground: nor while its companion lands."""
+    of = scenario("antipodal-8", {**SWAP, "vehicles": 2, "airborne": False, "flavour": flavour})
+    flown = fly(of, 1, tmp_path)
+    assert [helm.carried for helm in flown.flight.helms] == [0, 0]
+    assert flown.summary["converged"] is True

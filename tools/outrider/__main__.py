@@ -136,6 +136,9 @@ def replay(
     1 if not, or if there are findings."""
     if listing and certify:
         raise InputError(f"replay {log}: both at once; allowed: one of --list, --certify")
+    others = {"own": own, "neighbours": neighbours, "target": target, "speed": speed, "to": to, "out": out}
+    for name in [name for name, value in others.items() if value is not None] if listing or certify else ():
+        raise InputError(f"replay {log}: --{name} does not go with {'--list' if listing else '--certify'}")
     if listing:
         from outrider.logs.listing import listing as naming
 

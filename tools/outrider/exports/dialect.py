@@ -7,7 +7,7 @@ from struct import Struct
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from pymavlink.dialects.v20 import ardupilotmega as dialect
+from pymavlink.dialects.v20 import all as dialect
 
 _CODES: Final = {
     "int8_t": "b",

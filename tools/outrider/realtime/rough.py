@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from mavlink_bridge.ether import Channel, Ether
 from mavlink_bridge.header import sending_system
 from mavlink_bridge.node import Datagram, Node
+from mavlink_bridge.runtime import Direction, Tap
 from outrider import names
 
 
@@ -27,6 +28,7 @@ class Rough:
         self._channels = [channel.name for channel in channels]
         self._known = {end for channel in channels for end in channel.members.items() if end[0] != node.name}
         self.ether = Ether(channels, seed, tick)
+        self._last: tuple[int, list[Datagram], list[Datagram]] | None = None
 
     @property
     def name(self) -> str:
@@ -39,7 +41,23 @@ class Rough:
             sender = self._senders.get(datagram.link) or self._speaker(datagram)
             if (sender, datagram.link) in self._known:
                 self.ether.send(now, sender, [datagram])
-        return self.node.step(now, self.ether.receive(now, self.node.name))
+        delivered = self.ether.receive(now, self.node.name)
+        self._last = now, delivered, []
+        leaving = self.node.step(now, delivered)
+        self._last = now, delivered, leaving
+        return leaving
+
+    def show(self, taps: Sequence[Tap]) -> None:
+        """Let ``taps`` see the last step of the node, with what came through the ether; once."""
+        if self._last is None:
+            return
+        (now, delivered, leaving), self._last = self._last, None
+        boxes: tuple[tuple[Direction, list[Datagram]], ...] = (("in", delivered), ("out", leaving))
+        for tap in taps:
+            tap.begin(now, self.name)
+            for direction, box in boxes:
+                for datagram in box:
+                    tap(now, self.name, direction, datagram)
 
     def _speaker(self, datagram: Datagram) -> str:
         """The node that has the system id in the header."""

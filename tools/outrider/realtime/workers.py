@@ -77,6 +77,7 @@ class Worker:
         self._parent = os.getpid()
         self._events = deque(events)
         self._goal_seen = False
+        self._taps: list[Tap] = []
 
     def over(self) -> bool:
         """Whether to end: it was said, or the parent is gone."""
@@ -123,11 +124,11 @@ class Worker:
 
     def _run(self) -> None:
         with IdleCollector() as garbage, ExitStack() as files:
+            self._taps = self.taps(files)
             loop = RealTime(
                 self._scheduled,
                 self.links,
                 self._clock,
-                self.taps(files),
                 tolerance=TOLERANCE,
                 on_idle=garbage.idle,
                 excused=self.excused,
@@ -135,6 +136,8 @@ class Worker:
             try:
                 statistics = loop.run(self.over, self._stepped)
             finally:
+                # What a node fails at is logged.
+                self.rough.show(self._taps)
                 due = loop.deadlines
                 self.remains.lateness = due.lateness
                 self.remains.deadlines = due.lateness.count + due.skipped
@@ -144,6 +147,8 @@ class Worker:
         self.remains.dropped = counters.dropped + statistics.overruns
 
     def _stepped(self, now: int) -> None:
+        # After sending, so that writing a log makes no set-point late.
+        self.rough.show(self._taps)
         goal = self.board.goal
         if goal and not self._goal_seen:
             self._goal_seen = True

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from companion.node import COMPONENT
 from companion.reception import AUTOPILOT
@@ -14,9 +17,11 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.framing import START_V2
 from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, LocalPosition, Source
 from mavlink_bridge.tlog import Record
-from outrider.errors import InputError
+from outrider.errors import Fault, InputError
+from outrider.replaying.timeline import on_one_line
 
 SETPOINT, LOCAL, GLOBAL, ORIGIN = 84, 32, 33, 49
+_FAR = 5000.0
 _SURVEYED = {LOCAL, GLOBAL, ORIGIN}
 
 
@@ -72,7 +77,8 @@ class Survey(NamedTuple):
     """What a first look at the own vehicle's records shows: its first place (°, °, m above mean sea level)
     and how high above its home that is, its GPS_GLOBAL_ORIGIN, and whether it says LOCAL_POSITION_NED.
     ``systems`` are all that speak, ``placed`` those that say where they are; ``begin`` and ``end``, µs, of
-    the log."""
+    the log; ``reach``: how far (m, horizontally) it ever was from its first place, of what is within 5
+    km."""
 
     place: tuple[float, float, float]
     above_home: float
@@ -82,6 +88,7 @@ class Survey(NamedTuple):
     placed: frozenset[int]
     begin: int
     end: int
+    reach: float
 
     @property
     def seconds(self) -> float:
@@ -105,11 +112,13 @@ def survey(records: Iterable[Record], own: int, name: str) -> Survey:
     first: LocalPosition | None = None
     pair: tuple[GlobalPosition, LocalPosition] | None = None
     origin: tuple[float, float, float] | None = None
+    here: FleetFrame | None = None
+    reach = 0.0
     begin: int | None = None
     end = 0
-    for record in records:
+    for record in on_one_line(records):
         begin = record.time if begin is None else begin
-        end = max(end, record.time)
+        end = record.time
         systems.add(header(record.frame).system)
         for message in codec.feed(record.frame):
             if isinstance(message, GlobalPosition):
@@ -120,8 +129,10 @@ def survey(records: Iterable[Record], own: int, name: str) -> Survey:
                 case GlobalPosition():
                     # Without a fix it is all zeros: that counts only where there is nothing better.
                     if place is None or not (place.latitude or place.longitude):
-                        place = message
-                    if first is not None and pair is None:
+                        place, here = message, _frame(message)
+                    elif here is not None and (message.latitude or message.longitude):
+                        reach = max(reach, _apart(here, message))
+                    if first is not None and pair is None and (message.latitude or message.longitude):
                         pair = message, first
                 case LocalPosition():
                     first = message
@@ -148,11 +159,33 @@ def survey(records: Iterable[Record], own: int, name: str) -> Survey:
         frozenset(placed),
         begin or 0,
         end,
+        reach,
     )
+
+
+def _frame(place: GlobalPosition) -> FleetFrame:
+    return FleetFrame(place.latitude, place.longitude, place.altitude)
+
+
+def _apart(here: FleetFrame, place: GlobalPosition) -> float:
+    """Horizontally, m; 0 for what is too far to be true."""
+    east, north, _ = here.to_enu(place.latitude, place.longitude, place.altitude)
+    far = float(np.hypot(east, north))
+    return far if far < _FAR else 0.0
 
 
 def _origin(place: GlobalPosition, local: LocalPosition) -> tuple[float, float, float]:
     """Where the own local frame begins, from one place in both."""
-    here = FleetFrame(place.latitude, place.longitude, place.altitude)
+    here = _frame(place)
     north, east, down = local.position_ned
     return here.to_geodetic((-east, -north, down))
+
+
+def check(log: Path, cast: Cast, seen: Survey) -> None:
+    """InputError for somebody who says nothing of where it is."""
+    asked = {"--target": () if cast.target is None else (cast.target,), "--neighbours": cast.neighbours or ()}
+    allowed = ", ".join(map(str, sorted(seen.placed - {cast.own}))) or "nobody"
+    for option, systems in asked.items():
+        for system in sorted(set(systems) - seen.placed | set(systems) & {cast.own}):
+            wrong = "is the own vehicle" if system == cast.own else "never says where it is"
+            raise InputError(Fault(str(log), f"{option} {system} {wrong}; allowed: {allowed}"))

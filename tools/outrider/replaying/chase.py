@@ -2,56 +2,76 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 
+from pydantic import ValidationError
+
+from companion.config import CompanionConfig
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.tlog import read_tlog
 from outrider import names, swarm
+from outrider.errors import InputError
 from outrider.flight import Progress
-from outrider.replaying.casting import SETPOINT, header, survey
+from outrider.replaying.casting import SETPOINT, Survey, header, survey
 from outrider.resources import find
 from outrider.scenario import FIRST_SYSTEM, Origin, RecordedTarget, Ring, Scenario
 from outrider.yaml_file import load
 from sitl.config import VehicleConfig
 
-_ROOM = 200.0
-"""m around the first place that is flown in."""
+_ROOM = 20.0
+"""m around all places of the target that are flown in."""
+_LONGEST_S = 3600.0
 
 
 def chase(
-    log: Path, target: int, like: str, directory: Path, progress: Progress
+    log: Path, target: int, like: str, directory: Callable[[], Path], progress: Progress
 ) -> list[tuple[int, SetpointLocal]]:
     """Fly one vehicle with the companion's settings of the scenario ``like`` around ``target``, from the
-    first word of where it is to the last; the set-points that it was sent, with their times (µs). The run is
-    left in ``directory``. InputError as ``survey``."""
-    seen = survey(read_tlog(log), target, str(log))
+    first record of the log to the last, an hour at most; the set-points that it was sent, with times (µs).
+
+    The run is left in ``directory()``. InputError as ``survey``, and for settings that are of no use.
+    """
+    prepared = _prepared(log, survey(read_tlog(log), target, str(log)), target, like)
+    run = directory()
+    swarm.fly(prepared, 1, run, progress)
+    return setpoints(run / names.log(FIRST_SYSTEM))
+
+
+def _prepared(log: Path, seen: Survey, target: int, like: str) -> swarm.Prepared:
     base = load(find("scenarios", like), Scenario)
-    limits = base.companion.limits
-    # Wherever the target goes; nothing but its height is kept in bounds.
-    box = {"box_min": (-_ROOM, -_ROOM, limits.box_min[2]), "box_max": (_ROOM, _ROOM, limits.box_max[2])}
-    fleet = seen.fleet
-    document = base.model_dump() | {
-        "name": f"chase-{log.name.split('.')[0]}"[:64],
-        "task": "escort",
-        "vehicles": 1,
-        "bystanders": (),
-        "obstacles": (),
-        "moving": (),
-        "faults": (),
-        "origin": Origin(
-            latitude=fleet.latitude, longitude=fleet.longitude, altitude=fleet.altitude
-        ).model_dump(),
-        "starts": Ring(kind="ring", radius=4.0, height=max(limits.box_min[2] + 1.0, 4.0)).model_dump(),
-        "target": RecordedTarget(
-            kind="recorded", log=str(log.resolve()), system=target, start_s=0.0, duration_s=seen.seconds
-        ).model_dump(),
-        "companion": base.companion.model_dump() | {"limits": limits.model_dump() | box},
-    }
-    scenario = Scenario.model_validate(document)
-    vehicle = load(find("vehicles", scenario.vehicle), VehicleConfig)
-    swarm.fly(swarm.Prepared(scenario, vehicle), 1, directory, progress)
-    return setpoints(directory / names.log(FIRST_SYSTEM))
+    limits, fleet = base.companion.limits, seen.fleet
+    far = seen.reach + _ROOM
+    box = {"box_min": (-far, -far, limits.box_min[2]), "box_max": (far, far, limits.box_max[2])}
+    companion = base.companion.model_dump() | {"task": "escort", "limits": limits.model_dump() | box}
+    origin = Origin(latitude=fleet.latitude, longitude=fleet.longitude, altitude=fleet.altitude)
+    height = min(max(limits.box_min[2] + 1.0, 4.0), limits.box_max[2])
+    try:
+        scenario = Scenario(
+            name=f"chase-{re.sub('[^A-Za-z0-9._-]', '-', log.name.split('.')[0])}"[:64],
+            task="escort",
+            vehicles=1,
+            vehicle=base.vehicle,
+            flavour=base.flavour,
+            origin=origin,
+            starts=Ring(kind="ring", radius=4.0, height=height),
+            target=RecordedTarget(
+                kind="recorded",
+                log=str(log.resolve()),
+                system=target,
+                start_s=0.0,
+                duration_s=min(seen.seconds, _LONGEST_S),
+            ),
+            d_min_target=base.d_min_target,
+            sensors=base.sensors,
+            companion=CompanionConfig.model_validate(companion),
+        )
+    except ValidationError as error:
+        said = "; ".join(one["msg"] for one in error.errors())
+        raise InputError(f"{log}: cannot be flown like {like}: {said}") from None
+    return swarm.Prepared(scenario, load(find("vehicles", scenario.vehicle), VehicleConfig))
 
 
 def setpoints(log: Path) -> list[tuple[int, SetpointLocal]]:

@@ -16,8 +16,8 @@ from rich.text import Text
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog import Record, read_tlog
 from outrider.console import progress, share_progress
-from outrider.errors import Fault, InputError
-from outrider.replaying.casting import Cast, Survey, survey
+from outrider.errors import InputError
+from outrider.replaying.casting import Cast, check, survey
 from outrider.replaying.chase import chase
 from outrider.replaying.picture import draw
 from outrider.replaying.rehearsal import Rehearsed, rehearse
@@ -44,9 +44,11 @@ def rehearsal(log: Path, cast: Cast, like: str, out: Path | None, as_json: bool,
     InputError for a log that cannot be read, and for ids that are not in it.
     """
     config = load(find("scenarios", like), Scenario).companion
+    if config.avoidance == "certified":
+        raise InputError(f"--like {like}: certified plans cannot be rehearsed; allowed: avoidance 'field'")
     try:
         seen = survey(read_tlog(log), cast.own, str(log))
-        _check(log, cast, seen)
+        check(log, cast, seen)
         directory = _directory(out, f"{_stem(log)}-own-{cast.own}")
         with share_progress() as watch:
 
@@ -65,12 +67,17 @@ def chasing(log: Path, target: int, like: str, out: Path | None, as_json: bool) 
     left in ``out``. The exit status: 0. InputError as for ``rehearsal``."""
     try:
         seconds = survey(read_tlog(log), target, str(log)).seconds
-        directory = _directory(out, f"{_stem(log)}-target-{target}")
+        made: list[Path] = []
+
+        def directory() -> Path:
+            made.append(_directory(out, f"{_stem(log)}-target-{target}"))
+            return made[0]
+
         with progress(seconds) as watch:
             told = chase(log, target, like, directory, watch)
     except LogError as error:
         raise InputError(str(error)) from None
-    _tell(f"{log.name} · target {target}", Rehearsed(would=told), directory, as_json)
+    _tell(f"{log.name} · target {target}", Rehearsed(would=told), made[0], as_json)
     return 0
 
 
@@ -97,16 +104,6 @@ def document_of(found: Rehearsed) -> dict[str, object]:
         f"p{q}": round(float(np.percentile(off, q)), 3) if len(off) else None for q in (50, 95)
     }
     return document
-
-
-def _check(log: Path, cast: Cast, seen: Survey) -> None:
-    """InputError for somebody who says nothing of where it is."""
-    asked = {"--target": () if cast.target is None else (cast.target,), "--neighbours": cast.neighbours or ()}
-    allowed = ", ".join(map(str, sorted(seen.placed - {cast.own}))) or "nobody"
-    for option, systems in asked.items():
-        for system in sorted(set(systems) - seen.placed | set(systems) & {cast.own}):
-            wrong = "is the own vehicle" if system == cast.own else "never says where it is"
-            raise InputError(Fault(str(log), f"{option} {system} {wrong}; allowed: {allowed}"))
 
 
 def _directory(out: Path | None, stem: str) -> Path:

@@ -23,12 +23,11 @@ from mavlink_bridge.tlog import Record
 from outrider.beacon import Beacon
 from outrider.paths import Motion
 from outrider.replaying.casting import GLOBAL, Cast, Part, Survey, header
+from outrider.replaying.timeline import IDLE, on_one_line
 from outrider.scenario_part import TARGET_SYSTEM
 
 STEP = 10_000
 """µs."""
-_IDLE = 5_000_000
-"""µs of a log in which nobody speaks that are gone through; what is longer is skipped."""
 _RATE_HZ = 5.0
 
 Told = tuple[int, SetpointLocal]
@@ -71,9 +70,9 @@ def rehearse(
             inbox += _given(cast.part(record.frame), record, reader, found, stand_in)
         if standing is not None and standing.due(now):
             inbox += standing.say(now, Motion(here, here * 0.0))
-        for link, data in companion.step(now, inbox):
-            if link == "autopilot":
-                found.would += [(now, m) for m in reader.feed(data) if isinstance(m, SetpointLocal)]
+        companion.step(now, inbox)
+        found.would += [(now, message) for message in companion.would]
+        companion.would.clear()
         if companion.lacking:
             found.reasons[companion.lacking] += 1
         found.records += len(batch)
@@ -83,18 +82,17 @@ def rehearse(
 
 
 def steps(records: Iterable[Record]) -> Iterator[tuple[int, list[Record]]]:
-    """Times (µs, multiples of 4) every 10 ms, each with the records since the last one. A record whose time
-    steps back comes with the one before it; long silence is skipped."""
+    """Times (µs, multiples of 4) every 10 ms, each with the records since the last one, on one time line (see
+    ``timeline``); long silence is skipped."""
     now: int | None = None
     batch: list[Record] = []
-    for record in records:
-        time = record.time - record.time % 4
+    for record in on_one_line(records):
         if now is None:
-            now = time
-        if time > now + _IDLE:
+            now = record.time
+        if record.time > now + IDLE:
             yield now, batch
-            batch, now = [], time
-        while time > now:
+            batch, now = [], record.time
+        while record.time > now:
             yield now, batch
             batch = []
             now += STEP

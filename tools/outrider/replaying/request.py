@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 from mavlink_bridge.clock import WallClock
+from mavlink_bridge.errors import EndpointError, LinkError, LogError
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.tlog import read_tlog
 from outrider.console import share_progress
@@ -35,6 +38,8 @@ class Request(NamedTuple):
 
     def run(self) -> int:
         """Do it; the exit status. InputError for what does not go together."""
+        if self.speed is not None and not self.speed > 0.0:
+            raise InputError(f"--speed {self.speed}: must be more than 0")
         if self.log.is_dir():
             self._only("the directory of a run", ("own", "neighbours", "target", "speed", "to", "out"))
             return reenacting(self.log, self.as_json)
@@ -54,11 +59,15 @@ class Request(NamedTuple):
 
     def _send(self) -> int:
         """The log's telemetry to the endpoint."""
-        with self._paced() as pacing, share_progress() as watch:
-            size, done = max(self.log.stat().st_size if self.log.is_file() else 1, 1), 0
-            for record in pacing(read_tlog(self.log)):
-                done += 8 + len(record.frame)
-                watch(self.log.name, min(done / size, 1.0))
+        try:
+            records = read_tlog(self.log)
+            with self._paced() as pacing, share_progress() as watch:
+                size, done = max(self.log.stat().st_size, 1), 0
+                for record in pacing(records):
+                    done += 8 + len(record.frame)
+                    watch(self.log.name, min(done / size, 1.0))
+        except (LogError, OSError) as error:
+            raise InputError(str(error)) from None
         return 0
 
     @contextmanager
@@ -69,11 +78,22 @@ class Request(NamedTuple):
         if self.to is None:
             yield lambda records: paced(records, clock, self.speed)
             return
-        link = open_link(self.to, clock)
+        try:
+            link = open_link(self.to, clock)
+        except (EndpointError, LinkError, LogError) as error:
+            raise InputError(f"--to: {error}") from None
         try:
             forwarder = Forwarder(link)
             speed = 1.0 if self.speed is None else self.speed
             yield lambda records: paced(records, clock, speed, forwarder)
+            gone = link.counters.sent
+            if self.own is None and self.as_json:
+                counts = {"to": self.to, "telemetry": forwarder.sent, "kept": forwarder.kept, "sent": gone}
+                sys.stdout.write(json.dumps(counts) + "\n")
+            sys.stderr.write(
+                f"{self.to}: {gone} of {forwarder.sent} frames of telemetry were sent; "
+                f"{forwarder.kept} others were kept back\n"
+            )
         finally:
             link.close()
 

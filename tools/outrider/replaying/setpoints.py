@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mavlink_bridge.messages import SetpointLocal
 
 Array = NDArray[np.float64]
+_LOCAL_NED = 1
 TOGETHER = 100_000
 """µs. What is further apart is no step but a gap."""
 _TRIPLES = {"position": 0x007, "velocity": 0x038, "acceleration": 0x1C0}
@@ -20,7 +21,8 @@ _TRIPLES = {"position": 0x007, "velocity": 0x038, "acceleration": 0x1C0}
 
 class Course(NamedTuple):
     """A row of n set-points: ``times`` (n,) µs; ``positions``, ``velocities``, ``accelerations`` (n, 3) NED,
-    SI, NaN where the mask ignores them; ``yaw`` (n,) rad, ``masks`` and ``frames`` (n,)."""
+    SI, NaN where the mask ignores them, and positions where they are of another frame than LOCAL_NED; ``yaw``
+    (n,) rad, ``masks`` and ``frames`` (n,)."""
 
     times: NDArray[np.int64]
     positions: Array
@@ -55,6 +57,9 @@ def course(told: Sequence[tuple[int, SetpointLocal]]) -> Course:
     for k, bits in enumerate(_TRIPLES.values()):
         values[(masks & bits) != 0, 3 * k : 3 * k + 3] = np.nan
     values[(masks & 0x400) != 0, 9] = np.nan
+    frames = np.array([m.frame for _, m in told], dtype=np.int64)
+    # Offsets, and axes of the body, are no places.
+    values[frames != _LOCAL_NED, 0:3] = np.nan
     return Course(
         np.array([time for time, _ in told], dtype=np.int64),
         values[:, 0:3],
@@ -62,7 +67,7 @@ def course(told: Sequence[tuple[int, SetpointLocal]]) -> Course:
         values[:, 6:9],
         values[:, 9],
         masks,
-        np.array([m.frame for _, m in told], dtype=np.int64),
+        frames,
     )
 
 

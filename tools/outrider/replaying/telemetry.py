@@ -10,43 +10,50 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
+from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.tlog import Record
 from outrider.replaying.casting import header
+from outrider.replaying.timeline import IDLE, on_one_line
 
-_NAMES = (
-    *(
-        "HEARTBEAT",
-        "SYS_STATUS",
-        "SYSTEM_TIME",
-        "GPS_RAW_INT",
-        "GPS2_RAW",
-        "RAW_IMU",
-        "SCALED_IMU",
-        "SCALED_IMU2",
-    ),
-    *("SCALED_PRESSURE", "ATTITUDE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"),
-    *(
-        "SERVO_OUTPUT_RAW",
-        "VFR_HUD",
-        "ATTITUDE_TARGET",
-        "POSITION_TARGET_LOCAL_NED",
-        "POSITION_TARGET_GLOBAL_INT",
-    ),
-    *("HIGHRES_IMU", "ALTITUDE", "ESTIMATOR_STATUS", "BATTERY_STATUS", "HOME_POSITION", "GPS_GLOBAL_ORIGIN"),
-    *("EXTENDED_SYS_STATE", "VIBRATION", "STATUSTEXT", "WIND", "EKF_STATUS_REPORT", "MISSION_CURRENT"),
-    *(
-        "NAV_CONTROLLER_OUTPUT",
-        "TERRAIN_REPORT",
-        "DISTANCE_SENSOR",
-        "ODOMETRY",
-        "NAMED_VALUE_FLOAT",
-        "ADSB_VEHICLE",
-    ),
-)
+_NAMES = [
+    "HEARTBEAT",
+    "SYS_STATUS",
+    "GPS_RAW_INT",
+    "GPS2_RAW",
+    "RAW_IMU",
+    "SCALED_IMU",
+    "SCALED_IMU2",
+    "SCALED_PRESSURE",
+    "ATTITUDE",
+    "ATTITUDE_QUATERNION",
+    "LOCAL_POSITION_NED",
+    "GLOBAL_POSITION_INT",
+    "SERVO_OUTPUT_RAW",
+    "VFR_HUD",
+    "ATTITUDE_TARGET",
+    "POSITION_TARGET_LOCAL_NED",
+    "POSITION_TARGET_GLOBAL_INT",
+    "HIGHRES_IMU",
+    "ALTITUDE",
+    "ESTIMATOR_STATUS",
+    "BATTERY_STATUS",
+    "HOME_POSITION",
+    "GPS_GLOBAL_ORIGIN",
+    "EXTENDED_SYS_STATE",
+    "VIBRATION",
+    "STATUSTEXT",
+    "WIND",
+    "EKF_STATUS_REPORT",
+    "MISSION_CURRENT",
+    "NAV_CONTROLLER_OUTPUT",
+    "TERRAIN_REPORT",
+    "NAMED_VALUE_FLOAT",
+]
+# Not among them is what an autopilot takes in as a sensor's word: ODOMETRY, DISTANCE_SENSOR, ADSB_VEHICLE,
+# SYSTEM_TIME and their like. A vehicle that follows another by its GLOBAL_POSITION_INT would follow a log.
 TELEMETRY: Final = frozenset(getattr(dialect, f"MAVLINK_MSG_ID_{name}") for name in _NAMES)
 """Ids of messages that tell and ask nothing."""
 _HEARTBEAT, _GROUND_STATION = 0, 6
@@ -66,6 +73,8 @@ class Forwarder:
 
     def take(self, frame: bytes) -> None:
         """Send ``frame`` if it is a vehicle's telemetry."""
+        # A listener learns from what it receives whom to send to; what that says is nobody's business here.
+        self._link.receive()
         system, component, message_id = header(frame)
         if message_id == _HEARTBEAT:
             kind = frame[_PAYLOAD[frame[0]] + _TYPE_AT] if len(frame) > _PAYLOAD[frame[0]] + _TYPE_AT else 0
@@ -83,14 +92,15 @@ class Forwarder:
 def paced(
     records: Iterable[Record], clock: Clock, speed: float | None, forwarder: Forwarder | None = None
 ) -> Iterator[Record]:
-    """The records, each no earlier than its time says at ``speed`` times the log's (None: at once)."""
-    begin: tuple[int, int] | None = None
-    latest = 0
-    for record in records:
-        latest = max(latest, record.time)
-        if speed is not None:
-            begin = begin or (clock.now(), latest)
-            clock.wait_until(begin[0] + round((latest - begin[1]) / speed))
+    """The records on one time line (see ``timeline``), each no earlier than its time says at ``speed`` times
+    the log's (None: at once); long silence is cut short."""
+    before: int | None = None
+    due = clock.now()
+    for record in on_one_line(records):
+        if speed is not None and before is not None:
+            due += round(min(record.time - before, IDLE) / speed)
+            clock.wait_until(due)
+        before = record.time
         if forwarder is not None:
             forwarder.take(record.frame)
         yield record

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
+from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.messages import CommandAck, Heartbeat, StatusText
 from outrider.report.run import Log

@@ -59,7 +59,9 @@ class Flown:
         violation of any d_min."""
         __tracebackhide__ = True
         least, violations = self.summary["min_separation_m"], self.summary["d_min_violations"]
-        if isinstance(least, float) and least < at_least:
+        if not isinstance(least, float):
+            raise AssertionError("there are no two vehicles in the air")
+        if least < at_least:
             raise AssertionError(f"two vehicles came to {least:.3f} m; at least {at_least:g} m are asked for")
         if violations:
             raise AssertionError(f"{violations} violations of d_min")

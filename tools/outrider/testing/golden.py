@@ -13,9 +13,21 @@ import numpy as np
 from outrider.replaying.setpoints import Course
 
 FLAG = "--update-golden"
-_HEAD = ("time_ms", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s", "yaw_rad")
-_NAMES = ("north", "east", "down", "velocity north", "velocity east", "velocity down", "yaw")
-_UNITS = ("m", "m", "m", "m/s", "m/s", "m/s", "rad")
+_HEAD = (
+    *("time_ms", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s"),
+    *("a_north_m_s2", "a_east_m_s2", "a_down_m_s2", "yaw_rad", "mask", "frame"),
+)
+_AXES = ("north", "east", "down")
+_NAMES = (
+    *_AXES,
+    *(f"velocity {axis}" for axis in _AXES),
+    *(f"acceleration {axis}" for axis in _AXES),
+    *("yaw", "mask", "frame"),
+)
+_UNITS = (*("m",) * 3, *("m/s",) * 3, *("m/s²",) * 3, "rad", "", "")
+_YAW, _ACCELERATIONS = 9, slice(6, 9)
+_JOLT = 10.0
+"""Accelerations may be off by so many times more: they are what noise is seen in first."""
 _DIGITS = 4
 _EVERY = 1_000
 """µs: times are told to the millisecond."""
@@ -32,6 +44,12 @@ class Golden:
         """AssertionError, which says where and by how much, if the set-points ``of`` are not those of the
         file ``name``. See ``Setpoints.assert_golden``."""
         __tracebackhide__ = True
+        if not within > 0.0:
+            raise ValueError(f"within = {within:g} must be more than 0")
+        if Path(name).name != name:
+            raise ValueError(f"{name!r} is no name of a golden file: it is in the folder of the test")
+        if not len(of.times):
+            raise AssertionError(f"{whose}: no set-points")
         path = self._directory / f"{name}.csv.gz"
         found = table(of)
         if self._update:
@@ -48,9 +66,11 @@ class Golden:
 
 
 def table(of: Course) -> np.ndarray:
-    """(n, 8): ms since the first, position and velocity NED, yaw; rounded as the file is."""
+    """(n, 13): ms since the first, position, velocity and acceleration NED, yaw, mask and frame; rounded as
+    the file is."""
     since = (of.times - (of.times[0] if len(of.times) else 0)) // _EVERY
-    columns = [since[:, None], of.positions, of.velocities, of.yaw[:, None]]
+    last = np.column_stack([of.yaw, of.masks, of.frames])
+    columns = [since[:, None], of.positions, of.velocities, of.accelerations, last]
     result: np.ndarray = np.round(np.hstack(columns).astype(np.float64), _DIGITS)
     return result
 
@@ -65,7 +85,7 @@ def packed(values: np.ndarray) -> bytes:
 
 
 def unpacked(path: Path) -> np.ndarray:
-    """The values of a file, (n, 8). AssertionError if it is none."""
+    """The values of a file, (n, 13). AssertionError if it is none."""
     __tracebackhide__ = True
     try:
         rows = list(csv.reader(StringIO(gzip.decompress(path.read_bytes()).decode())))
@@ -78,7 +98,7 @@ def unpacked(path: Path) -> np.ndarray:
 
 
 def difference(golden: np.ndarray, found: np.ndarray, within: float) -> str:
-    """Where ``found`` first leaves ``golden`` (n, 8), and where it is furthest off; empty if it never
+    """Where ``found`` first leaves ``golden`` (n, 13), and where it is furthest off; empty if it never
     does."""
     count = min(len(golden), len(found))
     times = golden[:count, 0] != found[:count, 0]
@@ -90,24 +110,26 @@ def difference(golden: np.ndarray, found: np.ndarray, within: float) -> str:
         )
     off = np.abs(found[:count, 1:] - golden[:count, 1:])
     # An angle has no ends; and what neither has is no difference.
-    off[:, -1] = np.abs((off[:, -1] + np.pi) % (2.0 * np.pi) - np.pi)
+    off[:, _YAW] = np.abs((off[:, _YAW] + np.pi) % (2.0 * np.pi) - np.pi)
+    off[:, _ACCELERATIONS] /= _JOLT
     neither = np.isnan(found[:count, 1:]) & np.isnan(golden[:count, 1:])
     off = np.where(neither, 0.0, np.where(np.isnan(off), np.inf, off))
     wrong = off > within
     if wrong.any():
         rows = wrong.any(axis=1)
         first, worst = int(rows.argmax()), np.unravel_index(int(off.argmax()), off.shape)
-        begins = _place(golden, found, first, int(off[first].argmax()))
+        begins = _place(golden, found, off, first, int(off[first].argmax()))
         return (
             f"the set-points part {begins}, where {within:g} is allowed; "
-            f"{int(rows.sum())} of {count} differ, most {_place(golden, found, *map(int, worst))}"
+            f"{int(rows.sum())} of {count} differ, most {_place(golden, found, off, *map(int, worst))}"
         )
     if len(golden) != len(found):
         return f"there are {len(found)} set-points, the golden file has {len(golden)}"
     return ""
 
 
-def _place(golden: np.ndarray, found: np.ndarray, row: int, column: int) -> str:
+def _place(golden: np.ndarray, found: np.ndarray, off: np.ndarray, row: int, column: int) -> str:
+    apart = off[row, column] * (_JOLT if column in range(9)[_ACCELERATIONS] else 1.0)
     now, before, unit = found[row, column + 1], golden[row, column + 1], _UNITS[column]
-    values = f"{_NAMES[column]} {now:.3f} {unit}, golden {before:.3f} {unit}"
-    return f"{found[row, 0] * 1e-3:.2f} s after the first: {values}, {abs(now - before):.3f} {unit} apart"
+    values = f"{_NAMES[column]} {now:.4g} {unit}, golden {before:.4g} {unit}"
+    return f"{found[row, 0] * 1e-3:.2f} s after the first: {values}, {apart:.4f} {unit} apart"

@@ -8,10 +8,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog import read_tlog
 from outrider import swarm
 from outrider.errors import InputError
-from outrider.replaying.casting import Cast, survey
+from outrider.replaying.casting import Cast, check, survey
 from outrider.replaying.rehearsal import rehearse
 from outrider.resources import find
 from outrider.scenario import Scenario
@@ -45,7 +46,11 @@ def replayed(
     """Let a companion listen to it."""
     config = changed(like, {"companion": changes}).companion
     cast = Cast(own, None if neighbours is None else frozenset(neighbours), target)
-    seen = survey(read_tlog(log), own, str(log))
+    try:
+        seen = survey(read_tlog(log), own, str(log))
+    except LogError as error:
+        raise InputError(str(error)) from None
+    check(log, cast, seen)
     return Replayed(f"{log.name}, vehicle {own}", rehearse(config, cast, seen, read_tlog(log)), golden)
 
 

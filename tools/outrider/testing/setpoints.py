@@ -68,7 +68,12 @@ class Setpoints:
                 f"{self.name}: no set-point for {seconds:.2f} s, from {begins:.2f} s after the first on; "
                 f"{gap:g} s are allowed"
             )
+        if (np.diff(times) < 0).any():
+            raise AssertionError(f"{self.name}: the times of the set-points go back")
         counts = np.bincount((times - times[0]) // _MEAN)[:-1]
+        whole = (len(times) - 1) / max((times[-1] - times[0]) * 1e-6, 1e-6)
+        if not len(counts) and whole < at_least:
+            raise AssertionError(f"{self.name}: {whole:.1f} set-points a second; {at_least:g} are asked for")
         if len(counts) and counts.min() < at_least:
             raise AssertionError(
                 f"{self.name}: {counts.min()} set-points in the second that begins {counts.argmin()} s "
