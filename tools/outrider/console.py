@@ -77,9 +77,8 @@ def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
 
 def show(summary: Mapping[str, Value]) -> None:
     """The summary as a table; keys without a value are left out."""
-    table = Table(
-        title=f"{summary['scenario']} · {summary['method']} · seed {summary['seed']}", show_header=False
-    )
+    way = "certified" if summary["avoidance"] == "certified" else summary["method"]
+    table = Table(title=f"{summary['scenario']} · {way} · seed {summary['seed']}", show_header=False)
     for key, words in _WORDS.items():
         value = summary.get(key)
         if value is None or value == "" or (isinstance(value, dict) and set(value.values()) == {None}):

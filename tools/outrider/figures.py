@@ -42,7 +42,9 @@ def draw(flight: Outcome, summary: dict[str, Value], path: Path) -> None:
 
 
 def _headline(flight: Outcome, summary: dict[str, Value]) -> str:
-    words = [flight.scenario.name, str(summary["method"]), f"seed {flight.seed}"]
+    certified = summary["avoidance"] == "certified"
+    way = "certified" if certified else str(summary["method"])
+    words = [flight.scenario.name, way, f"seed {flight.seed}"]
     if summary["converged"] is not None:
         seconds = summary["convergence_time_s"]
         words.append(f"converged in {seconds} s" if seconds is not None else "not converged")

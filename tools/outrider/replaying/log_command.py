@@ -128,22 +128,34 @@ def _leave(directory: Path, name: str, found: Rehearsed, document: dict[str, obj
     draw(name, found, directory / "replay.png")
 
 
+_ROWS = {
+    "setpoints": "set-points",
+    "finite": "all finite",
+    "max_step_m": "largest step from one to the next, m",
+    "max_speed_m_s": "largest speed, m/s",
+    "max_acceleration_m_s2": "largest acceleration, m/s²",
+    "gaps": "pauses of more than 0.1 s",
+    "mask_counts": "type masks: how many",
+    "frames": "frames: how many",
+}
+
+
 def _show(title: str, document: dict[str, object], directory: Path) -> None:
-    sent = document["sent"]
-    table = Table("", "would have been sent", "was sent", title=Text(title))
-    for key in ("setpoints", "finite", "max_step_m", "max_speed_m_s", "max_acceleration_m_s2", "gaps"):
-        before = sent[key] if isinstance(sent, dict) else None
-        table.add_row(key, _text(document[key]), _text(before))
-    for key in ("mask_counts", "frames"):
-        before = sent[key] if isinstance(sent, dict) else None
-        table.add_row(key, _text(document[key]), _text(before))
+    sent, apart_m, reasons = document["sent"], document["apart_m"], document["reasons"]
+    said = isinstance(sent, dict) and sent["setpoints"]
+    table = Table("", "would have been sent", *(["was sent"] if said else []), title=Text(title))
+    for key, words in _ROWS.items():
+        before = [_text(sent[key])] if said and isinstance(sent, dict) else []
+        table.add_row(words, _text(document[key]), *before)
+    if said and isinstance(apart_m, dict):
+        table.add_row("apart, m: p50, p95", f"{_text(apart_m['p50'])}, {_text(apart_m['p95'])}", "")
     console = Console()
     console.print(table)
-    reasons = document["reasons"]
     if isinstance(reasons, dict):
         for words, steps in sorted(reasons.items(), key=lambda pair: -pair[1]):
             console.print(Text(f"{steps * 0.01:8.2f} s without a set-point for want of {words}"))
-    console.print(Text(f"{directory}: replay.png, setpoints.csv, replay.json"), soft_wrap=True)
+    files = ", ".join(sorted(path.name for path in directory.iterdir()))
+    console.print(Text(f"{directory}: {files}"), soft_wrap=True)
 
 
 def _text(value: object) -> str:
