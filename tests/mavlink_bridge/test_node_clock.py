@@ -9,10 +9,10 @@ import pytest
 from chatter import TICK, Chatter
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from watching import Event, Watcher
 
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.ether import Channel, Ether, Faults
-from mavlink_bridge.node import Datagram
 from mavlink_bridge.node_clock import NodeClock
 from mavlink_bridge.runtime import LockStep, Scheduled
 
@@ -93,10 +93,23 @@ def test_one_call_for_each_deadline_on_the_own_clock(
         assert abs(len(calls) - expected) < 2
 
 
+class Clerk(Watcher):
+    """Notes the true time of each step."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen: dict[str, list[int]] = {}
+        self.loop: LockStep | None = None
+
+    def begin(self, now: int, node: str, /) -> None:
+        assert self.loop is not None
+        self.seen.setdefault(node, []).append(self.loop.now)
+
+
 def test_phases_of_two_clocks_wander() -> None:
     """40 ppm against each other are two ticks of 2500 µs in 125 s."""
     fast, slow = Chatter("fast"), Chatter("slow")
-    seen: dict[str, list[int]] = {"fast": [], "slow": []}
+    clerk = Clerk()
     loop = LockStep(
         [
             Scheduled(fast, PERIOD, EPOCH, NodeClock(0, 20.0, EPOCH)),
@@ -104,17 +117,15 @@ def test_phases_of_two_clocks_wander() -> None:
         ],
         Ether([], 1, TICK),
         TICK,
-        [lambda _now, name, _way, _datagram: seen[name].append(loop.now)],
+        [clerk],
     )
+    clerk.loop = loop
     loop.run(EPOCH + 126 * SECOND)
-    apart = [b - a for a, b in zip(seen["fast"], seen["slow"], strict=False)]
+    apart = [b - a for a, b in zip(clerk.seen["fast"], clerk.seen["slow"], strict=False)]
     assert apart == sorted(apart)
     # Both are due at the epoch; from then on the slow one comes too late for its tick.
     assert (apart[0], apart[1], apart[-1]) == (0, TICK, 3 * TICK)
     assert fast.steps[0] == slow.steps[0] == EPOCH
-
-
-Event = tuple[int, str, str, Datagram]
 
 
 def story(clock: NodeClock | None, reverse: bool = False) -> list[Event]:
@@ -123,13 +134,11 @@ def story(clock: NodeClock | None, reverse: bool = False) -> list[Event]:
         Scheduled(Chatter(name), PERIOD, EPOCH + index * TICK, clock if name in "bc" else None)
         for index, name in enumerate(names)
     ]
-    seen: list[Event] = []
+    watcher = Watcher()
     ether = Ether([Channel("air", dict.fromkeys(names, "swarm"), Faults(3000, 9000, 0.1, 0.1, 0.1))], 3, TICK)
-    loop = LockStep(
-        scheduled[::-1] if reverse else scheduled, ether, TICK, [lambda *event: seen.append(event)]
-    )
+    loop = LockStep(scheduled[::-1] if reverse else scheduled, ether, TICK, [watcher])
     loop.run(EPOCH + 2 * SECOND)
-    return seen
+    return watcher.events
 
 
 def test_a_right_clock_changes_no_byte() -> None:
