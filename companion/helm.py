@@ -21,8 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from companion.autopilots import Profile, is_guided
-from companion.autopilots.ardupilot import ARDUPILOT
-from companion.autopilots.px4 import PX4
+from companion.autopilots.known import profile_of
 from companion.certified.committed import horizon_of, rests
 from companion.config import CompanionConfig
 from companion.heading import Yaw
@@ -71,7 +70,6 @@ class Helm:
         self.name = f"helm-{system}"
         self._config, self._fleet = config, fleet
         self._own = Source(system, HELM)
-        self._companion = Source(system, COMPONENT)
         self._codecs = {
             "autopilot": Codec(
                 lambda identifier, sender, component: (
@@ -197,6 +195,6 @@ class Helm:
         if self._beat is None or now - self._beat[0] > HEARTBEAT_LOST:
             return None
         beat = self._beat[1]
-        profile = {p.autopilot: p for p in (ARDUPILOT, PX4)}.get(beat.autopilot)
+        profile = profile_of(beat)
         steers = profile is not None and beat.base_mode & ARMED and is_guided(profile, beat)
         return profile if steers else None

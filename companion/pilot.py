@@ -10,8 +10,7 @@ from __future__ import annotations
 from enum import Enum
 
 from companion.autopilots import Profile, Step, is_guided
-from companion.autopilots.ardupilot import ARDUPILOT
-from companion.autopilots.px4 import PX4
+from companion.autopilots.known import profile_of
 from companion.calls import Calls
 from companion.config import CompanionConfig
 from companion.tracks import State
@@ -119,7 +118,7 @@ class Pilot:
         if isinstance(message, Heartbeat):
             if message.autopilot != INVALID:
                 self._heartbeat = message
-                self.profile = {p.autopilot: p for p in (ARDUPILOT, PX4)}.get(message.autopilot)
+                self.profile = profile_of(message)
         elif isinstance(message, SysStatus):
             self._status = message
         elif isinstance(message, ExtendedSysState):
@@ -157,9 +156,7 @@ class Pilot:
 
     def step(self, now: int, view: View) -> list[Message]:
         """Commands to send now."""
-        self._now = now
-        if self._heartbeat is not self._beaten:
-            self._beaten, self._beat_at = self._heartbeat, now
+        self._tick(now)
         if self._extended is not self._extended_seen:
             self._extended_seen, self._extended_at = self._extended, now
         if self.phase is Phase.SETTLE:
@@ -174,6 +171,12 @@ class Pilot:
                 return []
             return self._calls.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
         return []
+
+    def _tick(self, now: int) -> None:
+        """It is ``now`` (µs); a heartbeat that has come since the last step came then."""
+        self._now = now
+        if self._heartbeat is not self._beaten:
+            self._beaten, self._beat_at = self._heartbeat, now
 
     def _settle(self, now: int, view: View) -> None:
         """Land without settling when that cannot go on: blind, or too long. Somebody who took the vehicle

@@ -35,9 +35,7 @@ class _Onlooker(Pilot):
 
     def step(self, now: int, view: View) -> list[Message]:
         """No commands, ever."""
-        self._now = now
-        if self._heartbeat is not self._beaten:
-            self._beaten, self._beat_at = self._heartbeat, now
+        self._tick(now)
         self.waiting_for = self._lacking(now, view)
         self.phase = Phase.CONNECT if self.waiting_for else Phase.ESCORT
         return []

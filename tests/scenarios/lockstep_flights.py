@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from outrider.flight import Flight
 from outrider.resources import config_root, find
 from outrider.scenario import Scenario
 from outrider.summary import Cost, Value, summarise
+from outrider.testing.scenes import merged
 from outrider.yaml_file import load
 from sitl.config import VehicleConfig
 
@@ -32,23 +32,8 @@ def scenario(name: str, *changes: dict[str, Any]) -> Scenario:
     """A shipped scenario that replans slowly, with ``changes`` merged in, checked again."""
     document = load(find("scenarios", name), Scenario).model_dump()
     for change in (SLOWLY, *changes):
-        document = _merged(document, change)
+        document = merged(document, change)
     return Scenario.model_validate(document)
-
-
-def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    result = deepcopy(base)
-    for key, value in changes.items():
-        inner = result.get(key)
-        # What is of another kind has other keys: it replaces the old one.
-        if (
-            isinstance(inner, dict)
-            and isinstance(value, dict)
-            and value.get("kind", inner.get("kind")) == inner.get("kind")
-        ):
-            value = _merged(inner, value)
-        result[key] = value
-    return result
 
 
 @dataclass

@@ -14,7 +14,7 @@ from companion.node import COMPONENT
 from companion.reception import AUTOPILOT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.framing import START_V2
+from mavlink_bridge.header import header
 from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, LocalPosition, Source
 from mavlink_bridge.tlog import Record
 from outrider.errors import Fault, InputError
@@ -34,21 +34,6 @@ class Part(Enum):
     SENT = "sent"
     """A set-point for the own vehicle, from whoever steered it."""
     NOTHING = ""
-
-
-class Header(NamedTuple):
-    """Who says what."""
-
-    system: int
-    component: int
-    message_id: int
-
-
-def header(frame: bytes) -> Header:
-    """Of a whole frame."""
-    if frame[0] == START_V2:
-        return Header(frame[5], frame[6], int.from_bytes(frame[7:10], "little"))
-    return Header(frame[3], frame[4], frame[5])
 
 
 @dataclass(frozen=True)

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from companion.config import CompanionConfig
 from mavlink_bridge.codec import Codec
+from mavlink_bridge.header import header
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.tlog import read_tlog
-from outrider import names, swarm
+from outrider import swarm
 from outrider.errors import InputError
-from outrider.flight import Progress
-from outrider.replaying.casting import SETPOINT, Survey, header, survey
+from outrider.replaying.casting import SETPOINT, Survey
 from outrider.resources import find
-from outrider.scenario import FIRST_SYSTEM, Origin, RecordedTarget, Ring, Scenario
+from outrider.scenario import Origin, RecordedTarget, Ring, Scenario
 from outrider.yaml_file import load
 from sitl.config import VehicleConfig
 
@@ -26,21 +25,10 @@ _ROOM = 20.0
 _LONGEST_S = 3600.0
 
 
-def chase(
-    log: Path, target: int, like: str, directory: Callable[[], Path], progress: Progress
-) -> list[tuple[int, SetpointLocal]]:
-    """Fly one vehicle with the companion's settings of the scenario ``like`` around ``target``, from the
-    first record of the log to the last, an hour at most; the set-points that it was sent, with times (µs).
-
-    The run is left in ``directory()``. InputError as ``survey``, and for settings that are of no use.
-    """
-    prepared = _prepared(log, survey(read_tlog(log), target, str(log)), target, like)
-    run = directory()
-    swarm.fly(prepared, 1, run, progress)
-    return setpoints(run / names.log(FIRST_SYSTEM))
-
-
-def _prepared(log: Path, seen: Survey, target: int, like: str) -> swarm.Prepared:
+def prepared(log: Path, seen: Survey, target: int, like: str) -> swarm.Prepared:
+    """One vehicle with the companion's settings of the scenario ``like`` around ``target``, of which ``seen``
+    is the survey, from the first record of the log to the last, an hour at most. InputError for settings that
+    are of no use."""
     base = load(find("scenarios", like), Scenario)
     limits, fleet = base.companion.limits, seen.fleet
     far = seen.reach + _ROOM

@@ -15,16 +15,17 @@ from rich.text import Text
 
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog import Record, read_tlog
+from outrider import names
 from outrider.console import progress, share_progress
 from outrider.errors import InputError
 from outrider.replaying.casting import Cast, check, survey
-from outrider.replaying.chase import chase
+from outrider.replaying.chase import prepared, setpoints
 from outrider.replaying.picture import draw
 from outrider.replaying.rehearsal import Rehearsed, rehearse
 from outrider.replaying.setpoints import apart, course, facts
 from outrider.resources import find
-from outrider.scenario import Scenario
-from outrider.swarm import new_directory
+from outrider.scenario import FIRST_SYSTEM, Scenario
+from outrider.swarm import fly, new_directory
 from outrider.yaml_file import load
 
 _COLUMNS = (
@@ -66,18 +67,15 @@ def chasing(log: Path, target: int, like: str, out: Path | None, as_json: bool) 
     """Fly a vehicle of ours around ``target``, and say what it was sent; the run, and the same files, are
     left in ``out``. The exit status: 0. InputError as for ``rehearsal``."""
     try:
-        seconds = survey(read_tlog(log), target, str(log)).seconds
-        made: list[Path] = []
-
-        def directory() -> Path:
-            made.append(_directory(out, f"{_stem(log)}-target-{target}"))
-            return made[0]
-
-        with progress(seconds) as watch:
-            told = chase(log, target, like, directory, watch)
+        seen = survey(read_tlog(log), target, str(log))
+        flight = prepared(log, seen, target, like)
+        directory = _directory(out, f"{_stem(log)}-target-{target}")
+        with progress(flight.scenario.duration_s) as watch:
+            fly(flight, 1, directory, watch)
     except LogError as error:
         raise InputError(str(error)) from None
-    _tell(f"{log.name} · target {target}", Rehearsed(would=told), made[0], as_json)
+    told = setpoints(directory / names.log(FIRST_SYSTEM))
+    _tell(f"{log.name} · target {target}", Rehearsed(would=told), directory, as_json)
     return 0
 
 

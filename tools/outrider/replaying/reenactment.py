@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import zip_longest
 from typing import NamedTuple
 
-from mavlink_bridge.framing import START_V2, leading_frames
+from mavlink_bridge.framing import leading_frames
+from mavlink_bridge.header import header
 from mavlink_bridge.node import Datagram, Node
 from mavlink_bridge.tlog import Record
 from outrider import names
@@ -66,8 +67,8 @@ def reenact(
         count += 1
         watch(now)
         at_once = together.at(now)
-        inbox = [Datagram(sent.link, sent.frame) for sent in at_once if _source(sent.frame) != own]
-        logged = [sent for sent in at_once if _source(sent.frame) == own]
+        inbox = [Datagram(sent.link, sent.frame) for sent in at_once if header(sent.frame)[:2] != own]
+        logged = [sent for sent in at_once if header(sent.frame)[:2] == own]
         again = [
             Sent(link, frame.data)
             for link, data in companion.step(now, inbox)
@@ -76,7 +77,7 @@ def reenact(
         for before, after in zip_longest(logged, again):
             if before == after:
                 frames += 1
-                setpoints += _identifier(before.frame) == SETPOINT
+                setpoints += header(before.frame).message_id == SETPOINT
                 continue
             different += 1
             first = first or Difference(now, before, after)
@@ -107,13 +108,3 @@ class _Together:
         left = 0 if self._next is None else 1
         self._next = None
         return self._stray + left + sum(1 for _ in self._records)
-
-
-def _source(frame: bytes) -> tuple[int, int]:
-    """System and component id of a frame."""
-    return (frame[5], frame[6]) if frame[0] == START_V2 else (frame[3], frame[4])
-
-
-def _identifier(frame: bytes) -> int:
-    """Message id of a frame."""
-    return int.from_bytes(frame[7:10], "little") if frame[0] == START_V2 else frame[5]

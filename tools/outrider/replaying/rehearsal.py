@@ -10,6 +10,7 @@ from companion.config import CompanionConfig
 from companion.understudy import Understudy
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, enu_to_ned
+from mavlink_bridge.header import header
 from mavlink_bridge.messages import (
     GlobalPosition,
     GpsGlobalOrigin,
@@ -22,7 +23,7 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog import Record
 from outrider.beacon import Beacon
 from outrider.paths import Motion
-from outrider.replaying.casting import GLOBAL, Cast, Part, Survey, header
+from outrider.replaying.casting import GLOBAL, Cast, Part, Survey
 from outrider.replaying.timeline import IDLE, on_one_line
 from outrider.scenario_part import TARGET_SYSTEM
 

@@ -74,18 +74,23 @@ def course(told: Sequence[tuple[int, SetpointLocal]]) -> Course:
 def facts(told: Sequence[tuple[int, SetpointLocal]]) -> Facts:
     """Of set-points with their times, in order."""
     of = course(told)
-    near = np.diff(of.times) <= TOGETHER
-    steps = np.linalg.norm(np.diff(of.positions, axis=0), axis=1)[near]
     return Facts(
         len(told),
         all(_finite(m) for _, m in told),
-        _largest(steps),
+        _largest(steps(of)),
         _largest(np.linalg.norm(of.velocities, axis=1)),
         _largest(np.linalg.norm(of.accelerations, axis=1)),
-        int((~near).sum()),
+        int((np.diff(of.times) > TOGETHER).sum()),
         {f"0x{mask:03X}": n for mask, n in sorted(Counter(of.masks.tolist()).items())},
         {str(frame): n for frame, n in sorted(Counter(of.frames.tolist()).items())},
     )
+
+
+def steps(of: Course) -> Array:
+    """How far (n − 1,) m each position is from the one before; NaN over a gap."""
+    far: Array = np.linalg.norm(np.diff(of.positions, axis=0), axis=1)
+    far[np.diff(of.times) > TOGETHER] = np.nan
+    return far
 
 
 def apart(would: Course, sent: Course) -> Array:

@@ -13,9 +13,9 @@ from typing import Final
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.clock import Clock
+from mavlink_bridge.header import header
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.tlog import Record
-from outrider.replaying.casting import header
 from outrider.replaying.timeline import IDLE, on_one_line
 
 _NAMES = [

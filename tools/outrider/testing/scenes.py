@@ -57,7 +57,7 @@ def replayed(
 def changed(name: str, changes: dict[str, Any]) -> Scenario:
     """A scenario, by name or file, with ``changes`` merged in, mapping by mapping. InputError for what makes
     no sense."""
-    document = _merged(load(find("scenarios", name), Scenario).model_dump(), changes)
+    document = merged(load(find("scenarios", name), Scenario).model_dump(), changes)
     try:
         return Scenario.model_validate(document)
     except ValidationError as error:
@@ -65,7 +65,8 @@ def changed(name: str, changes: dict[str, Any]) -> Scenario:
         raise InputError(*(f"{name}, changed: {fault}" for fault in faults)) from None
 
 
-def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """``base`` with ``changes``, mapping by mapping."""
     result = deepcopy(base)
     for key, value in changes.items():
         inner = result.get(key)
@@ -75,6 +76,6 @@ def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
             and isinstance(value, dict)
             and value.get("kind", inner.get("kind")) == inner.get("kind")
         ):
-            value = _merged(inner, value)
+            value = merged(inner, value)
         result[key] = value
     return result

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mavlink_bridge.messages import SetpointLocal
-from outrider.replaying.setpoints import Course, Facts, course, facts
+from outrider.replaying.setpoints import Course, Facts, course, facts, steps
 from outrider.testing.golden import Golden
 
 _MEAN = 1_000_000
@@ -48,8 +48,8 @@ class Setpoints:
             raise AssertionError(
                 f"{self.name}: a set-point is not finite, {self._since(time):.2f} s after the first"
             )
-        self._below("m from one position to the next", self._steps(), step)
         of = self.course
+        self._below("m from one position to the next", np.append(0.0, steps(of)), step)
         self._below("m/s", np.linalg.norm(of.velocities, axis=1), speed)
         self._below("m/s²", np.linalg.norm(of.accelerations, axis=1), acceleration)
 
@@ -86,13 +86,6 @@ class Setpoints:
         file is written instead."""
         __tracebackhide__ = True
         self._golden.check(name, self.name, self.course, within)
-
-    def _steps(self) -> np.ndarray:
-        of = self.course
-        steps = np.linalg.norm(np.diff(of.positions, axis=0, prepend=of.positions[:1]), axis=1)
-        steps[np.diff(of.times, prepend=of.times[:1]) > 100_000] = 0.0
-        result: np.ndarray = steps
-        return result
 
     def _below(self, what: str, values: np.ndarray, bound: float | None) -> None:
         __tracebackhide__ = True

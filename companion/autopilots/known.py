@@ -1,0 +1,15 @@
+"""The autopilots that we know."""
+
+from __future__ import annotations
+
+from companion.autopilots import Profile
+from companion.autopilots.ardupilot import ARDUPILOT
+from companion.autopilots.px4 import PX4
+from mavlink_bridge.messages import Heartbeat
+
+_BY_NUMBER = {profile.autopilot: profile for profile in (ARDUPILOT, PX4)}
+
+
+def profile_of(heartbeat: Heartbeat) -> Profile | None:
+    """What the sender of ``heartbeat`` wants; None for one that is not known."""
+    return _BY_NUMBER.get(heartbeat.autopilot)
