@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import all as dialect
 
-from mavlink_bridge import fields as f
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.fields import Fields
+from mavlink_bridge.fields import flight as f
+from mavlink_bridge.fields.units import Fields, unchanged
 
 
 class Converter(NamedTuple):
@@ -104,19 +104,19 @@ TABLE: tuple[Converter, ...] = (
     _row(m.Heartbeat, 0, f.heartbeat, f.heartbeat_fields),
     _row(m.SysStatus, 1, f.sys_status, f.sys_status_fields, finite=True, size_v1=31),
     _row(m.SystemTime, 2, f.system_time, f.system_time_fields),
-    _row(m.Ping, 4, f.ping, f.unchanged),
+    _row(m.Ping, 4, f.ping, unchanged),
     _row(m.Attitude, 30, f.attitude, f.attitude_fields, finite=True),
     _row(m.LocalPosition, 32, f.local_position, f.local_position_fields, finite=True),
     _row(m.GlobalPosition, 33, f.global_position, f.global_position_fields, finite=True),
     _row(m.GpsGlobalOrigin, 49, f.origin, f.origin_fields, finite=True, size_v1=12),
     _row(m.CommandInt, 75, f.command_int, f.command_int_fields),
     _row(m.CommandLong, 76, f.command_long, f.command_long_fields),
-    _row(m.CommandAck, 77, f.command_ack, f.unchanged, size_v1=3),
+    _row(m.CommandAck, 77, f.command_ack, unchanged, size_v1=3),
     _row(m.SetpointLocal, 84, f.setpoint, f.setpoint_fields),
     _row(m.PositionTarget, 85, f.position_target, f.position_target_fields),
-    _row(m.Timesync, 111, f.timesync, f.unchanged),
+    _row(m.Timesync, 111, f.timesync, unchanged),
     _row(m.EkfStatus, 193, f.ekf_status, f.ekf_status_fields, size_v1=22),
-    _row(m.ExtendedSysState, 245, f.extended_sys_state, f.unchanged),
+    _row(m.ExtendedSysState, 245, f.extended_sys_state, unchanged),
     _row(m.StatusText, 253, f.status_text, f.status_text_fields, size_v1=51),
     _row(m.Tunnel, 385, f.tunnel, f.tunnel_fields),
 )
