@@ -29,7 +29,43 @@ from mavlink_bridge.messages.flight import (
     Timesync,
     Tunnel,
 )
+from mavlink_bridge.messages.missions import (
+    MissionAck,
+    MissionClearAll,
+    MissionCount,
+    MissionCurrent,
+    MissionItem,
+    MissionItemFloat,
+    MissionItemReached,
+    MissionRequest,
+    MissionRequestFloat,
+    MissionRequestList,
+    MissionSetCurrent,
+    MissionWritePartialList,
+)
+from mavlink_bridge.messages.services import (
+    AutopilotVersion,
+    FileTransfer,
+    HomePosition,
+    MessageInterval,
+    ParamRequestList,
+    ParamRequestRead,
+    ParamSet,
+    ParamValue,
+    RequestDataStream,
+    SetGpsGlobalOrigin,
+    SetHomePosition,
+    SetMode,
+)
 from mavlink_bridge.messages.source import Source, Vector
+from mavlink_bridge.messages.status import (
+    Altitude,
+    AttitudeQuaternion,
+    BatteryStatus,
+    EstimatorStatus,
+    GpsRaw,
+    VfrHud,
+)
 
 Message = (
     Heartbeat
@@ -50,22 +86,81 @@ Message = (
     | ExtendedSysState
     | StatusText
     | Tunnel
+    | SetMode
+    | ParamRequestRead
+    | ParamRequestList
+    | ParamValue
+    | ParamSet
+    | SetGpsGlobalOrigin
+    | RequestDataStream
+    | FileTransfer
+    | AutopilotVersion
+    | HomePosition
+    | SetHomePosition
+    | MessageInterval
+    | MissionWritePartialList
+    | MissionItemFloat
+    | MissionRequestFloat
+    | MissionSetCurrent
+    | MissionCurrent
+    | MissionRequestList
+    | MissionCount
+    | MissionClearAll
+    | MissionItemReached
+    | MissionAck
+    | MissionRequest
+    | MissionItem
+    | GpsRaw
+    | AttitudeQuaternion
+    | VfrHud
+    | Altitude
+    | BatteryStatus
+    | EstimatorStatus
 )
 
 __all__ = [
+    "Altitude",
     "Attitude",
+    "AttitudeQuaternion",
+    "AutopilotVersion",
+    "BatteryStatus",
     "CommandAck",
     "CommandInt",
     "CommandLong",
     "EkfStatus",
+    "EstimatorStatus",
     "ExtendedSysState",
+    "FileTransfer",
     "GlobalPosition",
     "GpsGlobalOrigin",
+    "GpsRaw",
     "Heartbeat",
+    "HomePosition",
     "LocalPosition",
     "Message",
+    "MessageInterval",
+    "MissionAck",
+    "MissionClearAll",
+    "MissionCount",
+    "MissionCurrent",
+    "MissionItem",
+    "MissionItemFloat",
+    "MissionItemReached",
+    "MissionRequest",
+    "MissionRequestFloat",
+    "MissionRequestList",
+    "MissionSetCurrent",
+    "MissionWritePartialList",
+    "ParamRequestList",
+    "ParamRequestRead",
+    "ParamSet",
+    "ParamValue",
     "Ping",
     "PositionTarget",
+    "RequestDataStream",
+    "SetGpsGlobalOrigin",
+    "SetHomePosition",
+    "SetMode",
     "SetpointLocal",
     "Source",
     "StatusText",
@@ -74,4 +169,5 @@ __all__ = [
     "Timesync",
     "Tunnel",
     "Vector",
+    "VfrHud",
 ]
