@@ -9,6 +9,7 @@ from typing import Final
 from sitl.autopilot_config import AutopilotConfig
 from sitl.flavours import FAILED, TEMPORARILY_REJECTED, Denial, Flavour, Mode, Status
 from sitl.guidance import Activity, Guidance
+from sitl.home import Home
 from sitl.sensors import Estimate
 from sitl.steering import Steering
 from sitl.voice import Voice
@@ -28,16 +29,16 @@ class Commander:
         guidance: Guidance,
         steering: Steering,
         estimate: Callable[[], Estimate],
-        altitude: float,
+        home: Home,
         voice: Voice,
     ) -> None:
-        """``estimate`` is the present state on demand, ``altitude`` home's (m above mean sea level)."""
+        """``estimate`` is the present state on demand."""
         self._config = config
         self._flavour = flavour
         self._guidance = guidance
         self._steering = steering
         self._estimate = estimate
-        self._altitude = altitude
+        self._home = home
         self._voice = voice
         self._takeoff_height = config.takeoff_height
         self._ready_at = 0 if config.start_height else round(config.ready_after * 1e6)
@@ -49,6 +50,11 @@ class Commander:
         self.ready = False
         self.mode = flavour.boot_mode
 
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        self._config = config
+        self._takeoff_height = config.takeoff_height
+
     def status(self, now: int) -> Status:
         """What decisions at ``now`` (µs) depend on."""
         stream = self._steering.stream
@@ -57,7 +63,7 @@ class Commander:
             self.landed,
             self.ready,
             self.mode,
-            -self._estimate().position[2],
+            -self._estimate().position[2] - self._home.height,
             self._guidance.activity is Activity.TAKEOFF,
             stream.age(now),
             stream.gap,
@@ -84,7 +90,7 @@ class Commander:
         self._postpone(now)
         self._voice.inform("Armed")
         if self.mode is Mode.TAKEOFF:
-            self._guidance.takeoff(self._takeoff_height, self._estimate().pose)
+            self._guidance.takeoff(self._takeoff_height + self._home.height, self._estimate().pose)
         return None
 
     def disarm(self, *, forced: bool) -> Denial | None:
@@ -97,13 +103,13 @@ class Commander:
 
     def take_off(self, altitude: float, relative: bool | None, now: int) -> Denial | None:
         """As NAV_TAKEOFF (22); arguments as for ``Flavour.takeoff``."""
-        verdict = self._flavour.takeoff(altitude, relative, self._altitude, self.status(now))
+        verdict = self._flavour.takeoff(altitude, relative, self._home.altitude, self.status(now))
         if isinstance(verdict, Denial):
             return verdict
         self.mode, self._takeoff_height = verdict.mode, verdict.height
         if self.armed:
             self._postpone(now)
-            self._guidance.takeoff(verdict.height, self._estimate().pose)
+            self._guidance.takeoff(verdict.height + self._home.height, self._estimate().pose)
         return None
 
     def enter(self, mode: Mode, now: int) -> Denial | None:

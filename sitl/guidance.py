@@ -39,6 +39,17 @@ class Guidance:
     """
 
     def __init__(self, config: AutopilotConfig) -> None:
+        self.configure(config)
+        self._shaper = Shaper()
+        self._heading = Heading(config.max_yaw_rate, config.max_yaw_acceleration)
+        self._setpoint = _STAY
+        self._received = 0
+        self._deadline = _FOR_EVER
+        self.activity = Activity.IDLE
+        self.timed_out = False
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
         limits = config.max_speed, config.max_acceleration, config.max_jerk
         gentle = config.gentle_acceleration, config.max_jerk
         self._config = config
@@ -48,13 +59,6 @@ class Guidance:
             Activity.HOLD: Limits(config.max_speed, *gentle),
             Activity.LAND: Limits(config.max_speed, *gentle),
         }
-        self._shaper = Shaper()
-        self._heading = Heading(config.max_yaw_rate, config.max_yaw_acceleration)
-        self._setpoint = _STAY
-        self._received = 0
-        self._deadline = _FOR_EVER
-        self.activity = Activity.IDLE
-        self.timed_out = False
 
     @property
     def position(self) -> Vector:

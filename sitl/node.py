@@ -9,24 +9,37 @@ import numpy as np
 import numpy.typing as npt
 
 from mavlink_bridge.codec import Codec
+from mavlink_bridge.converters import BY_TYPE
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, Source, Vector
+from mavlink_bridge.messages import Message, MissionCurrent, Source, Vector
 from mavlink_bridge.node import Datagram
+from sitl.airframe import hover_speeds
 from sitl.autopilot_config import AutopilotConfig
+from sitl.battery import Battery
 from sitl.commander import Commander
 from sitl.config import VehicleConfig
 from sitl.flavours import ARMED, Flavour, Mode
 from sitl.flavours.ardupilot import ArduPilot
 from sitl.flavours.px4 import Px4
 from sitl.guidance import Activity, Guidance
+from sitl.home import Home
+from sitl.homing import Homing
+from sitl.identity import version
 from sitl.orders import Orders
 from sitl.origin import Origin
+from sitl.parameters import ardupilot as ardupilot_parameters
+from sitl.parameters import px4 as px4_parameters
+from sitl.parameters.values import Values
 from sitl.plant import Plant
 from sitl.reception import Reception
+from sitl.reports import IN_AIR, LANDING, ON_GROUND, ORIGIN, TAKING_OFF, Snapshot
+from sitl.saved import Saved
 from sitl.sensors import Estimate
+from sitl.services import Services
 from sitl.setpoints import Setpoint
 from sitl.steering import Steering
-from sitl.telemetry import IN_AIR, LANDING, ON_GROUND, ORIGIN, TAKING_OFF, Snapshot, Telemetry
+from sitl.streams import usual_rates
+from sitl.telemetry import Telemetry
 from sitl.vehicle import Reference, VehicleState
 from sitl.voice import Voice
 from sitl.weather import WeatherConfig
@@ -36,8 +49,9 @@ LINK: Final = "autopilot"
 
 # MAV_COMP_ID_AUTOPILOT1
 _COMPONENT: Final = 1
-# PING, COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED, TIMESYNC
-_HEARD: Final = frozenset((4, 75, 76, 84, 111))
+# SET_MODE, PING, COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED, TIMESYNC; and the services'.
+_HEARD: Final = frozenset((4, 11, 75, 76, 84, 111))
+_TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
 _FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
 # In the air; with thrust cut it is about to be on the ground.
 _LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, Activity.IDLE: LANDING}
@@ -59,16 +73,22 @@ class Autopilot:
         site: FleetFrame,
         seed: int,
         weather: WeatherConfig | None = None,
+        saved: Saved | None = None,
     ) -> None:
         """On the ground at the configured place, which becomes the origin of its local frame, or as high
         above it as the configuration says. ``seed`` (≥ 0) with the system id for all noise. ``weather`` is
-        the air around it; without, the air stands still."""
-        self.config = config
+        the air around it; without, the air stands still. ``saved``: what it kept of an earlier time."""
+        saved = saved or Saved()
+        rotors = len(vehicle.rotors)
+        self._values = Values(_TABLES[config.flavour](rotors), config, saved.parameters)
+        self._configured = config
+        self.config = config = self._values.configured(config)
         self._source = Source(config.system_id, _COMPONENT)
         self._origin = Origin(site, config.latitude, config.longitude, config.altitude)
         self._flavour: Flavour = _FLAVOURS[config.flavour](config)
-        self._telemetry = Telemetry(config.rates, self._flavour.reports_ekf)
+        self._telemetry = Telemetry(usual_rates(config), self._flavour.reports_ekf)
         self._guidance = Guidance(config)
+        self._home = Home(self._origin)
         self._plant = Plant(
             config,
             vehicle,
@@ -87,12 +107,38 @@ class Autopilot:
             self._guidance,
             steering,
             self._plant.estimate,
-            self._origin.altitude,
+            self._home,
             voice,
         )
-        orders = Orders(self._commander, self._flavour, self._telemetry)
-        self._reception = Reception(self._source, self._outbox, voice, self._commander, orders, steering)
-        self._codec = Codec(accept=lambda message_id, _system, _component: message_id in _HEARD)
+        self._version = version(self._source, config.flavour)
+        self._battery: Battery | None = None
+        self._hovering: list[float] = hover_speeds(vehicle).tolist()
+        if config.battery is not None:
+            self._battery = Battery(config.battery, self._hovering)
+        homing = Homing(
+            self._home,
+            self._origin,
+            self._telemetry,
+            self._plant.estimate,
+            lambda: self._commander.ready,
+            voice,
+        )
+        self._services = Services(
+            self._source,
+            self._flavour,
+            self._values,
+            self._telemetry,
+            homing,
+            self._outbox,
+            voice,
+            self._configure,
+        )
+        orders = Orders(self._commander, self._flavour, self._services.commands)
+        self._reception = Reception(
+            self._source, self._outbox, voice, self._commander, orders, steering, self._services.handlers
+        )
+        heard = _HEARD | {BY_TYPE[kind].id for kind in self._services.handlers}
+        self._codec = Codec(accept=lambda message_id, _system, _component: message_id in heard)
         self._boot: int | None = None
         self._now = 0
         if config.start_height:
@@ -123,6 +169,8 @@ class Autopilot:
         self._commander.watch(self._now, self._plant.vehicle.on_ground, self._plant.sensors.gps.located)
         if self._commander.ready and not was_ready:
             self._telemetry.request(ORIGIN)
+        if self._battery is not None and self._battery.due(self._now):
+            self._battery.advance(self._now, self._plant.state.rotor_speeds.tolist())
 
     def _listen(self, datagram: Datagram) -> None:
         if datagram.link != LINK:
@@ -134,6 +182,8 @@ class Autopilot:
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
             messages = messages + self._telemetry.collect(self._now, self._snapshot())
+        if self._now >= self._services.next_due:
+            messages = messages + self._services.collect(self._now)
         if not messages:
             return []
         data = b"".join(map(self._codec.encode, messages))
@@ -163,7 +213,43 @@ class Autopilot:
             plant.sensors.gps.located,
             plant.sensors.gps.fixed,
             plant.sensors.silent(self._now),
+            self._waking(),
+            self._home,
+            None if self._battery is None else self._battery.charge,
+            self._throttle,
+            self.config.epoch,
+            self._version,
+            self._mission_current,
         )
+
+    def _waking(self) -> float:
+        """How far GPS and filter have come up, 0…1."""
+        config = self.config
+        if self._now >= config.ready_after * 1e6:
+            return 1.0
+        return self._now * 1e-6 / config.ready_after if config.startup == "in stages" else 0.0
+
+    def _throttle(self) -> float:
+        """Thrust as a part of twice what hovering takes, 0…1."""
+        speeds = self._plant.state.rotor_speeds.tolist()
+        share: float = sum(speed * speed for speed in speeds) / sum(speed * speed for speed in self._hovering)
+        return min(1.0, 0.5 * share)
+
+    def _mission_current(self) -> MissionCurrent:
+        return MissionCurrent(self._source, 0, 0xFFFF, 1, 2, 0, 0, 0)
+
+    def _configure(self) -> None:
+        """Take over the parameters that are settings, but for the system id, which counts from the next boot
+        on."""
+        changed = self._values.configured(self._configured)
+        self.config = changed.model_copy(update={"system_id": self.config.system_id})
+        for part in (self._flavour, self._guidance, self._commander):
+            part.configure(self.config)
+
+    @property
+    def saved(self) -> Saved:
+        """What there is to keep for the next boot."""
+        return Saved(parameters=self._values.changed)
 
     # Events and faults, from the next step on
 

@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Final, NamedTuple, Protocol
 
 from mavlink_bridge.messages import SetpointLocal
+from sitl.autopilot_config import AutopilotConfig
 from sitl.setpoints import Pose, Reading, Setpoint
 
 # MAV_RESULT
@@ -82,6 +83,10 @@ class Flavour(Protocol):
     """Whether POSITION_TARGET_LOCAL_NED (85) comes back with yaw."""
     shortest_interval: int
     """µs; SET_MESSAGE_INTERVAL (511) refuses less."""
+    bytewise: bool
+    """Whether integer parameters are sent as their bytes (PARAM_ENCODE_BYTEWISE)."""
+    groups_streams: bool
+    """Whether REQUEST_DATA_STREAM (66) is obeyed."""
     after_takeoff: Mode
     after_landing: Mode
     after_loss: Mode
@@ -93,12 +98,20 @@ class Flavour(Protocol):
     blind_text: str
     """STATUSTEXT (253) of that."""
 
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        ...
+
     def custom_mode(self, mode: Mode) -> int:
         """HEARTBEAT.custom_mode."""
         ...
 
     def base_mode(self, mode: Mode) -> int:
         """HEARTBEAT.base_mode without the armed bit."""
+        ...
+
+    def split(self, custom_mode: int, /) -> tuple[int, int]:
+        """``custom_mode`` as the two parameters of DO_SET_MODE."""
         ...
 
     def requested(self, main: int, sub: int, /) -> Mode | None:

@@ -70,6 +70,8 @@ class ArduPilot:
     echoes_yaw = False
     # Streams are served from the 400 Hz loop, and not faster than 80 % of it.
     shortest_interval = 3125
+    bytewise = False
+    groups_streams = True
     after_takeoff = Mode.GUIDED
     after_landing = Mode.LAND
     after_loss = Mode.GUIDED
@@ -79,6 +81,9 @@ class ArduPilot:
     blind_text = "EKF Failsafe: changed to LAND Mode"
 
     def __init__(self, config: AutopilotConfig) -> None:
+        self.configure(config)
+
+    def configure(self, config: AutopilotConfig) -> None:
         self._timeout = round(config.guided_timeout * 1e6)
 
     def custom_mode(self, mode: Mode) -> int:
@@ -87,6 +92,9 @@ class ArduPilot:
     def base_mode(self, mode: Mode) -> int:
         guided = GUIDED_FLAG if mode not in (Mode.STANDBY, Mode.POSITION) else 0
         return CUSTOM | STABILIZED | MANUAL | guided
+
+    def split(self, custom_mode: int, /) -> tuple[int, int]:
+        return custom_mode, 0
 
     def requested(self, main: int, _sub: int, /) -> Mode | None:
         return _MODES.get(main)

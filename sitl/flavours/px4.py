@@ -62,6 +62,8 @@ class Px4:
     reports_ekf = False
     echoes_yaw = True
     shortest_interval = 1000
+    bytewise = True
+    groups_streams = False
     after_takeoff = Mode.HOLD
     after_landing = Mode.HOLD
     # EKF2_NOAID_TOUT.
@@ -70,6 +72,9 @@ class Px4:
     blind_text = "Failsafe: no position, blind land"
 
     def __init__(self, config: AutopilotConfig) -> None:
+        self.configure(config)
+
+    def configure(self, config: AutopilotConfig) -> None:
         self.after_loss = _LOSS[config.offboard_loss]
         self._timeout = round(config.offboard_timeout * 1e6)
         self._takeoff_height = config.takeoff_height
@@ -82,6 +87,9 @@ class Px4:
         if mode in (Mode.STANDBY, Mode.POSITION):
             return CUSTOM | STABILIZED | MANUAL | (GUIDED_FLAG if mode is Mode.POSITION else 0)
         return CUSTOM | STABILIZED | GUIDED_FLAG | AUTO
+
+    def split(self, custom_mode: int, /) -> tuple[int, int]:
+        return custom_mode >> 16 & 0xFF, custom_mode >> 24
 
     def requested(self, main: int, sub: int, /) -> Mode | None:
         return _MODES.get((main, sub))

@@ -122,7 +122,7 @@ ASKED = [
     Asked(AP, (), (INTERVAL, 32, 2500), FAILED, "Interval refused: 2500 us is too short"),
     Asked(AP, (), (INTERVAL, 111, 100000), DENIED, "Interval refused: no message 111"),
     Asked(AP, (), (INTERVAL, NAN, NAN), DENIED, "Interval refused: not a number"),
-    Asked(AP, (), (REQUEST, 148), UNSUPPORTED, "Request refused: no message 148"),
+    Asked(AP, (), (REQUEST, 300), UNSUPPORTED, "Request refused: no message 300"),
     Asked(AP, (), (REQUEST, NAN), UNSUPPORTED, "Request refused: no message nan"),
     Asked(AP, (), (192, 0), UNSUPPORTED, "Command 192 is not supported"),
     Asked(PX4, (), (TAKEOFF, *[NAN] * 7), ACCEPTED),
