@@ -10,6 +10,8 @@ from sitl.autopilot_config import AutopilotConfig
 from sitl.flavours import FAILED, TEMPORARILY_REJECTED, Denial, Flavour, Mode, Status
 from sitl.guidance import Activity, Guidance
 from sitl.home import Home
+from sitl.journeys import MODES, Journeys
+from sitl.missions.itinerary import Event
 from sitl.sensors import Estimate
 from sitl.steering import Steering
 from sitl.voice import Voice
@@ -30,6 +32,7 @@ class Commander:
         steering: Steering,
         estimate: Callable[[], Estimate],
         home: Home,
+        journeys: Journeys,
         voice: Voice,
     ) -> None:
         """``estimate`` is the present state on demand."""
@@ -39,6 +42,7 @@ class Commander:
         self._steering = steering
         self._estimate = estimate
         self._home = home
+        self._journeys = journeys
         self._voice = voice
         self._takeoff_height = config.takeoff_height
         self._ready_at = 0 if config.start_height else round(config.ready_after * 1e6)
@@ -89,6 +93,8 @@ class Commander:
         self.armed = True
         self._postpone(now)
         self._voice.inform("Armed")
+        if self.mode in MODES:
+            self._journeys.begin(self.mode, self._estimate())
         if self.mode is Mode.TAKEOFF:
             self._guidance.takeoff(self._takeoff_height + self._home.height, self._estimate().pose)
         return None
@@ -116,7 +122,11 @@ class Commander:
         """Change to ``mode``."""
         if mode is self.mode:
             return None
-        if denial := self._flavour.mode_denial(mode, self.status(now)):
+        status = self.status(now)
+        if mode is Mode.MISSION:
+            itinerary = self._journeys.itinerary
+            status = status._replace(items=itinerary.total, takes_off=itinerary.takes_off)
+        if denial := self._flavour.mode_denial(mode, status):
             return denial
         self._switch(mode, now)
         return None
@@ -139,6 +149,8 @@ class Commander:
             self._look(now, located)
         if guidance.timed_out:
             self._lose(now)
+        elif self.mode in MODES:
+            self._journey(now)
         elif guidance.activity is Activity.TAKEOFF and guidance.reached:
             self.mode = self._flavour.after_takeoff
             guidance.settle()
@@ -147,8 +159,27 @@ class Commander:
         elif now >= self._disarm_at:
             self._stop("Disarmed: on the ground for too long")
 
+    def start_mission(self, now: int) -> Denial | None:
+        """As MISSION_START (300): enter its mode, and arm if this firmware does."""
+        denial = self.enter(Mode.MISSION, now)
+        if denial is None and self._flavour.start_arms:
+            return self.arm(now, forced=False)
+        return denial
+
+    def _journey(self, now: int) -> None:
+        event = self._journeys.advance(self.mode, now, self._estimate())
+        if event is Event.RETURNS:
+            self._switch(Mode.RETURN, now)
+        elif event is Event.FINISHED:
+            self._voice.inform("Mission finished")
+            self.mode = self._flavour.after_mission
+            self._guidance.hold()
+
     def _switch(self, mode: Mode, now: int) -> None:
         self.mode = mode
+        if self.armed and mode is Mode.MISSION:
+            self._journeys.begin(mode, self._estimate())
+            return
         if self.landed or not self.armed:
             self._guidance.idle()
             if self.armed and mode is Mode.LAND:
@@ -159,6 +190,8 @@ class Commander:
         match mode:
             case Mode.LAND:
                 self._guidance.land(self._config.land_speed)
+            case Mode.RETURN:
+                self._journeys.begin(mode, self._estimate())
             case Mode.GUIDED:
                 self._steering.resume(self._estimate().pose, now)
             case _:
@@ -204,8 +237,13 @@ class Commander:
     def _stop(self, why: str) -> None:
         self.armed = False
         self._guidance.idle()
+        self._journeys.itinerary.landed()
         if self.mode is Mode.LAND:
             self.mode = self._flavour.after_landing
+        elif self.mode is Mode.RETURN:
+            self.mode = self._flavour.after_return
+        elif self.mode is Mode.MISSION:
+            self.mode = self._flavour.after_mission
         elif self.mode is Mode.TAKEOFF:
             self.mode = self._flavour.after_takeoff
         self._voice.inform(why)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_TYPE
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, MissionCurrent, Source, Vector
+from mavlink_bridge.messages import Message, Source, Vector
 from mavlink_bridge.node import Datagram
 from sitl.airframe import hover_speeds
 from sitl.autopilot_config import AutopilotConfig
@@ -25,6 +25,10 @@ from sitl.guidance import Activity, Guidance
 from sitl.home import Home
 from sitl.homing import Homing
 from sitl.identity import version
+from sitl.journeys import Journeys
+from sitl.missions.itinerary import Itinerary
+from sitl.missions.plans import Plans
+from sitl.missions.service import MissionService
 from sitl.orders import Orders
 from sitl.origin import Origin
 from sitl.parameters import ardupilot as ardupilot_parameters
@@ -33,6 +37,7 @@ from sitl.parameters.values import Values
 from sitl.plant import Plant
 from sitl.reception import Reception
 from sitl.reports import IN_AIR, LANDING, ON_GROUND, ORIGIN, TAKING_OFF, Snapshot
+from sitl.returning import Returning
 from sitl.saved import Saved
 from sitl.sensors import Estimate
 from sitl.services import Services
@@ -101,6 +106,18 @@ class Autopilot:
         self._outbox: list[Message] = []
         voice = Voice(self._source, self._outbox)
         steering = Steering(self._flavour, self._guidance, voice)
+        self._plans = Plans(saved.plans)
+        bytewise = self._flavour.bytewise
+        itinerary = Itinerary(
+            self._plans,
+            self._guidance,
+            self._home,
+            self._origin,
+            config,
+            self._flavour.first_item,
+            lifts=bytewise,
+        )
+        self._journeys = Journeys(itinerary, Returning(self._guidance, self._home, config))
         self._commander = Commander(
             config,
             self._flavour,
@@ -108,6 +125,7 @@ class Autopilot:
             steering,
             self._plant.estimate,
             self._home,
+            self._journeys,
             voice,
         )
         self._version = version(self._source, config.flavour)
@@ -123,12 +141,23 @@ class Autopilot:
             lambda: self._commander.ready,
             voice,
         )
+        self._missions = MissionService(
+            self._source,
+            self._plans,
+            itinerary,
+            self._commander,
+            self._telemetry,
+            self._outbox,
+            voice,
+            asks_int=bytewise,
+        )
         self._services = Services(
             self._source,
             self._flavour,
             self._values,
             self._telemetry,
             homing,
+            self._missions,
             self._outbox,
             voice,
             self._configure,
@@ -179,11 +208,12 @@ class Autopilot:
             self._reception.handle(message, self._now, self._plant.estimate())
 
     def _tell(self) -> list[Datagram]:
+        self._missions.tell()
+        if self._now >= self._services.next_due:
+            self._services.work(self._now)
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
             messages = messages + self._telemetry.collect(self._now, self._snapshot())
-        if self._now >= self._services.next_due:
-            messages = messages + self._services.collect(self._now)
         if not messages:
             return []
         data = b"".join(map(self._codec.encode, messages))
@@ -219,7 +249,7 @@ class Autopilot:
             self._throttle,
             self.config.epoch,
             self._version,
-            self._mission_current,
+            self._missions.current,
         )
 
     def _waking(self) -> float:
@@ -235,21 +265,18 @@ class Autopilot:
         share: float = sum(speed * speed for speed in speeds) / sum(speed * speed for speed in self._hovering)
         return min(1.0, 0.5 * share)
 
-    def _mission_current(self) -> MissionCurrent:
-        return MissionCurrent(self._source, 0, 0xFFFF, 1, 2, 0, 0, 0)
-
     def _configure(self) -> None:
         """Take over the parameters that are settings, but for the system id, which counts from the next boot
         on."""
         changed = self._values.configured(self._configured)
         self.config = changed.model_copy(update={"system_id": self.config.system_id})
-        for part in (self._flavour, self._guidance, self._commander):
+        for part in (self._flavour, self._guidance, self._commander, self._journeys):
             part.configure(self.config)
 
     @property
     def saved(self) -> Saved:
         """What there is to keep for the next boot."""
-        return Saved(parameters=self._values.changed)
+        return Saved(parameters=self._values.changed, plans=self._plans.all)
 
     # Events and faults, from the next step on
 

@@ -20,6 +20,7 @@ from mavlink_bridge.messages import (
 from sitl import files
 from sitl.flavours import DENIED, Denial, Flavour
 from sitl.homing import Homing
+from sitl.missions.service import MissionService
 from sitl.orders import Handler, Order
 from sitl.parameters.ardupilot import STREAMS
 from sitl.parameters.protocol import ParameterProtocol
@@ -35,7 +36,7 @@ _READ, _WRITE, _RESET = 0.0, 1.0, 2.0
 
 class Services:
     """``handlers`` by type of message, ``commands`` by MAV_CMD; ``next_due`` (µs): before it there is nothing
-    to ``collect``."""
+    to do."""
 
     def __init__(
         self,
@@ -44,6 +45,7 @@ class Services:
         values: Values,
         telemetry: Telemetry,
         homing: Homing,
+        missions: MissionService,
         outbox: list[Message],
         voice: Voice,
         configure: Callable[[], None],
@@ -56,6 +58,7 @@ class Services:
         self._requests = Requests(source, flavour, telemetry, outbox)
         self._rates = dict.fromkeys(STREAMS, 0.0) if flavour.groups_streams else {}
         self._now = 0
+        self._missions = missions
         self.parameters = ParameterProtocol(
             source, values, outbox, voice, self._changed, bytewise=flavour.bytewise
         )
@@ -67,10 +70,12 @@ class Services:
             FileTransfer: self._refuse_file,
             SetHomePosition: homing.set_home,
             SetGpsGlobalOrigin: homing.set_origin,
+            **missions.handlers,
         }
         self.commands: dict[int, Handler] = {
             **self._requests.commands,
             **homing.commands,
+            **missions.commands,
             STORAGE: self._store,
         }
         self._stream(0)
@@ -78,11 +83,13 @@ class Services:
     @property
     def next_due(self) -> int:
         """µs."""
-        return self.parameters.next_due
+        return min(self.parameters.next_due, self._missions.transfer.next_due)
 
-    def collect(self, now: int) -> list[Message]:
-        """All that is due at ``now`` (µs)."""
-        return self.parameters.collect(now) if now >= self.parameters.next_due else []
+    def work(self, now: int) -> None:
+        """Do what is due at ``now`` (µs)."""
+        for part in (self.parameters, self._missions.transfer):
+            if now >= part.next_due:
+                part.work(now)
 
     def _set_parameter(self, message: ParamSet, now: int) -> None:
         self._now = now

@@ -39,11 +39,15 @@ class Mode(Enum):
     GUIDED = "guided"
     TAKEOFF = "takeoff"
     LAND = "land"
+    MISSION = "mission"
+    RETURN = "return"
 
 
 class Status(NamedTuple):
     """What a decision may depend on. ``height`` (m) above home. ``stream_age`` and ``stream_gap`` (s): since
-    the last usable set-point, and between it and the one before it (0 when it is the first of its stream)."""
+    the last usable set-point, and between it and the one before it (0 when it is the first of its stream).
+    ``items``, ``takes_off``: how many items the mission has, and whether it begins with a takeoff; told when
+    its mode is asked for."""
 
     armed: bool
     landed: bool
@@ -53,6 +57,8 @@ class Status(NamedTuple):
     taking_off: bool
     stream_age: float
     stream_gap: float
+    items: int = 0
+    takes_off: bool = False
 
 
 class Takeoff(NamedTuple):
@@ -89,6 +95,13 @@ class Flavour(Protocol):
     """Whether REQUEST_DATA_STREAM (66) is obeyed."""
     after_takeoff: Mode
     after_landing: Mode
+    after_return: Mode
+    after_mission: Mode
+    """The mode when the last item is done."""
+    first_item: int
+    """The first item of a mission that is flown: ArduPilot keeps home as item 0."""
+    start_arms: bool
+    """Whether MISSION_START (300) arms."""
     after_loss: Mode
     """The mode when set-points time out."""
     coasting: float

@@ -28,7 +28,7 @@ _NEVER: Final = 1 << 62
 
 
 class ParameterProtocol:
-    """Shows and sets ``values``. ``next_due`` (µs): before it there is nothing to ``collect``.
+    """Shows and sets ``values``. ``next_due`` (µs): before it there is no ``work``.
 
     A value that is refused is answered with the old one, and with STATUSTEXT (253). ArduPilot says no number
     with what it was asked for by name; PX4 does, and has the hash.
@@ -68,11 +68,11 @@ class ParameterProtocol:
             case ParamSet():
                 self._set(message, now)
 
-    def collect(self, now: int) -> list[Message]:
-        """The next part of the list."""
+    def work(self, now: int) -> None:
+        """Send the next part of the list."""
         first, self._next = self._next, min(self._next + _BURST, len(self._values))
         self.next_due = now + _PAUSE if self._next < len(self._values) else _NEVER
-        return [self._value(number) for number in range(first, self._next)]
+        self._outbox += [self._value(number) for number in range(first, self._next)]
 
     def _read(self, message: ParamRequestRead) -> None:
         if message.number >= 0:

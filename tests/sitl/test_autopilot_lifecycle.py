@@ -129,7 +129,7 @@ ASKED = [
     Asked(PX4, (ARMED,), (TAKEOFF, *[NAN] * 7), ACCEPTED),
     Asked(PX4, (ARMED,), (SET_MODE, 1, 4, 2), ACCEPTED),
     Asked(PX4, (ARMED,), (SET_MODE, 1, 4, 3), ACCEPTED),
-    Asked(PX4, (), (SET_MODE, 1, 4, 4), DENIED, "Mode refused: 4, 4 is not known"),
+    Asked(PX4, (), (SET_MODE, 1, 4, 8), DENIED, "Mode refused: 4, 8 is not known"),
     Asked(PX4, (ARMED,), (SET_MODE, 1, 6), REJECTED, "OFFBOARD needs set-points at more than 2 Hz"),
     Asked(PX4, (), (TAKEOFF, 0, 0, 0, 0, 0, 0, math.inf), DENIED, "Takeoff altitude is not finite"),
     Asked(PX4, ((LAND,),), ARMED, ACCEPTED),
