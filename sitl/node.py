@@ -18,6 +18,7 @@ from sitl.autopilot_config import AutopilotConfig
 from sitl.battery import Battery
 from sitl.commander import Commander
 from sitl.config import VehicleConfig
+from sitl.failures import Failures
 from sitl.flavours import ARMED, Flavour, Mode
 from sitl.flavours.ardupilot import ArduPilot
 from sitl.flavours.px4 import Px4
@@ -158,6 +159,7 @@ class Autopilot:
             self._telemetry,
             homing,
             self._missions,
+            Failures(self._plant, self._battery, lambda: self.config),
             self._outbox,
             voice,
             self._configure,

@@ -18,6 +18,7 @@ from mavlink_bridge.messages import (
     Source,
 )
 from sitl import files
+from sitl.failures import Failures
 from sitl.flavours import DENIED, Denial, Flavour
 from sitl.homing import Homing
 from sitl.missions.service import MissionService
@@ -46,6 +47,7 @@ class Services:
         telemetry: Telemetry,
         homing: Homing,
         missions: MissionService,
+        failures: Failures,
         outbox: list[Message],
         voice: Voice,
         configure: Callable[[], None],
@@ -76,6 +78,7 @@ class Services:
             **self._requests.commands,
             **homing.commands,
             **missions.commands,
+            **failures.commands,
             STORAGE: self._store,
         }
         self._stream(0)

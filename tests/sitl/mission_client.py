@@ -13,6 +13,9 @@ JUMP, SPEED = 177, 178
 RELATIVE, MISSION_FRAME = 6, 2
 
 
+SAID = ("seq", "command", "frame", "autocontinue", "param1", "param2", "param3", "param4", "x", "y", "z")
+
+
 class Way(NamedTuple):
     """An item as a test writes it."""
 
@@ -81,9 +84,4 @@ def download(client: Client, of: int = 0) -> list[Any]:
 
 def ways(items: list[Any]) -> list[str]:
     """What items say, so that a NaN is equal to itself."""
-    return [
-        repr(
-            (m.command, m.frame, m.param1, m.param2, m.param3, m.param4, m.x, m.y, m.z, m.autocontinue, m.seq)
-        )
-        for m in items
-    ]
+    return [repr([getattr(m, name) for name in SAID]) for m in items]

@@ -249,36 +249,23 @@ def test_plans_have_names_that_say_whether_they_changed():
     assert 0 not in names[:3]
 
 
+kinds, numbers = st.integers(0, 3), st.integers(0, 9)
+any_way = st.sampled_from([*SQUARE, *FENCE, *RALLY, Way(DELAY), Way(LAND)])
+us = st.just(11), st.just(1)
 messages: st.SearchStrategy[Any] = st.one_of(
-    st.builds(count, st.integers(0, 5), st.integers(0, 3)),
-    st.builds(
-        item,
-        st.sampled_from([*SQUARE, *FENCE, *RALLY, Way(DELAY), Way(LAND)]),
-        st.integers(0, 5),
-        st.integers(0, 3),
-    ),
-    st.builds(dialect.MAVLink_mission_request_list_message, st.just(11), st.just(1), st.integers(0, 3)),
-    st.builds(
-        dialect.MAVLink_mission_request_int_message,
-        st.just(11),
-        st.just(1),
-        st.integers(0, 9),
-        st.integers(0, 3),
-    ),
-    st.builds(
-        dialect.MAVLink_mission_ack_message, st.just(11), st.just(1), st.integers(0, 15), st.integers(0, 3)
-    ),
-    st.builds(
-        dialect.MAVLink_mission_clear_all_message, st.just(11), st.just(1), st.sampled_from((0, 1, 2, 5, 255))
-    ),
-    st.builds(dialect.MAVLink_mission_set_current_message, st.just(11), st.just(1), st.integers(0, 9)),
+    st.builds(count, st.integers(0, 5), kinds),
+    st.builds(item, any_way, st.integers(0, 5), kinds),
+    st.builds(dialect.MAVLink_mission_request_list_message, *us, kinds),
+    st.builds(dialect.MAVLink_mission_request_int_message, *us, numbers, kinds),
+    st.builds(dialect.MAVLink_mission_ack_message, *us, st.integers(0, 15), kinds),
+    st.builds(dialect.MAVLink_mission_clear_all_message, *us, st.sampled_from((0, 1, 2, 5, 255))),
+    st.builds(dialect.MAVLink_mission_set_current_message, *us, numbers),
     st.builds(
         dialect.MAVLink_mission_write_partial_list_message,
-        st.just(11),
-        st.just(1),
+        *us,
         st.integers(-3, 4),
         st.integers(-3, 6),
-        st.integers(0, 3),
+        kinds,
     ),
 )
 
