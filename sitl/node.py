@@ -1,4 +1,7 @@
-"""The emulated autopilot as a node: datagrams in, datagrams out, physics in between."""
+"""The emulated autopilot as a node: datagrams in, datagrams out, physics in between.
+
+A longer module as it is where the parts are put together.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +22,13 @@ from sitl.battery import Battery
 from sitl.commander import Commander
 from sitl.config import VehicleConfig
 from sitl.failures import Failures
-from sitl.flavours import ARMED, Flavour, Mode
+from sitl.flavours import Flavour, Mode
 from sitl.flavours.ardupilot import ArduPilot
 from sitl.flavours.px4 import Px4
-from sitl.guidance import Activity, Guidance
+from sitl.gauges import Gauges
+from sitl.guidance import Guidance
 from sitl.home import Home
 from sitl.homing import Homing
-from sitl.identity import version
 from sitl.journeys import Journeys
 from sitl.missions.itinerary import Itinerary
 from sitl.missions.plans import Plans
@@ -37,12 +40,11 @@ from sitl.parameters import px4 as px4_parameters
 from sitl.parameters.values import Values
 from sitl.plant import Plant
 from sitl.reception import Reception
-from sitl.reports import IN_AIR, LANDING, ON_GROUND, ORIGIN, TAKING_OFF, Snapshot
+from sitl.reports import ORIGIN
 from sitl.returning import Returning
 from sitl.saved import Saved
 from sitl.sensors import Estimate
 from sitl.services import Services
-from sitl.setpoints import Setpoint
 from sitl.steering import Steering
 from sitl.streams import usual_rates
 from sitl.telemetry import Telemetry
@@ -59,8 +61,6 @@ _COMPONENT: Final = 1
 _HEARD: Final = frozenset((4, 11, 75, 76, 84, 111))
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
 _FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
-# In the air; with thrust cut it is about to be on the ground.
-_LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, Activity.IDLE: LANDING}
 
 
 class Autopilot:
@@ -116,7 +116,7 @@ class Autopilot:
             self._origin,
             config,
             self._flavour.first_item,
-            lifts=bytewise,
+            px4=bytewise,
         )
         self._journeys = Journeys(itinerary, Returning(self._guidance, self._home, config))
         self._commander = Commander(
@@ -129,11 +129,9 @@ class Autopilot:
             self._journeys,
             voice,
         )
-        self._version = version(self._source, config.flavour)
-        self._battery: Battery | None = None
-        self._hovering: list[float] = hover_speeds(vehicle).tolist()
+        self._battery = None
         if config.battery is not None:
-            self._battery = Battery(config.battery, self._hovering)
+            self._battery = Battery(config.battery, hover_speeds(vehicle).tolist())
         homing = Homing(
             self._home,
             self._origin,
@@ -163,6 +161,19 @@ class Autopilot:
             self._outbox,
             voice,
             self._configure,
+        )
+        self._gauges = Gauges(
+            config,
+            vehicle,
+            self._source,
+            self._origin,
+            self._home,
+            self._flavour,
+            self._commander,
+            self._guidance,
+            self._plant,
+            self._battery,
+            self._missions.current,
         )
         orders = Orders(self._commander, self._flavour, self._services.commands)
         self._reception = Reception(
@@ -215,64 +226,19 @@ class Autopilot:
             self._services.work(self._now)
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
-            messages = messages + self._telemetry.collect(self._now, self._snapshot())
+            messages = messages + self._telemetry.collect(self._now, self._gauges.read(self._now))
         if not messages:
             return []
         data = b"".join(map(self._codec.encode, messages))
         self._outbox.clear()
         return [Datagram(LINK, data)]
 
-    def _target(self) -> Setpoint | None:
-        guidance = self._guidance
-        return guidance.wanted(self._now) if guidance.activity is Activity.TRACK else None
-
-    def _snapshot(self) -> Snapshot:
-        commander, flavour, plant = self._commander, self._flavour, self._plant
-        return Snapshot(
-            self._source,
-            self._now,
-            plant.estimate(),
-            self._origin,
-            commander.ready,
-            commander.armed,
-            len(plant.vehicle.config.rotors),
-            flavour.autopilot,
-            flavour.base_mode(commander.mode) | (ARMED if commander.armed else 0),
-            flavour.custom_mode(commander.mode),
-            ON_GROUND if commander.landed else _LANDED_STATES.get(self._guidance.activity, IN_AIR),
-            self._target,
-            flavour.echoes_yaw,
-            plant.sensors.gps.located,
-            plant.sensors.gps.fixed,
-            plant.sensors.silent(self._now),
-            self._waking(),
-            self._home,
-            None if self._battery is None else self._battery.charge,
-            self._throttle,
-            self.config.epoch,
-            self._version,
-            self._missions.current,
-        )
-
-    def _waking(self) -> float:
-        """How far GPS and filter have come up, 0…1."""
-        config = self.config
-        if self._now >= config.ready_after * 1e6:
-            return 1.0
-        return self._now * 1e-6 / config.ready_after if config.startup == "in stages" else 0.0
-
-    def _throttle(self) -> float:
-        """Thrust as a part of twice what hovering takes, 0…1."""
-        speeds = self._plant.state.rotor_speeds.tolist()
-        share: float = sum(speed * speed for speed in speeds) / sum(speed * speed for speed in self._hovering)
-        return min(1.0, 0.5 * share)
-
     def _configure(self) -> None:
         """Take over the parameters that are settings, but for the system id, which counts from the next boot
         on."""
         changed = self._values.configured(self._configured)
         self.config = changed.model_copy(update={"system_id": self.config.system_id})
-        for part in (self._flavour, self._guidance, self._commander, self._journeys):
+        for part in (self._flavour, self._guidance, self._commander, self._journeys, self._gauges):
             part.configure(self.config)
 
     @property

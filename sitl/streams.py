@@ -12,6 +12,7 @@ from sitl.autopilot_config import AutopilotConfig, TelemetryRates
 _ARDUPILOT: Final = TelemetryRates(
     sys_status=2.0,
     attitude=4.0,
+    attitude_quaternion=4.0,
     local_position=4.0,
     global_position=4.0,
     gps_global_origin=0.0,

@@ -74,17 +74,18 @@ class Itinerary:
         config: AutopilotConfig,
         first: int,
         *,
-        lifts: bool,
+        px4: bool,
     ) -> None:
-        """``first``: item 0 is home for ArduPilot. ``lifts``: a mission that begins on the ground without a
-        takeoff takes off all the same, as with PX4."""
+        """``first``: item 0 is home for ArduPilot. ``px4``: a mission that begins on the ground without a
+        takeoff takes off all the same, and a waypoint may say its own radius (parameter 2) and heading
+        (4)."""
         self._plans = plans
         self._guidance = guidance
         self._home = home
         self._origin = origin
         self._config = config
         self._first = first
-        self._lifts = lifts
+        self._px4 = px4
         self._speed: float | None = None
         self._jumps: dict[int, int] = {}
         self._until = 0
@@ -185,7 +186,7 @@ class Itinerary:
 
     def _depart(self, item: Item, here: Estimate) -> Event | None:
         guidance = self._guidance
-        if guidance.activity is Activity.IDLE and (self._lifts or item.command == TAKEOFF):
+        if guidance.activity is Activity.IDLE and (self._px4 or item.command == TAKEOFF):
             height = self._config.takeoff_height + self._home.height
             if item.command == TAKEOFF:
                 height = max(self._height(item), 0.1)
@@ -242,7 +243,11 @@ class Itinerary:
         if item.command == LAND:
             # It sinks from the height that it has.
             return math.dist(here.position[:2], self._target[:2]) <= min(0.3, self._config.acceptance_radius)
-        return math.dist(here.position, self._target) <= self._config.acceptance_radius
+        return math.dist(here.position, self._target) <= self._radius(item)
+
+    def _radius(self, item: Item) -> float:
+        own = item.params[1] if self._px4 and item.command == WAYPOINT else 0.0
+        return own if 0.0 < own < math.inf else self._config.acceptance_radius
 
     def _height(self, item: Item) -> float:
         """m above the origin."""
@@ -274,7 +279,7 @@ class Itinerary:
 
     def _yaw(self, item: Item, here: Estimate) -> float | None:
         """rad: to where it flies, or as PX4's parameter 4 says (degrees)."""
-        if self._lifts and math.isfinite(item.params[3]) and item.command != LAND:
+        if self._px4 and math.isfinite(item.params[3]) and item.command != LAND:
             return math.radians(item.params[3])
         north, east = self._target[0] - here.position[0], self._target[1] - here.position[1]
         return math.atan2(east, north) if math.hypot(north, east) > _NEAR else None

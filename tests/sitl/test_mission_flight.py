@@ -139,6 +139,18 @@ def test_it_waits_as_long_as_it_is_told(flavour, pause):
     assert times[first + 2] - times[first + 1] == pytest.approx(4e6, abs=1e5)
 
 
+def test_a_radius_of_its_own_counts_with_px4():
+    """The larger one lets it turn off earlier."""
+    turned = []
+    for radius in (0.5, 6.0):
+        client = ready("px4", at(0, 0, 5, TAKEOFF), at(15, 0, 5, WAYPOINT, 0.0, radius), at(15, 15, 5))
+        take_off_by_mission(client)
+        track = fly(client, 25.0)
+        turned.append(track[track[:, 1] > 1.0][0, 0])
+    assert turned[0] > 14.0
+    assert turned[1] < 13.0
+
+
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_loiter_without_end_has_none(flavour):
     client = ready(flavour, at(0, 0, 5, TAKEOFF), at(8, 0, 5, LOITER_UNLIM), at(20, 0, 5))
