@@ -22,6 +22,8 @@ from sitl.setpoints import Setpoint
 
 # In the air; with thrust cut it is about to be on the ground.
 _LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, Activity.IDLE: LANDING}
+# MAV_SYS_STATUS_GEOFENCE: MAVProxy takes a bit that is not set for a breach, as ArduPilot sets it always.
+_GEOFENCE: Final = 0x100000
 
 
 class Gauges:
@@ -54,6 +56,8 @@ class Gauges:
         self._version = version(source, config.flavour)
         self._rotors = len(vehicle.rotors)
         self._hovering = _squares(hover_speeds(vehicle).tolist())
+        told = config.streams == "normal" and config.flavour == "ardupilot"
+        self._unbreached = _GEOFENCE if told else 0
         self._now = 0
 
     def configure(self, config: AutopilotConfig) -> None:
@@ -85,6 +89,7 @@ class Gauges:
             self._home,
             None if self._battery is None else self._battery.charge,
             self._throttle,
+            self._unbreached,
             self._config.epoch,
             self._version,
             self._mission,

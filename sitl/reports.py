@@ -70,8 +70,9 @@ class Snapshot(NamedTuple):
     gives the set-point that is followed now, None when there is none. ``located``: the estimator has a
     position or waits for its first; ``fixed``: there is GPS; ``silent``: position messages fail to come.
     ``waking`` 0…1: how far GPS and filter have come up, if that is shown; ``charge`` None without a battery;
-    ``throttle`` 0…1; ``epoch``: Unix time of the boot (µs), 0 if nobody knows; ``version`` is what
-    AUTOPILOT_VERSION says; ``mission`` gives MISSION_CURRENT."""
+    ``throttle`` 0…1; ``unbreached``: MAV_SYS_STATUS_GEOFENCE where it is told; ``epoch``: Unix time of the
+    boot (µs), 0 if nobody knows; ``version`` is what AUTOPILOT_VERSION says; ``mission`` gives
+    MISSION_CURRENT."""
 
     source: Source
     time: int
@@ -93,6 +94,7 @@ class Snapshot(NamedTuple):
     home: Home
     charge: Charge | None
     throttle: Callable[[], float]
+    unbreached: int
     epoch: int
     version: AutopilotVersion
     mission: Callable[[], MissionCurrent]
@@ -107,7 +109,7 @@ def heartbeat(s: Snapshot) -> Message:
 
 def sys_status(s: Snapshot) -> Message:
     known = _SENSORS | _GPS | _PREARM
-    health = (known if s.ready else _SENSORS) & ~(0 if s.fixed else _GPS)
+    health = (known if s.ready else _SENSORS) & ~(0 if s.fixed else _GPS) | s.unbreached
     if s.charge is None:
         return SysStatus(s.source, known, known, health, None, None)
     known |= _BATTERY

@@ -155,6 +155,12 @@ def test_normal_streams_are_what_ground_stations_live_on(flavour):
     assert ("ESTIMATOR_STATUS" in heard) == ("ALTITUDE" in heard) == (flavour == "px4")
 
 
+def test_no_fence_is_breached():
+    client = Client(Rig("ardupilot", streams="normal"))
+    client.wait(2.0)
+    assert all(m.onboard_control_sensors_health & 0x100000 for m in client.of("SYS_STATUS"))
+
+
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_quiet_ones_say_no_more_than_before(flavour):
     client = Client(Rig(flavour))
