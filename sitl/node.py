@@ -181,6 +181,9 @@ class Autopilot:
         )
         heard = _HEARD | {BY_TYPE[kind].id for kind in self._services.handlers}
         self._codec = Codec(accept=lambda message_id, _system, _component: message_id in heard)
+        # What nearly every step finds empty and undue is looked at here, not asked for.
+        self._reached = itinerary.reached
+        self._work_due = self._services.next_due
         self._boot: int | None = None
         self._now = 0
         if config.start_height:
@@ -219,11 +222,14 @@ class Autopilot:
             return
         for message in self._codec.feed(datagram.data):
             self._reception.handle(message, self._now, self._plant.estimate())
+        self._work_due = self._services.next_due
 
     def _tell(self) -> list[Datagram]:
-        self._missions.tell()
-        if self._now >= self._services.next_due:
+        if self._reached:
+            self._missions.tell()
+        if self._now >= self._work_due:
             self._services.work(self._now)
+            self._work_due = self._services.next_due
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
             messages = messages + self._telemetry.collect(self._now, self._gauges.read(self._now))
