@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from mavlink_bridge.converters import BY_ID, BY_TYPE, Converter
 from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.fields import TEXT_LENGTH, text_chunks
+from mavlink_bridge.fields.flight import TEXT_LENGTH, text_chunks
 from mavlink_bridge.framing import Framer, frame_v1, frame_v2
 from mavlink_bridge.messages import Message, Source, StatusText
 

@@ -16,10 +16,13 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import all as dialect
 
-from mavlink_bridge import fields as f
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.fields import Fields
+from mavlink_bridge.fields import flight as f
+from mavlink_bridge.fields import missions as w
+from mavlink_bridge.fields import services as p
+from mavlink_bridge.fields import status as q
+from mavlink_bridge.fields.units import Fields, unchanged
 
 
 class Converter(NamedTuple):
@@ -74,18 +77,38 @@ class Converter(NamedTuple):
         return EncodeError(f"{self.name}: {message} cannot be packed")
 
 
+def _spelt_out(code: str) -> str:
+    """A struct's code for each value of a field: ``4f`` is four of them, ``16s`` is one."""
+    return code if code.endswith("s") else code[-1] * int(code[:-1] or 1)
+
+
+def _plain(message: type[Any]) -> Callable[[m.Source, Fields], Any]:
+    """For messages that have their fields in wire order and in MAVLink's units."""
+    return lambda source, fields: message(source, *fields)
+
+
 def _row(
     message: type[m.Message],
     message_id: int,
     decode: Callable[[m.Source, Fields], m.Message | None],
-    encode: Callable[[Any], Fields],
+    encode: Callable[[Any], Fields] = unchanged,
     *,
     finite: bool = False,
     size_v1: int | None = None,
+    layout: str | None = None,
+    more: tuple[str, ...] = (),
 ) -> Converter:
-    """``size_v1`` has to be said where there are extension fields: the generated classes do not mark them."""
+    """``size_v1`` has to be said where there are extension fields: the generated classes do not mark them.
+    ``layout`` instead of the dialect's, with ``more`` extension fields that it lacks."""
     kind = dialect.mavlink_map[message_id]
-    struct = Struct(re.sub(r"(\d+)B", r"\1s", kind.unpacker.format))
+    fields = re.findall(r"\d*[a-zA-Z]", re.sub(r"(\d+)B", r"\1s", layout or kind.unpacker.format))
+    codes = [_spelt_out(field) for field in fields]
+    names = [
+        name
+        for name, code in zip((*kind.ordered_fieldnames, *more), codes, strict=True)
+        for _ in re.findall(r"\d*[a-zA-Z]", code)
+    ]
+    struct = Struct("<" + "".join(codes))
     return Converter(
         message,
         message_id,
@@ -93,7 +116,7 @@ def _row(
         bytes((kind.crc_extra,)),
         struct,
         struct.size if size_v1 is None else size_v1,
-        tuple(kind.ordered_fieldnames),
+        tuple(names),
         decode,
         encode,
         finite,
@@ -104,19 +127,64 @@ TABLE: tuple[Converter, ...] = (
     _row(m.Heartbeat, 0, f.heartbeat, f.heartbeat_fields),
     _row(m.SysStatus, 1, f.sys_status, f.sys_status_fields, finite=True, size_v1=31),
     _row(m.SystemTime, 2, f.system_time, f.system_time_fields),
-    _row(m.Ping, 4, f.ping, f.unchanged),
+    _row(m.Ping, 4, f.ping, unchanged),
+    _row(m.SetMode, 11, _plain(m.SetMode)),
+    _row(m.ParamRequestRead, 20, p.param_request_read, p.param_request_read_fields),
+    _row(m.ParamRequestList, 21, _plain(m.ParamRequestList)),
+    # A value is four bytes: a float changes those that look like a signalling NaN.
+    _row(m.ParamValue, 22, p.param_value, p.param_value_fields, layout="<4sHH16sB"),
+    _row(m.ParamSet, 23, p.param_set, p.param_set_fields, layout="<4sBB16sB"),
+    _row(m.GpsRaw, 24, q.gps_raw, q.gps_raw_fields, size_v1=30),
     _row(m.Attitude, 30, f.attitude, f.attitude_fields, finite=True),
+    _row(
+        m.AttitudeQuaternion,
+        31,
+        q.attitude_quaternion,
+        q.attitude_quaternion_fields,
+        finite=True,
+        size_v1=32,
+    ),
     _row(m.LocalPosition, 32, f.local_position, f.local_position_fields, finite=True),
     _row(m.GlobalPosition, 33, f.global_position, f.global_position_fields, finite=True),
+    _row(m.MissionWritePartialList, 38, _plain(m.MissionWritePartialList), size_v1=6),
+    _row(m.MissionItemFloat, 39, w.item_float, w.item_fields, size_v1=37),
+    _row(m.MissionRequestFloat, 40, _plain(m.MissionRequestFloat), size_v1=4),
+    _row(m.MissionSetCurrent, 41, _plain(m.MissionSetCurrent)),
+    _row(
+        m.MissionCurrent,
+        42,
+        _plain(m.MissionCurrent),
+        size_v1=2,
+        layout="<HHBBIII",
+        more=("mission_id", "fence_id", "rally_points_id"),
+    ),
+    _row(m.MissionRequestList, 43, _plain(m.MissionRequestList), size_v1=2),
+    _row(m.MissionCount, 44, _plain(m.MissionCount), size_v1=4, layout="<HBBBI", more=("opaque_id",)),
+    _row(m.MissionClearAll, 45, _plain(m.MissionClearAll), size_v1=2),
+    _row(m.MissionItemReached, 46, _plain(m.MissionItemReached)),
+    _row(m.MissionAck, 47, _plain(m.MissionAck), size_v1=3, layout="<BBBBI", more=("opaque_id",)),
+    _row(m.SetGpsGlobalOrigin, 48, p.set_origin, p.set_origin_fields, size_v1=13),
     _row(m.GpsGlobalOrigin, 49, f.origin, f.origin_fields, finite=True, size_v1=12),
+    _row(m.MissionRequest, 51, _plain(m.MissionRequest), size_v1=4),
+    _row(m.RequestDataStream, 66, _plain(m.RequestDataStream)),
+    _row(m.MissionItem, 73, w.item, w.item_fields, size_v1=37),
+    _row(m.VfrHud, 74, q.vfr_hud, q.vfr_hud_fields, finite=True),
     _row(m.CommandInt, 75, f.command_int, f.command_int_fields),
     _row(m.CommandLong, 76, f.command_long, f.command_long_fields),
-    _row(m.CommandAck, 77, f.command_ack, f.unchanged, size_v1=3),
+    _row(m.CommandAck, 77, f.command_ack, unchanged, size_v1=3),
     _row(m.SetpointLocal, 84, f.setpoint, f.setpoint_fields),
     _row(m.PositionTarget, 85, f.position_target, f.position_target_fields),
-    _row(m.Timesync, 111, f.timesync, f.unchanged),
+    _row(m.FileTransfer, 110, _plain(m.FileTransfer), p.file_transfer_fields),
+    _row(m.Timesync, 111, f.timesync, unchanged),
+    _row(m.Altitude, 141, _plain(m.Altitude)),
+    _row(m.BatteryStatus, 147, q.battery_status, q.battery_status_fields, size_v1=36),
+    _row(m.AutopilotVersion, 148, _plain(m.AutopilotVersion), size_v1=60),
     _row(m.EkfStatus, 193, f.ekf_status, f.ekf_status_fields, size_v1=22),
-    _row(m.ExtendedSysState, 245, f.extended_sys_state, f.unchanged),
+    _row(m.EstimatorStatus, 230, _plain(m.EstimatorStatus)),
+    _row(m.HomePosition, 242, p.home, p.home_fields, size_v1=52),
+    _row(m.SetHomePosition, 243, p.set_home, p.home_fields, size_v1=53),
+    _row(m.MessageInterval, 244, _plain(m.MessageInterval)),
+    _row(m.ExtendedSysState, 245, f.extended_sys_state, unchanged),
     _row(m.StatusText, 253, f.status_text, f.status_text_fields, size_v1=51),
     _row(m.Tunnel, 385, f.tunnel, f.tunnel_fields),
 )

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from sitl.battery import BatteryConfig
 from sitl.profiles import ProfileName
 
 Rate = Annotated[float, Field(ge=0.0, le=1000.0)]
@@ -31,6 +32,15 @@ class TelemetryRates(BaseModel):
     position_target: Rate = 10.0
     extended_sys_state: Rate = 2.0
     ekf_status: Rate = 1.0
+    system_time: Rate = 0.0
+    gps_raw: Rate = 0.0
+    attitude_quaternion: Rate = 0.0
+    mission_current: Rate = 0.0
+    vfr_hud: Rate = 0.0
+    battery_status: Rate = 0.0
+    home_position: Rate = 0.0
+    altitude: Rate = 0.0
+    estimator_status: Rate = 0.0
 
 
 class AutopilotConfig(BaseModel):
@@ -45,6 +55,9 @@ class AutopilotConfig(BaseModel):
     altitude: FiniteFloat = Field(0.0, description="of the ground at the start, m above mean sea level")
     yaw: FiniteFloat = Field(0.0, description="at the start, clockwise from north")
     rates: TelemetryRates = TelemetryRates()
+    streams: Literal["quiet", "normal"] = Field(
+        "quiet", description="quiet: ``rates``, what companions need; normal: what ground stations expect"
+    )
     sensors: ProfileName = Field("truth", description="how good its estimate is: truth, rtk or gnss")
     start_height: float = Field(
         0.0,
@@ -54,6 +67,11 @@ class AutopilotConfig(BaseModel):
     )
 
     ready_after: Seconds = Field(1.0, description="from boot until position is known and arming is allowed")
+    startup: Literal["at once", "in stages"] = Field(
+        "at once", description="whether GPS and estimator are seen to come up before ``ready_after``"
+    )
+    epoch: int = Field(0, ge=0, description="Unix time of the boot (µs); 0: it does not know the time")
+    battery: BatteryConfig | None = Field(None, description="none: its state is not told")
     disarm_delay: Seconds = Field(10.0, description="armed on the ground for this long: disarmed again")
     touchdown_time: Seconds = Field(0.5, description="on the ground for this long: landed")
 
@@ -67,11 +85,26 @@ class AutopilotConfig(BaseModel):
     max_yaw_rate: Positive = math.radians(180.0)
     max_yaw_acceleration: Positive = Field(2.4, description="the firefly's yaw torque gives 2.5 rad/s²")
 
+    waypoint_speed: Positive = Field(5.0, description="in missions and on the way home, norm")
+    waypoint_climb: Positive = 2.5
+    waypoint_sink: Positive = 1.5
+    acceptance_radius: Positive = Field(2.0, description="a waypoint is reached this near")
+    return_height: float = Field(
+        15.0, ge=0.0, le=3000.0, description="above home, at least, on the way home (m)"
+    )
+    return_pause: float = Field(
+        2.0, ge=-1.0, le=86400.0, description="above home before landing; negative: it stays there (s)"
+    )
+
     guided_timeout: Seconds = Field(3.0, description="ArduPilot's GUID_TIMEOUT")
     offboard_timeout: Seconds = Field(1.0, description="PX4's COM_OF_LOSS_T")
-    offboard_loss: Literal["hold", "land", "descend"] = Field(
+    offboard_loss: Literal["hold", "land", "return", "descend"] = Field(
         "hold",
-        description="PX4's COM_OBL_RC_ACT: hold 5; land 4; descend 0, PX4's default, which without RC sinks",
+        description="PX4's COM_OBL_RC_ACT: hold 5; land 4; return 3; descend 0, its default, which without RC"
+        " sinks",
+    )
+    failures: Literal["refused", "obeyed"] = Field(
+        "refused", description="MAV_CMD_INJECT_FAILURE; PX4's SYS_FAILURE_EN"
     )
     thrusting: Seconds = Field(
         1.0,

@@ -9,6 +9,9 @@ from typing import Final
 from sitl.autopilot_config import AutopilotConfig
 from sitl.flavours import FAILED, TEMPORARILY_REJECTED, Denial, Flavour, Mode, Status
 from sitl.guidance import Activity, Guidance
+from sitl.home import Home
+from sitl.journeys import MODES, Journeys
+from sitl.missions.itinerary import Event
 from sitl.sensors import Estimate
 from sitl.steering import Steering
 from sitl.voice import Voice
@@ -28,16 +31,18 @@ class Commander:
         guidance: Guidance,
         steering: Steering,
         estimate: Callable[[], Estimate],
-        altitude: float,
+        home: Home,
+        journeys: Journeys,
         voice: Voice,
     ) -> None:
-        """``estimate`` is the present state on demand, ``altitude`` home's (m above mean sea level)."""
+        """``estimate`` is the present state on demand."""
         self._config = config
         self._flavour = flavour
         self._guidance = guidance
         self._steering = steering
         self._estimate = estimate
-        self._altitude = altitude
+        self._home = home
+        self._journeys = journeys
         self._voice = voice
         self._takeoff_height = config.takeoff_height
         self._ready_at = 0 if config.start_height else round(config.ready_after * 1e6)
@@ -49,6 +54,11 @@ class Commander:
         self.ready = False
         self.mode = flavour.boot_mode
 
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        self._config = config
+        self._takeoff_height = config.takeoff_height
+
     def status(self, now: int) -> Status:
         """What decisions at ``now`` (µs) depend on."""
         stream = self._steering.stream
@@ -57,7 +67,7 @@ class Commander:
             self.landed,
             self.ready,
             self.mode,
-            -self._estimate().position[2],
+            -self._estimate().position[2] - self._home.height,
             self._guidance.activity is Activity.TAKEOFF,
             stream.age(now),
             stream.gap,
@@ -83,8 +93,10 @@ class Commander:
         self.armed = True
         self._postpone(now)
         self._voice.inform("Armed")
+        if self.mode in MODES:
+            self._journeys.begin(self.mode, self._estimate())
         if self.mode is Mode.TAKEOFF:
-            self._guidance.takeoff(self._takeoff_height, self._estimate().pose)
+            self._guidance.takeoff(self._takeoff_height + self._home.height, self._estimate().pose)
         return None
 
     def disarm(self, *, forced: bool) -> Denial | None:
@@ -97,20 +109,24 @@ class Commander:
 
     def take_off(self, altitude: float, relative: bool | None, now: int) -> Denial | None:
         """As NAV_TAKEOFF (22); arguments as for ``Flavour.takeoff``."""
-        verdict = self._flavour.takeoff(altitude, relative, self._altitude, self.status(now))
+        verdict = self._flavour.takeoff(altitude, relative, self._home.altitude, self.status(now))
         if isinstance(verdict, Denial):
             return verdict
         self.mode, self._takeoff_height = verdict.mode, verdict.height
         if self.armed:
             self._postpone(now)
-            self._guidance.takeoff(verdict.height, self._estimate().pose)
+            self._guidance.takeoff(verdict.height + self._home.height, self._estimate().pose)
         return None
 
     def enter(self, mode: Mode, now: int) -> Denial | None:
         """Change to ``mode``."""
         if mode is self.mode:
             return None
-        if denial := self._flavour.mode_denial(mode, self.status(now)):
+        status = self.status(now)
+        if mode is Mode.MISSION:
+            itinerary = self._journeys.itinerary
+            status = status._replace(items=itinerary.total, takes_off=itinerary.takes_off)
+        if denial := self._flavour.mode_denial(mode, status):
             return denial
         self._switch(mode, now)
         return None
@@ -133,6 +149,8 @@ class Commander:
             self._look(now, located)
         if guidance.timed_out:
             self._lose(now)
+        elif self.mode in MODES:
+            self._journey(now)
         elif guidance.activity is Activity.TAKEOFF and guidance.reached:
             self.mode = self._flavour.after_takeoff
             guidance.settle()
@@ -141,8 +159,27 @@ class Commander:
         elif now >= self._disarm_at:
             self._stop("Disarmed: on the ground for too long")
 
+    def start_mission(self, now: int) -> Denial | None:
+        """As MISSION_START (300): enter its mode, and arm if this firmware does."""
+        denial = self.enter(Mode.MISSION, now)
+        if denial is None and self._flavour.start_arms:
+            return self.arm(now, forced=False)
+        return denial
+
+    def _journey(self, now: int) -> None:
+        event = self._journeys.advance(self.mode, now, self._estimate())
+        if event is Event.RETURNS:
+            self._switch(Mode.RETURN, now)
+        elif event is Event.FINISHED:
+            self._voice.inform("Mission finished")
+            self.mode = self._flavour.after_mission
+            self._guidance.hold()
+
     def _switch(self, mode: Mode, now: int) -> None:
         self.mode = mode
+        if self.armed and mode is Mode.MISSION:
+            self._journeys.begin(mode, self._estimate())
+            return
         if self.landed or not self.armed:
             self._guidance.idle()
             if self.armed and mode is Mode.LAND:
@@ -153,6 +190,8 @@ class Commander:
         match mode:
             case Mode.LAND:
                 self._guidance.land(self._config.land_speed)
+            case Mode.RETURN:
+                self._journeys.begin(mode, self._estimate())
             case Mode.GUIDED:
                 self._steering.resume(self._estimate().pose, now)
             case _:
@@ -198,8 +237,13 @@ class Commander:
     def _stop(self, why: str) -> None:
         self.armed = False
         self._guidance.idle()
+        self._journeys.itinerary.landed()
         if self.mode is Mode.LAND:
             self.mode = self._flavour.after_landing
+        elif self.mode is Mode.RETURN:
+            self.mode = self._flavour.after_return
+        elif self.mode is Mode.MISSION:
+            self.mode = self._flavour.after_mission
         elif self.mode is Mode.TAKEOFF:
             self.mode = self._flavour.after_takeoff
         self._voice.inform(why)

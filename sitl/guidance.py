@@ -25,6 +25,7 @@ class Activity(Enum):
 
     IDLE = "idle"
     TAKEOFF = "takeoff"
+    GO = "go"
     TRACK = "track"
     HOLD = "hold"
     LAND = "land"
@@ -39,15 +40,7 @@ class Guidance:
     """
 
     def __init__(self, config: AutopilotConfig) -> None:
-        limits = config.max_speed, config.max_acceleration, config.max_jerk
-        gentle = config.gentle_acceleration, config.max_jerk
-        self._config = config
-        self._limits = {
-            Activity.TAKEOFF: Limits(config.takeoff_speed, *gentle),
-            Activity.TRACK: Limits(*limits),
-            Activity.HOLD: Limits(config.max_speed, *gentle),
-            Activity.LAND: Limits(config.max_speed, *gentle),
-        }
+        self.configure(config)
         self._shaper = Shaper()
         self._heading = Heading(config.max_yaw_rate, config.max_yaw_acceleration)
         self._setpoint = _STAY
@@ -55,6 +48,19 @@ class Guidance:
         self._deadline = _FOR_EVER
         self.activity = Activity.IDLE
         self.timed_out = False
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        limits = config.max_speed, config.max_acceleration, config.max_jerk
+        gentle = config.gentle_acceleration, config.max_jerk
+        self._config = config
+        self._limits = {
+            Activity.GO: Limits(config.waypoint_speed, *gentle),
+            Activity.TAKEOFF: Limits(config.takeoff_speed, *gentle),
+            Activity.TRACK: Limits(*limits),
+            Activity.HOLD: Limits(config.max_speed, *gentle),
+            Activity.LAND: Limits(config.max_speed, *gentle),
+        }
 
     @property
     def position(self) -> Vector:
@@ -92,6 +98,8 @@ class Guidance:
         """The set-point that is followed, extrapolated to ``now`` (µs) and within the limits."""
         config = self._config
         age = (now - self._received) * 1e-6
+        if self.activity is Activity.GO:
+            return self._setpoint
         return self._setpoint.after(age, config.thrusting).limited(config.max_speed, config.max_acceleration)
 
     def idle(self) -> None:
@@ -103,6 +111,13 @@ class Guidance:
         self._leave_ground(here)
         x, y, _ = self._shaper.position
         self._begin(Activity.TAKEOFF, Setpoint((POSITION, POSITION, POSITION), (x, y, -height)))
+
+    def go(self, position: Vector, speed: float, yaw: float | None, here: Pose) -> None:
+        """To ``position`` (m) at up to ``speed`` (m/s), looking to ``yaw`` (rad; None: as it looks now)."""
+        self._leave_ground(here)
+        gentle = self._config.gentle_acceleration, self._config.max_jerk
+        self._limits[Activity.GO] = Limits(speed, *gentle)
+        self._begin(Activity.GO, Setpoint((POSITION, POSITION, POSITION), position, yaw=yaw))
 
     def track(self, setpoint: Setpoint, received: int, timeout: int | None, here: Pose, now: int) -> None:
         """Follow ``setpoint``, which is for the time ``received`` (µs), until ``timeout`` µs after that."""

@@ -1,4 +1,7 @@
-"""The emulated autopilot as a node: datagrams in, datagrams out, physics in between."""
+"""The emulated autopilot as a node: datagrams in, datagrams out, physics in between.
+
+A longer module as it is where the parts are put together.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +12,42 @@ import numpy as np
 import numpy.typing as npt
 
 from mavlink_bridge.codec import Codec
+from mavlink_bridge.converters import BY_TYPE
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, Source, Vector
 from mavlink_bridge.node import Datagram
+from sitl.airframe import hover_speeds
 from sitl.autopilot_config import AutopilotConfig
+from sitl.battery import Battery
 from sitl.commander import Commander
 from sitl.config import VehicleConfig
-from sitl.flavours import ARMED, Flavour, Mode
+from sitl.failures import Failures
+from sitl.flavours import Flavour, Mode
 from sitl.flavours.ardupilot import ArduPilot
 from sitl.flavours.px4 import Px4
-from sitl.guidance import Activity, Guidance
+from sitl.gauges import Gauges
+from sitl.guidance import Guidance
+from sitl.home import Home
+from sitl.homing import Homing
+from sitl.journeys import Journeys
+from sitl.missions.itinerary import Itinerary
+from sitl.missions.plans import Plans
+from sitl.missions.service import MissionService
 from sitl.orders import Orders
 from sitl.origin import Origin
+from sitl.parameters import ardupilot as ardupilot_parameters
+from sitl.parameters import px4 as px4_parameters
+from sitl.parameters.values import Values
 from sitl.plant import Plant
 from sitl.reception import Reception
+from sitl.reports import ORIGIN
+from sitl.returning import Returning
+from sitl.saved import Saved
 from sitl.sensors import Estimate
-from sitl.setpoints import Setpoint
+from sitl.services import Services
 from sitl.steering import Steering
-from sitl.telemetry import IN_AIR, LANDING, ON_GROUND, ORIGIN, TAKING_OFF, Snapshot, Telemetry
+from sitl.streams import usual_rates
+from sitl.telemetry import Telemetry
 from sitl.vehicle import Reference, VehicleState
 from sitl.voice import Voice
 from sitl.weather import WeatherConfig
@@ -36,11 +57,10 @@ LINK: Final = "autopilot"
 
 # MAV_COMP_ID_AUTOPILOT1
 _COMPONENT: Final = 1
-# PING, COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED, TIMESYNC
-_HEARD: Final = frozenset((4, 75, 76, 84, 111))
+# SET_MODE, PING, COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED, TIMESYNC; and the services'.
+_HEARD: Final = frozenset((4, 11, 75, 76, 84, 111))
+_TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
 _FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
-# In the air; with thrust cut it is about to be on the ground.
-_LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, Activity.IDLE: LANDING}
 
 
 class Autopilot:
@@ -59,16 +79,22 @@ class Autopilot:
         site: FleetFrame,
         seed: int,
         weather: WeatherConfig | None = None,
+        saved: Saved | None = None,
     ) -> None:
         """On the ground at the configured place, which becomes the origin of its local frame, or as high
         above it as the configuration says. ``seed`` (≥ 0) with the system id for all noise. ``weather`` is
-        the air around it; without, the air stands still."""
-        self.config = config
+        the air around it; without, the air stands still. ``saved``: what it kept of an earlier time."""
+        saved = saved or Saved()
+        rotors = len(vehicle.rotors)
+        self._values = Values(_TABLES[config.flavour](rotors), config, saved.parameters)
+        self._configured = config
+        self.config = config = self._values.configured(config)
         self._source = Source(config.system_id, _COMPONENT)
         self._origin = Origin(site, config.latitude, config.longitude, config.altitude)
         self._flavour: Flavour = _FLAVOURS[config.flavour](config)
-        self._telemetry = Telemetry(config.rates, self._flavour.reports_ekf)
+        self._telemetry = Telemetry(usual_rates(config), self._flavour.reports_ekf)
         self._guidance = Guidance(config)
+        self._home = Home(self._origin)
         self._plant = Plant(
             config,
             vehicle,
@@ -81,18 +107,83 @@ class Autopilot:
         self._outbox: list[Message] = []
         voice = Voice(self._source, self._outbox)
         steering = Steering(self._flavour, self._guidance, voice)
+        self._plans = Plans(saved.plans)
+        bytewise = self._flavour.bytewise
+        itinerary = Itinerary(
+            self._plans,
+            self._guidance,
+            self._home,
+            self._origin,
+            config,
+            self._flavour.first_item,
+            px4=bytewise,
+        )
+        self._journeys = Journeys(itinerary, Returning(self._guidance, self._home, config))
         self._commander = Commander(
             config,
             self._flavour,
             self._guidance,
             steering,
             self._plant.estimate,
-            self._origin.altitude,
+            self._home,
+            self._journeys,
             voice,
         )
-        orders = Orders(self._commander, self._flavour, self._telemetry)
-        self._reception = Reception(self._source, self._outbox, voice, self._commander, orders, steering)
-        self._codec = Codec(accept=lambda message_id, _system, _component: message_id in _HEARD)
+        self._battery = None
+        if config.battery is not None:
+            self._battery = Battery(config.battery, hover_speeds(vehicle).tolist())
+        homing = Homing(
+            self._home,
+            self._origin,
+            self._telemetry,
+            self._plant.estimate,
+            lambda: self._commander.ready,
+            voice,
+        )
+        self._missions = MissionService(
+            self._source,
+            self._plans,
+            itinerary,
+            self._commander,
+            self._telemetry,
+            self._outbox,
+            voice,
+            asks_int=bytewise,
+        )
+        self._services = Services(
+            self._source,
+            self._flavour,
+            self._values,
+            self._telemetry,
+            homing,
+            self._missions,
+            Failures(self._plant, self._battery, lambda: self.config),
+            self._outbox,
+            voice,
+            self._configure,
+        )
+        self._gauges = Gauges(
+            config,
+            vehicle,
+            self._source,
+            self._origin,
+            self._home,
+            self._flavour,
+            self._commander,
+            self._guidance,
+            self._plant,
+            self._battery,
+            self._missions.current,
+        )
+        orders = Orders(self._commander, self._flavour, self._services.commands)
+        self._reception = Reception(
+            self._source, self._outbox, voice, self._commander, orders, steering, self._services.handlers
+        )
+        heard = _HEARD | {BY_TYPE[kind].id for kind in self._services.handlers}
+        self._codec = Codec(accept=lambda message_id, _system, _component: message_id in heard)
+        # What nearly every step finds empty and undue is looked at here, not asked for.
+        self._reached = itinerary.reached
+        self._work_due = self._services.next_due
         self._boot: int | None = None
         self._now = 0
         if config.start_height:
@@ -123,47 +214,43 @@ class Autopilot:
         self._commander.watch(self._now, self._plant.vehicle.on_ground, self._plant.sensors.gps.located)
         if self._commander.ready and not was_ready:
             self._telemetry.request(ORIGIN)
+        if self._battery is not None and self._battery.due(self._now):
+            self._battery.advance(self._now, self._plant.state.rotor_speeds.tolist())
 
     def _listen(self, datagram: Datagram) -> None:
         if datagram.link != LINK:
             return
         for message in self._codec.feed(datagram.data):
             self._reception.handle(message, self._now, self._plant.estimate())
+        self._work_due = self._services.next_due
 
     def _tell(self) -> list[Datagram]:
+        if self._reached:
+            self._missions.tell()
+        if self._now >= self._work_due:
+            self._services.work(self._now)
+            self._work_due = self._services.next_due
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
-            messages = messages + self._telemetry.collect(self._now, self._snapshot())
+            messages = messages + self._telemetry.collect(self._now, self._gauges.read(self._now))
         if not messages:
             return []
         data = b"".join(map(self._codec.encode, messages))
         self._outbox.clear()
         return [Datagram(LINK, data)]
 
-    def _target(self) -> Setpoint | None:
-        guidance = self._guidance
-        return guidance.wanted(self._now) if guidance.activity is Activity.TRACK else None
+    def _configure(self) -> None:
+        """Take over the parameters that are settings, but for the system id, which counts from the next boot
+        on."""
+        changed = self._values.configured(self._configured)
+        self.config = changed.model_copy(update={"system_id": self.config.system_id})
+        for part in (self._flavour, self._guidance, self._commander, self._journeys, self._gauges):
+            part.configure(self.config)
 
-    def _snapshot(self) -> Snapshot:
-        commander, flavour, plant = self._commander, self._flavour, self._plant
-        return Snapshot(
-            self._source,
-            self._now,
-            plant.estimate(),
-            self._origin,
-            commander.ready,
-            commander.armed,
-            len(plant.vehicle.config.rotors),
-            flavour.autopilot,
-            flavour.base_mode(commander.mode) | (ARMED if commander.armed else 0),
-            flavour.custom_mode(commander.mode),
-            ON_GROUND if commander.landed else _LANDED_STATES.get(self._guidance.activity, IN_AIR),
-            self._target,
-            flavour.echoes_yaw,
-            plant.sensors.gps.located,
-            plant.sensors.gps.fixed,
-            plant.sensors.silent(self._now),
-        )
+    @property
+    def saved(self) -> Saved:
+        """What there is to keep for the next boot."""
+        return Saved(parameters=self._values.changed, plans=self._plans.all)
 
     # Events and faults, from the next step on
 

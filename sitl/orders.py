@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 from mavlink_bridge.messages import CommandInt, CommandLong
 from sitl.commander import Commander
-from sitl.flavours import ACCEPTED, CUSTOM, DENIED, FAILED, UNSUPPORTED, Denial, Flavour, Mode
-from sitl.telemetry import Telemetry
+from sitl.flavours import ACCEPTED, CUSTOM, DENIED, UNSUPPORTED, Denial, Flavour, Mode
 
 # MAV_CMD
 LAND: Final = 21
 TAKEOFF: Final = 22
 SET_MODE: Final = 176
 ARM: Final = 400
-SET_INTERVAL: Final = 511
-REQUEST: Final = 512
 
 _FORCED: Final = 21196.0
 # MAV_FRAME
@@ -27,11 +24,19 @@ _RELATIVE: Final = (3, 6)
 
 class Order(NamedTuple):
     """A command, whichever message brought it. ``relative``: its altitude counts from home (True), from mean
-    sea level (False), unsaid (None)."""
+    sea level (False), unsaid (None). ``integer``: it came as COMMAND_INT, with latitude and longitude in
+    degE7."""
 
     params: tuple[float, ...]
     relative: bool | None
     now: int
+    integer: bool = False
+
+    @property
+    def place(self) -> tuple[float, float, float]:
+        """Parameters 5 to 7 as latitude and longitude (degrees) and altitude (m)."""
+        x, y, z = self.params[4:7]
+        return (x / 1e7, y / 1e7, z) if self.integer else (x, y, z)
 
 
 class Verdict(NamedTuple):
@@ -41,20 +46,23 @@ class Verdict(NamedTuple):
     reason: str
 
 
+Handler = Callable[[Order], Denial | None]
+"""Obeys one command, or says why not."""
+
+
 class Orders:
     """Obeys commands. A retried command finds that what it asks is already so, and changes nothing."""
 
-    def __init__(self, commander: Commander, flavour: Flavour, telemetry: Telemetry) -> None:
+    def __init__(self, commander: Commander, flavour: Flavour, more: Mapping[int, Handler]) -> None:
+        """``more``: those who obey the commands that are not about flight, by MAV_CMD."""
         self._commander = commander
         self._flavour = flavour
-        self._telemetry = telemetry
-        self._handlers: dict[int, Callable[[Order], Denial | None]] = {
+        self._handlers: dict[int, Handler] = {
             LAND: self._land,
             TAKEOFF: self._take_off,
             SET_MODE: self._set_mode,
             ARM: self._arm,
-            SET_INTERVAL: self._set_interval,
-            REQUEST: self._request,
+            **more,
         }
 
     def obey(self, message: CommandLong | CommandInt, now: int) -> Verdict:
@@ -63,6 +71,12 @@ class Orders:
         if handler is None:
             return Verdict(UNSUPPORTED, f"Command {message.command} is not supported")
         denial = handler(_order(message, now))
+        return Verdict(ACCEPTED, "") if denial is None else Verdict(*denial)
+
+    def set_mode(self, custom_mode: int, base_mode: int, now: int) -> Verdict:
+        """As SET_MODE (11), which has the mode in one number."""
+        main, sub = self._flavour.split(custom_mode)
+        denial = self._set_mode(Order((base_mode, main, sub), None, now))
         return Verdict(ACCEPTED, "") if denial is None else Verdict(*denial)
 
     def _arm(self, order: Order) -> Denial | None:
@@ -91,25 +105,9 @@ class Orders:
             return self._commander.take_off(math.nan, None, order.now)
         return self._commander.enter(mode, order.now)
 
-    def _set_interval(self, order: Order) -> Denial | None:
-        message_id, interval = order.params[:2]
-        if not (math.isfinite(message_id) and math.isfinite(interval)):
-            return Denial(DENIED, "Interval refused: not a number")
-        if 0.0 < interval < self._flavour.shortest_interval:
-            return Denial(FAILED, f"Interval refused: {interval:.0f} us is too short")
-        if not self._telemetry.set_interval(int(message_id), round(interval), order.now):
-            return Denial(DENIED, f"Interval refused: no message {message_id:.0f}")
-        return None
-
-    def _request(self, order: Order) -> Denial | None:
-        message_id = order.params[0]
-        if math.isfinite(message_id) and self._telemetry.request(int(message_id)):
-            return None
-        return Denial(UNSUPPORTED, f"Request refused: no message {message_id:.0f}")
-
 
 def _order(message: CommandLong | CommandInt, now: int) -> Order:
     if isinstance(message, CommandLong):
         return Order(message.params, None, now)
     relative = True if message.frame in _RELATIVE else False if message.frame in _GLOBAL else None
-    return Order((*message.params, message.x, message.y, message.z), relative, now)
+    return Order((*message.params, message.x, message.y, message.z), relative, now, integer=True)

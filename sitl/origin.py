@@ -58,6 +58,10 @@ class Origin:
         x, y, z = (site @ self.rotation).tolist()
         return x, y, z
 
+    def local(self, latitude: float, longitude: float, altitude: float) -> Vector:
+        """The position (m, local NED) of a place (deg, deg, m)."""
+        return self.position_to_local(enu_to_ned(self._site.to_enu(latitude, longitude, altitude)))
+
     def geodetic(self, local: Vector) -> tuple[float, float, float]:
         """Latitude (deg), longitude (deg), altitude (m) of a position (m, local NED)."""
         return self._site.to_geodetic(ned_to_enu(self.motion_to_site([local])[0]))

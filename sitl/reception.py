@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 from mavlink_bridge.messages import (
     CommandAck,
     CommandInt,
     CommandLong,
     Message,
     Ping,
+    SetMode,
     SetpointLocal,
     Source,
     Timesync,
@@ -18,10 +22,13 @@ from sitl.sensors import Estimate
 from sitl.steering import Steering
 from sitl.voice import Voice
 
+# ArduPilot acknowledges SET_MODE as if its number were a command's.
+_SET_MODE = 11
+
 
 class Reception:
-    """Hands messages for this vehicle to ``orders`` and ``steering``, answers TIMESYNC (111) and PING (4)
-    itself, and leaves alone what is for others. Answers go to ``outbox``."""
+    """Hands messages for this vehicle to ``orders``, ``steering`` and ``services``, answers TIMESYNC (111)
+    and PING (4) itself, and leaves alone what is for others. Answers go to ``outbox``."""
 
     def __init__(
         self,
@@ -31,13 +38,16 @@ class Reception:
         commander: Commander,
         orders: Orders,
         steering: Steering,
+        services: Mapping[type[Any], Callable[[Any, int], None]],
     ) -> None:
+        """``services``: who handles a message that arrived at some time (µs), by its type."""
         self._source = source
         self._outbox = outbox
         self._voice = voice
         self._commander = commander
         self._orders = orders
         self._steering = steering
+        self._services = services
 
     def handle(self, message: Message, now: int, estimate: Estimate) -> None:
         """Act on a message that arrived at ``now`` (µs since boot), when ``estimate`` was believed."""
@@ -54,14 +64,32 @@ class Reception:
             case Ping(target_system=0):
                 system, component = message.source
                 self._outbox.append(Ping(self._source, message.time, message.sequence, system, component))
+            case SetMode():
+                if self._is_mine(message.target_system, 0):
+                    self._change_mode(message, now)
             case _:
-                pass
+                self._serve(message, now)
 
     def _obey(self, message: CommandLong | CommandInt, now: int) -> None:
         result, reason = self._orders.obey(message, now)
         self._outbox.append(CommandAck(self._source, message.command, result, 0, 0, *message.source))
         if reason:
             self._voice.warn(reason)
+
+    def _change_mode(self, message: SetMode, now: int) -> None:
+        result, reason = self._orders.set_mode(message.custom_mode, message.base_mode, now)
+        self._outbox.append(CommandAck(self._source, _SET_MODE, result, 0, 0, *message.source))
+        if reason:
+            self._voice.warn(reason)
+
+    def _serve(self, message: Message, now: int) -> None:
+        handle = self._services.get(type(message))
+        if handle is None:
+            return
+        # Not every message says a component; each of these says a system.
+        component: int = getattr(message, "target_component", 0)
+        if self._is_mine(getattr(message, "target_system", -1), component):
+            handle(message, now)
 
     def _is_mine(self, system: int, component: int) -> bool:
         return system in (0, self._source.system) and component in (0, self._source.component)

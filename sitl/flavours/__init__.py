@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Final, NamedTuple, Protocol
 
 from mavlink_bridge.messages import SetpointLocal
+from sitl.autopilot_config import AutopilotConfig
 from sitl.setpoints import Pose, Reading, Setpoint
 
 # MAV_RESULT
@@ -38,11 +39,15 @@ class Mode(Enum):
     GUIDED = "guided"
     TAKEOFF = "takeoff"
     LAND = "land"
+    MISSION = "mission"
+    RETURN = "return"
 
 
 class Status(NamedTuple):
     """What a decision may depend on. ``height`` (m) above home. ``stream_age`` and ``stream_gap`` (s): since
-    the last usable set-point, and between it and the one before it (0 when it is the first of its stream)."""
+    the last usable set-point, and between it and the one before it (0 when it is the first of its stream).
+    ``items``, ``takes_off``: how many items the mission has, and whether it begins with a takeoff; told when
+    its mode is asked for."""
 
     armed: bool
     landed: bool
@@ -52,6 +57,8 @@ class Status(NamedTuple):
     taking_off: bool
     stream_age: float
     stream_gap: float
+    items: int = 0
+    takes_off: bool = False
 
 
 class Takeoff(NamedTuple):
@@ -82,8 +89,19 @@ class Flavour(Protocol):
     """Whether POSITION_TARGET_LOCAL_NED (85) comes back with yaw."""
     shortest_interval: int
     """µs; SET_MESSAGE_INTERVAL (511) refuses less."""
+    bytewise: bool
+    """Whether integer parameters are sent as their bytes (PARAM_ENCODE_BYTEWISE)."""
+    groups_streams: bool
+    """Whether REQUEST_DATA_STREAM (66) is obeyed."""
     after_takeoff: Mode
     after_landing: Mode
+    after_return: Mode
+    after_mission: Mode
+    """The mode when the last item is done."""
+    first_item: int
+    """The first item of a mission that is flown: ArduPilot keeps home as item 0."""
+    start_arms: bool
+    """Whether MISSION_START (300) arms."""
     after_loss: Mode
     """The mode when set-points time out."""
     coasting: float
@@ -93,12 +111,20 @@ class Flavour(Protocol):
     blind_text: str
     """STATUSTEXT (253) of that."""
 
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        ...
+
     def custom_mode(self, mode: Mode) -> int:
         """HEARTBEAT.custom_mode."""
         ...
 
     def base_mode(self, mode: Mode) -> int:
         """HEARTBEAT.base_mode without the armed bit."""
+        ...
+
+    def split(self, custom_mode: int, /) -> tuple[int, int]:
+        """``custom_mode`` as the two parameters of DO_SET_MODE."""
         ...
 
     def requested(self, main: int, sub: int, /) -> Mode | None:

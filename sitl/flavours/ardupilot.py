@@ -49,16 +49,28 @@ _NUMBERS: Final = {
     Mode.GUIDED: 4,
     Mode.TAKEOFF: 4,
     Mode.POSITION: 5,
+    Mode.MISSION: 3,
+    Mode.RETURN: 6,
     Mode.LAND: 9,
     Mode.HOLD: 17,
 }
-_MODES: Final = {0: Mode.STANDBY, 4: Mode.GUIDED, 5: Mode.POSITION, 9: Mode.LAND, 17: Mode.HOLD}
+_MODES: Final = {
+    0: Mode.STANDBY,
+    3: Mode.MISSION,
+    4: Mode.GUIDED,
+    5: Mode.POSITION,
+    6: Mode.RETURN,
+    9: Mode.LAND,
+    17: Mode.HOLD,
+}
+_NAMES: Final = {Mode.MISSION: "AUTO", Mode.RETURN: "RTL"}
+_NOT_ARMABLE: Final = (Mode.LAND, Mode.HOLD, Mode.MISSION, Mode.RETURN)
 _FRAMES: Final = (LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED)
 _TRIPLES: Final = (IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION)
 
 
 class ArduPilot:
-    """STABILIZE 0, GUIDED 4, LOITER 5, LAND 9, BRAKE 17.
+    """STABILIZE 0, AUTO 3, GUIDED 4, LOITER 5, RTL 6, LAND 9, BRAKE 17.
 
     The force bit of a set-point means nothing to it: MAVProxy's velocity command has it set.
     """
@@ -70,8 +82,14 @@ class ArduPilot:
     echoes_yaw = False
     # Streams are served from the 400 Hz loop, and not faster than 80 % of it.
     shortest_interval = 3125
+    bytewise = False
+    groups_streams = True
     after_takeoff = Mode.GUIDED
     after_landing = Mode.LAND
+    after_return = Mode.RETURN
+    after_mission = Mode.MISSION
+    first_item = 1
+    start_arms = False
     after_loss = Mode.GUIDED
     # EKF3's posRetryTimeNoVel; then ten failures of the check that runs at 10 Hz.
     coasting = 7.0
@@ -79,6 +97,9 @@ class ArduPilot:
     blind_text = "EKF Failsafe: changed to LAND Mode"
 
     def __init__(self, config: AutopilotConfig) -> None:
+        self.configure(config)
+
+    def configure(self, config: AutopilotConfig) -> None:
         self._timeout = round(config.guided_timeout * 1e6)
 
     def custom_mode(self, mode: Mode) -> int:
@@ -88,17 +109,25 @@ class ArduPilot:
         guided = GUIDED_FLAG if mode not in (Mode.STANDBY, Mode.POSITION) else 0
         return CUSTOM | STABILIZED | MANUAL | guided
 
+    def split(self, custom_mode: int, /) -> tuple[int, int]:
+        return custom_mode, 0
+
     def requested(self, main: int, _sub: int, /) -> Mode | None:
         return _MODES.get(main)
 
     def arming_denial(self, status: Status) -> str | None:
-        return f"{status.mode.name} mode is not armable" if status.mode in (Mode.LAND, Mode.HOLD) else None
+        name = _NAMES.get(status.mode, status.mode.name)
+        return f"{name} mode is not armable" if status.mode in _NOT_ARMABLE else None
 
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
         if mode is Mode.STANDBY and status.armed and not status.landed:
             return Denial(FAILED, "STABILIZE in flight needs a pilot")
         if mode not in (Mode.STANDBY, Mode.LAND) and not status.ready:
             return Denial(FAILED, "Mode change failed: requires position")
+        if mode is Mode.MISSION and not status.items:
+            return Denial(FAILED, "Mode change to AUTO failed: no mission")
+        if mode is Mode.MISSION and status.armed and status.landed and not status.takes_off:
+            return Denial(FAILED, "Auto: Missing Takeoff Cmd")
         return None
 
     def takeoff(

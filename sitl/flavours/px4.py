@@ -44,17 +44,20 @@ _NUMBERS: Final = {
     Mode.POSITION: (3, 0),
     Mode.TAKEOFF: (4, 2),
     Mode.HOLD: (4, 3),
+    Mode.MISSION: (4, 4),
+    Mode.RETURN: (4, 5),
     Mode.LAND: (4, 6),
     Mode.GUIDED: (6, 0),
 }
 _MODES: Final = {number: mode for mode, number in _NUMBERS.items() if mode is not Mode.STANDBY}
-_LOSS: Final = {"hold": Mode.HOLD, "land": Mode.LAND, "descend": Mode.POSITION}
+_LOSS: Final = {"hold": Mode.HOLD, "land": Mode.LAND, "return": Mode.RETURN, "descend": Mode.POSITION}
 # Offboard needs more than 2 Hz.
 _SLOWEST: Final = 0.5
 
 
 class Px4:
-    """POSCTL 3, AUTO 4 (TAKEOFF 2, LOITER 3, LAND 6), OFFBOARD 6; custom_mode is main << 16 | sub << 24."""
+    """POSCTL 3, AUTO 4 (TAKEOFF 2, LOITER 3, MISSION 4, RTL 5, LAND 6), OFFBOARD 6; custom_mode is
+    main << 16 | sub << 24."""
 
     autopilot = 12
     boot_mode = Mode.HOLD
@@ -62,14 +65,23 @@ class Px4:
     reports_ekf = False
     echoes_yaw = True
     shortest_interval = 1000
+    bytewise = True
+    groups_streams = False
     after_takeoff = Mode.HOLD
     after_landing = Mode.HOLD
+    after_return = Mode.HOLD
+    after_mission = Mode.HOLD
+    first_item = 0
+    start_arms = True
     # EKF2_NOAID_TOUT.
     coasting = 5.0
     blind_patience = 0
     blind_text = "Failsafe: no position, blind land"
 
     def __init__(self, config: AutopilotConfig) -> None:
+        self.configure(config)
+
+    def configure(self, config: AutopilotConfig) -> None:
         self.after_loss = _LOSS[config.offboard_loss]
         self._timeout = round(config.offboard_timeout * 1e6)
         self._takeoff_height = config.takeoff_height
@@ -82,6 +94,9 @@ class Px4:
         if mode in (Mode.STANDBY, Mode.POSITION):
             return CUSTOM | STABILIZED | MANUAL | (GUIDED_FLAG if mode is Mode.POSITION else 0)
         return CUSTOM | STABILIZED | GUIDED_FLAG | AUTO
+
+    def split(self, custom_mode: int, /) -> tuple[int, int]:
+        return custom_mode >> 16 & 0xFF, custom_mode >> 24
 
     def requested(self, main: int, sub: int, /) -> Mode | None:
         return _MODES.get((main, sub))
@@ -96,6 +111,8 @@ class Px4:
             return Denial(TEMPORARILY_REJECTED, "OFFBOARD needs set-points at more than 2 Hz")
         if not status.ready and (status.landed or mode is not Mode.LAND):
             return Denial(TEMPORARILY_REJECTED, "Mode change refused: no position estimate")
+        if mode is Mode.MISSION and not status.items:
+            return Denial(TEMPORARILY_REJECTED, "Mode change refused: no valid mission")
         return None
 
     def takeoff(

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from recorded_logs import PIECES
 
+from mavlink_bridge import messages as m
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_TYPE, TABLE
 from mavlink_bridge.messages import (
@@ -135,11 +136,54 @@ def messages(fingerprint: int = 0, now: int = NOW) -> tuple[Known, ...]:
         Known("autopilot", ExtendedSysState(AUTOPILOT, 0, 2)),
         Known("autopilot", StatusText(AUTOPILOT, 4, "Arming refused: no position yet")),
         Known("swarm", plan(fingerprint, now)),
+        *(Known("autopilot", message) for message in services()),
     )
     missing = {row.message for row in TABLE} - {type(known.message) for known in found}
     if missing:
         raise LookupError(f"no good message of {missing}")
     return found
+
+
+def services() -> tuple[Message, ...]:
+    """What a ground station asks, and what an autopilot answers: one of each."""
+    me, ground = (11, 1), (255, 190)
+    place = LATITUDE, LONGITUDE, ALTITUDE
+    four = (1.0, 0.0, 0.0, 0.0)
+    x, y = round(LATITUDE * 1e7) + 200, round(LONGITUDE * 1e7)
+    takeoff, waypoint = (22, (0.0, 0.0, 0.0, NAN)), (16, (0.0, 2.0, 0.0, NAN))
+    return (
+        m.SetMode(GROUND, 4, 11, 1),
+        m.ParamRequestRead(GROUND, -1, *me, "GUID_TIMEOUT"),
+        m.ParamRequestList(GROUND, *me),
+        m.ParamValue(AUTOPILOT, stamp("<f", 3.0), 200, 7, "GUID_TIMEOUT", 9),
+        m.ParamSet(GROUND, stamp("<f", 2.0), *me, "GUID_TIMEOUT", 9),
+        m.SetGpsGlobalOrigin(GROUND, *place, 11, 0),
+        m.RequestDataStream(GROUND, 4, *me, 0, 1),
+        m.FileTransfer(GROUND, 0, *me, bytes((1, 0, 0, 4, 5, *[0] * 7)) + b"/fs/a".ljust(239, b"\0")),
+        m.AutopilotVersion(AUTOPILOT, 0xE0CF, 1, 0x040603FF, 0, 0, 0, 0, 0, *[bytes(8)] * 3, bytes(18)),
+        m.HomePosition(AUTOPILOT, *place, ZERO, four, ZERO, 1),
+        m.SetHomePosition(GROUND, *place, ZERO, four, ZERO, 11, 1),
+        m.MessageInterval(AUTOPILOT, 20_000, 30),
+        m.MissionCount(GROUND, 2, *me, 0, 0),
+        m.MissionItem(GROUND, takeoff[1], x, y, 6.0, 0, takeoff[0], *me, 6, 1, 1, 0),
+        m.MissionItemFloat(GROUND, waypoint[1], *place[:2], 8.0, 1, waypoint[0], *me, 3, 0, 1, 0),
+        m.MissionWritePartialList(GROUND, 1, 1, *me, 0),
+        m.MissionRequestList(GROUND, *me, 0),
+        m.MissionRequest(GROUND, 1, *me, 0),
+        m.MissionRequestFloat(GROUND, 0, *me, 0),
+        m.MissionSetCurrent(GROUND, 1, *me),
+        m.MissionAck(GROUND, *me, 15, 0, 0),
+        m.MissionClearAll(GROUND, *me, 255),
+        m.MissionCurrent(AUTOPILOT, 1, 2, 3, 1, 5, 0, 0),
+        m.MissionItemReached(AUTOPILOT, 1),
+        m.GpsRaw(AUTOPILOT, 7, 3, *place, 0.7, 1.1, 0.2, 1.0, 10, ALTITUDE, 0.9, 1.8, 0.4),
+        m.AttitudeQuaternion(AUTOPILOT, 7000, four, (0.0, 0.1, 0.2)),
+        m.VfrHud(AUTOPILOT, 1.0, 1.0, ALTITUDE, 0.1, 2.0, 0.4),
+        m.Altitude(AUTOPILOT, 7, 1.0, ALTITUDE, 1.0, 1.0, NAN, NAN),
+        m.BatteryStatus(AUTOPILOT, 0, 1, 1, (12.4,), 11.0, 700.0, 0.9, 600, 1),
+        m.EstimatorStatus(AUTOPILOT, 7, 0.1, 0.1, 0.1, 0.1, NAN, NAN, 0.3, 0.3, 831),
+        m.MissionCount(AUTOPILOT, 2, *ground, 0, 5),
+    )
 
 
 def frames(known: Sequence[Known]) -> tuple[bytes, ...]:

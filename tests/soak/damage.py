@@ -132,7 +132,7 @@ def extreme_payload(random: Random, row: Converter, payload: bytes) -> bytes:
     """``payload`` with one to all of its fields at the ends of their ranges or beyond sense."""
     values = list(row.struct.unpack(payload[: row.struct.size].ljust(row.struct.size, b"\0")))
     codes = re.findall(r"\d*[a-zA-Z]", row.struct.format)
-    for place in random.sample(range(len(values)), random.choice((1, 1, 2, len(values)))):
+    for place in random.sample(range(len(values)), min(len(values), random.choice((1, 1, 2, len(values))))):
         values[place] = _extreme(random, codes[place])
     return row.struct.pack(*values)
 

@@ -8,7 +8,7 @@ from random import Random
 import numpy as np
 from autopilot_rig import ALL, PILOT, POSITION_YAW, Rig, setpoint
 from campaigns import Mutants
-from corpora import frames, messages
+from corpora import GROUND, frames, messages
 from damage import WIRE_EDITS, absurd, damaged
 
 from mavlink_bridge.codec import Codec
@@ -16,7 +16,7 @@ from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Ping, S
 
 OTHERS = frames(messages())
 OBEYED = CommandInt | CommandLong | SetpointLocal | Ping | Timesync
-HEARD = [one for one in messages() if isinstance(one.message, OBEYED)]
+HEARD = [one for one in messages() if isinstance(one.message, OBEYED) or one.message.source == GROUND]
 HEIGHT = 20.0
 UNSUPPORTED, UNHEARD_OF = 3, 31_000
 

@@ -1,30 +1,15 @@
-"""What the fields of each message mean: tuples in MAVLink's wire order ↔ the SI values of ``messages``.
-
-degE7 ↔ degrees (float64), mm, cm/s, mV, % ↔ m, m/s, V, 0…1; cdeg ↔ rad; ms ↔ µs (the rest is lost); markers
-of *unknown* ↔ None. ``name(source, fields)`` decodes, None if the fields are absurd; ``name_fields(message)``
-encodes, or raises EncodeError. A longer module as it is a list, two short functions a message.
-"""
+"""Those of ``messages.flight``. A longer module as it is a list, two short functions a message."""
 
 from __future__ import annotations
 
 from math import degrees, radians, remainder, tau
-from typing import Any
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
+from mavlink_bridge.fields.units import FULL_CIRCLE_CDEG, UNKNOWN_U16, Fields, degrees_e7, on_globe
 
-Fields = tuple[Any, ...]
-
-UNKNOWN_U16 = 0xFFFF
-FULL_CIRCLE_CDEG = 36000
 TEXT_LENGTH = 50
 TUNNEL_LENGTH = 128
-
-
-def _degrees_e7(name: str, value: float, limit: int) -> int:
-    if abs(value) > limit:
-        raise EncodeError(f"{name} = {value} is outside ±{limit}°")
-    return round(value * 1e7)
 
 
 def heartbeat(s: m.Source, f: Fields) -> m.Heartbeat:
@@ -73,10 +58,6 @@ def ping(s: m.Source, f: Fields) -> m.Ping:
     return m.Ping(s, *f)
 
 
-def unchanged(x: Any) -> Fields:
-    return tuple(x[1:])
-
-
 def attitude(s: m.Source, f: Fields) -> m.Attitude:
     time, roll, pitch, yaw, p, q, r = f
     return m.Attitude(s, time * 1000, roll, pitch, yaw, (p, q, r))
@@ -95,13 +76,9 @@ def local_position_fields(x: m.LocalPosition) -> Fields:
     return x.time_boot // 1000, *x.position_ned, *x.velocity_ned
 
 
-def _on_globe(latitude_e7: int, longitude_e7: int) -> bool:
-    return abs(latitude_e7) <= 900_000_000 and abs(longitude_e7) <= 1_800_000_000
-
-
 def global_position(s: m.Source, f: Fields) -> m.GlobalPosition | None:
     time, latitude, longitude, altitude, relative, vx, vy, vz, heading = f
-    if not _on_globe(latitude, longitude):
+    if not on_globe(latitude, longitude):
         return None
     return m.GlobalPosition(
         s,
@@ -119,8 +96,8 @@ def global_position_fields(x: m.GlobalPosition) -> Fields:
     vx, vy, vz = x.velocity_ned
     return (
         x.time_boot // 1000,
-        _degrees_e7("latitude", x.latitude, 90),
-        _degrees_e7("longitude", x.longitude, 180),
+        degrees_e7("latitude", x.latitude, 90),
+        degrees_e7("longitude", x.longitude, 180),
         round(x.altitude * 1e3),
         round(x.relative_altitude * 1e3),
         round(vx * 1e2),
@@ -132,15 +109,15 @@ def global_position_fields(x: m.GlobalPosition) -> Fields:
 
 def origin(s: m.Source, f: Fields) -> m.GpsGlobalOrigin | None:
     latitude, longitude, altitude, time = f
-    if not _on_globe(latitude, longitude):
+    if not on_globe(latitude, longitude):
         return None
     return m.GpsGlobalOrigin(s, latitude / 1e7, longitude / 1e7, altitude / 1e3, time)
 
 
 def origin_fields(x: m.GpsGlobalOrigin) -> Fields:
     return (
-        _degrees_e7("latitude", x.latitude, 90),
-        _degrees_e7("longitude", x.longitude, 180),
+        degrees_e7("latitude", x.latitude, 90),
+        degrees_e7("longitude", x.longitude, 180),
         round(x.altitude * 1e3),
         x.time,
     )

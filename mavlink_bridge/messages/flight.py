@@ -1,24 +1,10 @@
-"""The values that outrider exchanges: one frozen tuple per MAVLink message, SI units, the message's own
-frame.
-
-Angles are radians, distances metres, latitudes and longitudes degrees (float64, so that the degE7 step of 1.1
-cm is kept), times integer µs. Positions stay local NED or geodetic as the message is: ``frames`` alone
-converts. ``None`` stands for a field that the sender marked unknown. Tuples rather than dataclasses: they are
-made thousands of times a second and a tuple costs a third as much.
-"""
+"""What a vehicle says of itself, and what it is told: states, commands, set-points, texts, plans."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-Vector = tuple[float, float, float]
-
-
-class Source(NamedTuple):
-    """Who sent a message: MAVLink system and component id (both 0…255)."""
-
-    system: int
-    component: int
+from mavlink_bridge.messages.source import Source, Vector
 
 
 class Heartbeat(NamedTuple):
@@ -211,25 +197,3 @@ class Tunnel(NamedTuple):
     target_component: int
     payload_type: int
     payload: bytes
-
-
-Message = (
-    Heartbeat
-    | SysStatus
-    | SystemTime
-    | Ping
-    | Attitude
-    | LocalPosition
-    | GlobalPosition
-    | GpsGlobalOrigin
-    | CommandInt
-    | CommandLong
-    | CommandAck
-    | SetpointLocal
-    | PositionTarget
-    | Timesync
-    | EkfStatus
-    | ExtendedSysState
-    | StatusText
-    | Tunnel
-)

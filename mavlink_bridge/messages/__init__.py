@@ -1,0 +1,173 @@
+"""The values that outrider exchanges: one frozen tuple per MAVLink message, SI units, the message's own
+frame.
+
+Angles are radians, distances metres, latitudes and longitudes degrees (float64, so that the degE7 step of 1.1
+cm is kept), times integer µs. Positions stay local NED or geodetic as the message is: ``frames`` alone
+converts. ``None`` stands for a field that the sender marked unknown. Tuples rather than dataclasses: they are
+made thousands of times a second and a tuple costs a third as much.
+"""
+
+from __future__ import annotations
+
+from mavlink_bridge.messages.flight import (
+    Attitude,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    EkfStatus,
+    ExtendedSysState,
+    GlobalPosition,
+    GpsGlobalOrigin,
+    Heartbeat,
+    LocalPosition,
+    Ping,
+    PositionTarget,
+    SetpointLocal,
+    StatusText,
+    SysStatus,
+    SystemTime,
+    Timesync,
+    Tunnel,
+)
+from mavlink_bridge.messages.missions import (
+    MissionAck,
+    MissionClearAll,
+    MissionCount,
+    MissionCurrent,
+    MissionItem,
+    MissionItemFloat,
+    MissionItemReached,
+    MissionRequest,
+    MissionRequestFloat,
+    MissionRequestList,
+    MissionSetCurrent,
+    MissionWritePartialList,
+)
+from mavlink_bridge.messages.services import (
+    AutopilotVersion,
+    FileTransfer,
+    HomePosition,
+    MessageInterval,
+    ParamRequestList,
+    ParamRequestRead,
+    ParamSet,
+    ParamValue,
+    RequestDataStream,
+    SetGpsGlobalOrigin,
+    SetHomePosition,
+    SetMode,
+)
+from mavlink_bridge.messages.source import Source, Vector
+from mavlink_bridge.messages.status import (
+    Altitude,
+    AttitudeQuaternion,
+    BatteryStatus,
+    EstimatorStatus,
+    GpsRaw,
+    VfrHud,
+)
+
+Message = (
+    Heartbeat
+    | SysStatus
+    | SystemTime
+    | Ping
+    | Attitude
+    | LocalPosition
+    | GlobalPosition
+    | GpsGlobalOrigin
+    | CommandInt
+    | CommandLong
+    | CommandAck
+    | SetpointLocal
+    | PositionTarget
+    | Timesync
+    | EkfStatus
+    | ExtendedSysState
+    | StatusText
+    | Tunnel
+    | SetMode
+    | ParamRequestRead
+    | ParamRequestList
+    | ParamValue
+    | ParamSet
+    | SetGpsGlobalOrigin
+    | RequestDataStream
+    | FileTransfer
+    | AutopilotVersion
+    | HomePosition
+    | SetHomePosition
+    | MessageInterval
+    | MissionWritePartialList
+    | MissionItemFloat
+    | MissionRequestFloat
+    | MissionSetCurrent
+    | MissionCurrent
+    | MissionRequestList
+    | MissionCount
+    | MissionClearAll
+    | MissionItemReached
+    | MissionAck
+    | MissionRequest
+    | MissionItem
+    | GpsRaw
+    | AttitudeQuaternion
+    | VfrHud
+    | Altitude
+    | BatteryStatus
+    | EstimatorStatus
+)
+
+__all__ = [
+    "Altitude",
+    "Attitude",
+    "AttitudeQuaternion",
+    "AutopilotVersion",
+    "BatteryStatus",
+    "CommandAck",
+    "CommandInt",
+    "CommandLong",
+    "EkfStatus",
+    "EstimatorStatus",
+    "ExtendedSysState",
+    "FileTransfer",
+    "GlobalPosition",
+    "GpsGlobalOrigin",
+    "GpsRaw",
+    "Heartbeat",
+    "HomePosition",
+    "LocalPosition",
+    "Message",
+    "MessageInterval",
+    "MissionAck",
+    "MissionClearAll",
+    "MissionCount",
+    "MissionCurrent",
+    "MissionItem",
+    "MissionItemFloat",
+    "MissionItemReached",
+    "MissionRequest",
+    "MissionRequestFloat",
+    "MissionRequestList",
+    "MissionSetCurrent",
+    "MissionWritePartialList",
+    "ParamRequestList",
+    "ParamRequestRead",
+    "ParamSet",
+    "ParamValue",
+    "Ping",
+    "PositionTarget",
+    "RequestDataStream",
+    "SetGpsGlobalOrigin",
+    "SetHomePosition",
+    "SetMode",
+    "SetpointLocal",
+    "Source",
+    "StatusText",
+    "SysStatus",
+    "SystemTime",
+    "Timesync",
+    "Tunnel",
+    "Vector",
+    "VfrHud",
+]

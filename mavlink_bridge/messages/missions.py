@@ -1,0 +1,147 @@
+"""The mission protocol: missions, fences and rally points up and down.
+
+``mission_type`` is MAV_MISSION_TYPE. ``opaque_id`` names a plan that the vehicle holds, 0 when it has none.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from mavlink_bridge.messages.source import Source
+
+
+class MissionWritePartialList(NamedTuple):
+    """MISSION_WRITE_PARTIAL_LIST (38): items ``start`` to ``end``, both included, will be sent anew."""
+
+    source: Source
+    start: int
+    end: int
+    target_system: int
+    target_component: int
+    mission_type: int
+
+
+class MissionItemFloat(NamedTuple):
+    """MISSION_ITEM (39), the old form: ``x``, ``y`` in degrees or metres as float32."""
+
+    source: Source
+    params: tuple[float, float, float, float]
+    x: float
+    y: float
+    z: float
+    seq: int
+    command: int
+    target_system: int
+    target_component: int
+    frame: int
+    current: int
+    autocontinue: int
+    mission_type: int
+
+
+class MissionRequestFloat(NamedTuple):
+    """MISSION_REQUEST (40), the old form."""
+
+    source: Source
+    seq: int
+    target_system: int
+    target_component: int
+    mission_type: int
+
+
+class MissionSetCurrent(NamedTuple):
+    """MISSION_SET_CURRENT (41)."""
+
+    source: Source
+    seq: int
+    target_system: int
+    target_component: int
+
+
+class MissionCurrent(NamedTuple):
+    """MISSION_CURRENT (42). ``total`` is the last item, 65535 without a mission; ``state`` is MISSION_STATE;
+    ``mode`` 1 in mission mode, 2 out of it; then the ids of the three plans."""
+
+    source: Source
+    seq: int
+    total: int
+    state: int
+    mode: int
+    mission_id: int
+    fence_id: int
+    rally_id: int
+
+
+class MissionRequestList(NamedTuple):
+    """MISSION_REQUEST_LIST (43)."""
+
+    source: Source
+    target_system: int
+    target_component: int
+    mission_type: int
+
+
+class MissionCount(NamedTuple):
+    """MISSION_COUNT (44)."""
+
+    source: Source
+    total: int
+    target_system: int
+    target_component: int
+    mission_type: int
+    opaque_id: int
+
+
+class MissionClearAll(NamedTuple):
+    """MISSION_CLEAR_ALL (45)."""
+
+    source: Source
+    target_system: int
+    target_component: int
+    mission_type: int
+
+
+class MissionItemReached(NamedTuple):
+    """MISSION_ITEM_REACHED (46)."""
+
+    source: Source
+    seq: int
+
+
+class MissionAck(NamedTuple):
+    """MISSION_ACK (47): ``result`` is MAV_MISSION_RESULT."""
+
+    source: Source
+    target_system: int
+    target_component: int
+    result: int
+    mission_type: int
+    opaque_id: int
+
+
+class MissionRequest(NamedTuple):
+    """MISSION_REQUEST_INT (51)."""
+
+    source: Source
+    seq: int
+    target_system: int
+    target_component: int
+    mission_type: int
+
+
+class MissionItem(NamedTuple):
+    """MISSION_ITEM_INT (73): ``x``, ``y`` are the raw int32 (degE7, or 0.1 mm in local frames)."""
+
+    source: Source
+    params: tuple[float, float, float, float]
+    x: int
+    y: int
+    z: float
+    seq: int
+    command: int
+    target_system: int
+    target_component: int
+    frame: int
+    current: int
+    autocontinue: int
+    mission_type: int

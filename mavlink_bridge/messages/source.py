@@ -1,0 +1,14 @@
+"""Who sent a message, and three numbers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+Vector = tuple[float, float, float]
+
+
+class Source(NamedTuple):
+    """Who sent a message: MAVLink system and component id (both 0…255)."""
+
+    system: int
+    component: int

@@ -1,0 +1,96 @@
+"""How a vehicle is: what ground stations show beside its motion."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from mavlink_bridge.messages.source import Source, Vector
+
+
+class GpsRaw(NamedTuple):
+    """GPS_RAW_INT (24). ``time`` µs since boot; ``hdop``, ``vdop`` dilutions; ``speed`` over ground and
+    ``course`` (clockwise from north); the three accuracies in m, m and m/s, 0 when not known."""
+
+    source: Source
+    time: int
+    fix_type: int
+    latitude: float
+    longitude: float
+    altitude: float
+    hdop: float | None
+    vdop: float | None
+    speed: float | None
+    course: float | None
+    satellites: int | None
+    altitude_ellipsoid: float
+    horizontal_accuracy: float
+    vertical_accuracy: float
+    speed_accuracy: float
+
+
+class AttitudeQuaternion(NamedTuple):
+    """ATTITUDE_QUATERNION (31): FRD body to local NED as (w, x, y, z); body rates (rad/s)."""
+
+    source: Source
+    time_boot: int
+    attitude: tuple[float, float, float, float]
+    body_rates: Vector
+
+
+class VfrHud(NamedTuple):
+    """VFR_HUD (74): speeds in m/s, altitude above mean sea level, ``heading`` 0…2π, ``throttle`` 0…1."""
+
+    source: Source
+    airspeed: float
+    ground_speed: float
+    altitude: float
+    climb: float
+    heading: float
+    throttle: float
+
+
+class Altitude(NamedTuple):
+    """ALTITUDE (141): m; NaN for what nobody measures. ``time`` µs since boot."""
+
+    source: Source
+    time: int
+    monotonic: float
+    above_sea: float
+    local: float
+    relative: float
+    terrain: float
+    clearance: float
+
+
+class BatteryStatus(NamedTuple):
+    """BATTERY_STATUS (147). ``voltages`` (V) of up to ten cells, or one of all in the first; ``current`` (A);
+    ``consumed`` (A s); ``remaining`` 0…1; ``time_remaining`` (s, 0 when not known); ``charge_state`` is
+    MAV_BATTERY_CHARGE_STATE."""
+
+    source: Source
+    id: int
+    function: int
+    type: int
+    voltages: tuple[float, ...]
+    current: float | None
+    consumed: float | None
+    remaining: float | None
+    time_remaining: int
+    charge_state: int
+
+
+class EstimatorStatus(NamedTuple):
+    """ESTIMATOR_STATUS (230): ratios of innovations to their gates (below 1 is good, NaN not tested),
+    accuracies (m), ESTIMATOR_STATUS_FLAGS. ``time`` µs since boot."""
+
+    source: Source
+    time: int
+    velocity: float
+    horizontal: float
+    vertical: float
+    magnetic: float
+    above_ground: float
+    airspeed: float
+    horizontal_accuracy: float
+    vertical_accuracy: float
+    flags: int

@@ -1,0 +1,82 @@
+"""A battery that drains: rotor speeds in, voltage, current and charge out.
+
+The power of a rotor goes with the cube of its speed. A cell's open voltage falls in a line from 4.2 V when
+full to 3.5 V when a tenth is left, and from there to 3.0 V, as lithium polymer roughly does.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+_FULL, _KNEE, _EMPTY = 4.2, 3.5, 3.0
+_KNEE_AT: Final = 0.1
+_PERIOD: Final = 100_000
+
+
+class BatteryConfig(BaseModel):
+    """One battery. SI units, but for what is written on it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    cells: int = Field(4, ge=1, le=10)
+    capacity_mah: Positive = 5000.0
+    remaining: float = Field(1.0, ge=0.0, le=1.0, description="at the start")
+    hover_current: Positive = Field(20.0, description="A")
+    idle_current: float = Field(0.5, ge=0.0, description="A, of all but the motors")
+    resistance: float = Field(0.02, ge=0.0, description="ohm, of all cells")
+
+
+class Charge(NamedTuple):
+    """``voltage`` (V, of all cells), ``current`` (A), ``consumed`` (A s), ``remaining`` (0…1), and for how
+    long (s) that lasts at this current."""
+
+    voltage: float
+    current: float
+    consumed: float
+    remaining: float
+    lasts: float
+
+
+class Battery:
+    """The state of one battery, moved on in steps of 0.1 s."""
+
+    def __init__(self, config: BatteryConfig, hover_speeds: list[float]) -> None:
+        """``hover_speeds`` (rad/s) of the rotors: where it gives ``hover_current``."""
+        self._config = config
+        self._hovering = sum(speed**3 for speed in hover_speeds)
+        self._capacity = config.capacity_mah * 3.6
+        self._left = self._capacity * config.remaining
+        self._current = config.idle_current
+        self._time = 0
+
+    def due(self, now: int) -> bool:
+        """Whether a step ends by ``now`` (µs)."""
+        return now - self._time >= _PERIOD
+
+    def advance(self, now: int, speeds: list[float]) -> None:
+        """To ``now`` (µs), the rotors turning at ``speeds`` (rad/s)."""
+        share = sum(speed**3 for speed in speeds) / self._hovering
+        self._current = self._config.idle_current + self._config.hover_current * share
+        self._left = max(0.0, self._left - self._current * (now - self._time) * 1e-6)
+        self._time = now
+
+    def drain(self) -> None:
+        """Nothing left."""
+        self._left = 0.0
+
+    @property
+    def charge(self) -> Charge:
+        """Its state."""
+        config, current = self._config, self._current
+        remaining = self._left / self._capacity
+        if remaining >= _KNEE_AT:
+            cell = _KNEE + (_FULL - _KNEE) * (remaining - _KNEE_AT) / (1.0 - _KNEE_AT)
+        else:
+            cell = _EMPTY + (_KNEE - _EMPTY) * remaining / _KNEE_AT
+        voltage = max(0.0, cell * config.cells - config.resistance * current)
+        consumed = self._capacity * config.remaining - self._left
+        return Charge(voltage, current, consumed, remaining, self._left / max(current, 0.01))

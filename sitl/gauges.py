@@ -1,0 +1,116 @@
+"""All that telemetry may tell of an autopilot at one moment, read off its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from mavlink_bridge.messages import MissionCurrent, Source
+from sitl.airframe import hover_speeds
+from sitl.autopilot_config import AutopilotConfig
+from sitl.battery import Battery
+from sitl.commander import Commander
+from sitl.config import VehicleConfig
+from sitl.flavours import ARMED, Flavour
+from sitl.guidance import Activity, Guidance
+from sitl.home import Home
+from sitl.identity import version
+from sitl.origin import Origin
+from sitl.plant import Plant
+from sitl.reports import IN_AIR, LANDING, ON_GROUND, TAKING_OFF, Snapshot
+from sitl.setpoints import Setpoint
+
+# In the air; with thrust cut it is about to be on the ground.
+_LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, Activity.IDLE: LANDING}
+# MAV_SYS_STATUS_GEOFENCE: MAVProxy takes a bit that is not set for a breach, as ArduPilot sets it always.
+_GEOFENCE: Final = 0x100000
+
+
+class Gauges:
+    """Makes snapshots for ``Telemetry``."""
+
+    def __init__(
+        self,
+        config: AutopilotConfig,
+        vehicle: VehicleConfig,
+        source: Source,
+        origin: Origin,
+        home: Home,
+        flavour: Flavour,
+        commander: Commander,
+        guidance: Guidance,
+        plant: Plant,
+        battery: Battery | None,
+        mission: Callable[[], MissionCurrent],
+    ) -> None:
+        self._config = config
+        self._source = source
+        self._origin = origin
+        self._home = home
+        self._flavour = flavour
+        self._commander = commander
+        self._guidance = guidance
+        self._plant = plant
+        self._battery = battery
+        self._mission = mission
+        self._version = version(source, config.flavour)
+        self._rotors = len(vehicle.rotors)
+        self._hovering = _squares(hover_speeds(vehicle).tolist())
+        told = config.streams == "normal" and config.flavour == "ardupilot"
+        self._unbreached = _GEOFENCE if told else 0
+        self._now = 0
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        self._config = config
+
+    def read(self, now: int) -> Snapshot:
+        """At ``now`` (µs since boot)."""
+        self._now = now
+        commander, flavour, plant = self._commander, self._flavour, self._plant
+        return Snapshot(
+            self._source,
+            now,
+            plant.estimate(),
+            self._origin,
+            commander.ready,
+            commander.armed,
+            self._rotors,
+            flavour.autopilot,
+            flavour.base_mode(commander.mode) | (ARMED if commander.armed else 0),
+            flavour.custom_mode(commander.mode),
+            ON_GROUND if commander.landed else _LANDED_STATES.get(self._guidance.activity, IN_AIR),
+            self._target,
+            flavour.echoes_yaw,
+            plant.sensors.gps.located,
+            plant.sensors.gps.fixed,
+            plant.sensors.silent(now),
+            self._waking(),
+            self._home,
+            None if self._battery is None else self._battery.charge,
+            self._throttle,
+            self._unbreached,
+            self._config.epoch,
+            self._version,
+            self._mission,
+        )
+
+    def _target(self) -> Setpoint | None:
+        guidance = self._guidance
+        follows = guidance.activity is Activity.TRACK or guidance.activity is Activity.GO
+        return guidance.wanted(self._now) if follows else None
+
+    def _waking(self) -> float:
+        """How far GPS and filter have come up, 0…1."""
+        config = self._config
+        if self._now >= config.ready_after * 1e6:
+            return 1.0
+        return self._now * 1e-6 / config.ready_after if config.startup == "in stages" else 0.0
+
+    def _throttle(self) -> float:
+        """Thrust as a part of twice what hovering takes, 0…1."""
+        return min(1.0, 0.5 * _squares(self._plant.state.rotor_speeds.tolist()) / self._hovering)
+
+
+def _squares(speeds: list[float]) -> float:
+    return sum(speed * speed for speed in speeds)

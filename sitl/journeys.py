@@ -1,0 +1,43 @@
+"""Flights that lead themselves, without set-points: the mission, and the way home."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sitl.autopilot_config import AutopilotConfig
+from sitl.flavours import Mode
+from sitl.missions.itinerary import Event, Itinerary, Phase
+from sitl.returning import Returning
+from sitl.sensors import Estimate
+
+MODES: Final = frozenset((Mode.MISSION, Mode.RETURN))
+
+
+class Journeys:
+    """What flies in the modes of ``MODES``."""
+
+    def __init__(self, itinerary: Itinerary, returning: Returning) -> None:
+        self.itinerary = itinerary
+        self._returning = returning
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        self.itinerary.configure(config)
+        self._returning.configure(config)
+
+    def begin(self, mode: Mode, here: Estimate) -> None:
+        """Set out from ``here``."""
+        if mode is Mode.RETURN:
+            self._returning.begin(here)
+        elif self.itinerary.phase is Phase.DONE:
+            self.itinerary.rewind()
+        else:
+            self.itinerary.pause()
+
+    def advance(self, mode: Mode, now: int, here: Estimate) -> Event | None:
+        """Fly on at ``now`` (µs), if this is one of ``MODES``."""
+        if mode is Mode.MISSION:
+            return self.itinerary.advance(now, here)
+        if mode is Mode.RETURN:
+            self._returning.advance(now, here)
+        return None

@@ -1,0 +1,20 @@
+"""What an autopilot keeps over a restart. The node reads and writes no file: it is given this, and gives
+it."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, FiniteFloat
+
+from sitl.missions.items import Item
+
+
+class Saved(BaseModel):
+    """``parameters`` that are not as at first, by name; ``plans``: mission, fence and rally points.
+
+    As JSON: ``model_dump_json`` and ``model_validate_json``, which refuses what is damaged.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
+
+    parameters: dict[str, FiniteFloat] = {}
+    plans: tuple[tuple[Item, ...], ...] = ()

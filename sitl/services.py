@@ -1,0 +1,128 @@
+"""All that an autopilot does beside flying: parameters, requests, files, home. One place that knows who takes
+care of which message and which command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from mavlink_bridge.messages import (
+    FileTransfer,
+    Message,
+    ParamRequestList,
+    ParamRequestRead,
+    ParamSet,
+    RequestDataStream,
+    SetGpsGlobalOrigin,
+    SetHomePosition,
+    Source,
+)
+from sitl import files
+from sitl.failures import Failures
+from sitl.flavours import DENIED, Denial, Flavour
+from sitl.homing import Homing
+from sitl.missions.service import MissionService
+from sitl.orders import Handler, Order
+from sitl.parameters.ardupilot import STREAMS
+from sitl.parameters.protocol import ParameterProtocol
+from sitl.parameters.values import Values
+from sitl.requests import Requests
+from sitl.telemetry import Telemetry
+from sitl.voice import Voice
+
+# MAV_CMD_PREFLIGHT_STORAGE, and its first parameter
+STORAGE: Final = 245
+_READ, _WRITE, _RESET = 0.0, 1.0, 2.0
+
+
+class Services:
+    """``handlers`` by type of message, ``commands`` by MAV_CMD; ``next_due`` (µs): before it there is nothing
+    to do."""
+
+    def __init__(
+        self,
+        source: Source,
+        flavour: Flavour,
+        values: Values,
+        telemetry: Telemetry,
+        homing: Homing,
+        missions: MissionService,
+        failures: Failures,
+        outbox: list[Message],
+        voice: Voice,
+        configure: Callable[[], None],
+    ) -> None:
+        """``configure`` is called when a parameter has changed."""
+        self._source = source
+        self._values = values
+        self._outbox = outbox
+        self._configure = configure
+        self._requests = Requests(source, flavour, telemetry, outbox)
+        self._rates = dict.fromkeys(STREAMS, 0.0) if flavour.groups_streams else {}
+        self._now = 0
+        self._missions = missions
+        self.parameters = ParameterProtocol(
+            source, values, outbox, voice, self._changed, bytewise=flavour.bytewise
+        )
+        self.handlers: dict[type[Any], Callable[[Any, int], None]] = {
+            ParamRequestList: self.parameters.handle,
+            ParamRequestRead: self.parameters.handle,
+            ParamSet: self._set_parameter,
+            RequestDataStream: self._requests.stream,
+            FileTransfer: self._refuse_file,
+            SetHomePosition: homing.set_home,
+            SetGpsGlobalOrigin: homing.set_origin,
+            **missions.handlers,
+        }
+        self.commands: dict[int, Handler] = {
+            **self._requests.commands,
+            **homing.commands,
+            **missions.commands,
+            **failures.commands,
+            STORAGE: self._store,
+        }
+        self._stream(0)
+
+    @property
+    def next_due(self) -> int:
+        """µs."""
+        return min(self.parameters.next_due, self._missions.transfer.next_due)
+
+    def work(self, now: int) -> None:
+        """Do what is due at ``now`` (µs)."""
+        for part in (self.parameters, self._missions.transfer):
+            if now >= part.next_due:
+                part.work(now)
+
+    def _set_parameter(self, message: ParamSet, now: int) -> None:
+        self._now = now
+        self.parameters.handle(message, now)
+
+    def _changed(self) -> None:
+        self._configure()
+        self._stream(self._now)
+
+    def _stream(self, now: int) -> None:
+        """Give the groups of messages the rates that ArduPilot's SR0_ parameters say, where they changed."""
+        for group, rate in self._rates.items():
+            wanted = self._values.named(f"SR0_{group}")
+            if wanted != rate:
+                self._rates[group] = wanted
+                self._requests.set_rate(STREAMS[group], wanted, now)
+
+    def _refuse_file(self, message: FileTransfer, _now: int) -> None:
+        answer = files.answer(message, self._source)
+        if answer is not None:
+            self._outbox.append(answer)
+
+    def _store(self, order: Order) -> Denial | None:
+        """PREFLIGHT_STORAGE: what is set is kept anyhow; all can be made as at first."""
+        wish = order.params[0]
+        if wish == _RESET:
+            self._values.reset()
+            self._now = order.now
+            self._changed()
+            return None
+        if wish in (_READ, _WRITE):
+            return None
+        return Denial(DENIED, "Storage refused: parameter 1 must be 0, 1 or 2")
