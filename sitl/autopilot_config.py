@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from sitl.backends.physics import PhysicsName
 from sitl.profiles import ProfileName
 
 Rate = Annotated[float, Field(ge=0.0, le=1000.0)]
@@ -46,6 +47,7 @@ class AutopilotConfig(BaseModel):
     yaw: FiniteFloat = Field(0.0, description="at the start, clockwise from north")
     rates: TelemetryRates = TelemetryRates()
     sensors: ProfileName = Field("truth", description="how good its estimate is: truth, rtk or gnss")
+    physics: PhysicsName = Field("own", description="what moves the vehicle: our own integrator, or JSBSim")
     start_height: float = Field(
         0.0,
         ge=0.0,

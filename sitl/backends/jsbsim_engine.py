@@ -16,9 +16,8 @@ import numpy as np
 
 from mavlink_bridge.messages import Vector
 from sitl.backends.jsbsim_model import FOOT, aircraft, command_property, left_property, motor_property
-from sitl.backends.jsbsim_place import Geodetic, euler_angles
+from sitl.backends.jsbsim_place import euler_angles, rotation_of
 from sitl.backends.physics import BackendError
-from sitl.body import body_axes
 from sitl.config import VehicleConfig
 from sitl.pipeline import STATE_SIZE
 
@@ -70,7 +69,9 @@ class Engine:
     """A JSBSim instance. ``measured`` (len(MEASURED) + n,) is what was read after the last step, in JSBSim's
     feet and pounds, then the motors' speeds (rad/s); ``place`` (12,) is a place row of ``jsbsim_pilot``."""
 
-    def __init__(self, config: VehicleConfig, place: Place, state: FloatArray, ground: float, air: Air) -> None:
+    def __init__(
+        self, config: VehicleConfig, place: Place, state: FloatArray, ground: float, air: Air
+    ) -> None:
         """At the motion and the motor speeds of a ``state`` row (as in ``sitl.pipeline``; site NED). The
         ground is at z = ``ground`` (m) there and level all around. Raises BackendError."""
         n = len(config.rotors)
@@ -133,10 +134,9 @@ class Engine:
 
     def _begin(self, place: Place, state: FloatArray, ground: float, motors: list[Any]) -> None:
         here = place.geodetic(state[0:3])
-        below: Geodetic = place.geodetic((state[0], state[1], ground))
+        below = place.geodetic((state[0], state[1], ground))
         local = place.local_axes(here)
-        w, x, y, z = state[6:10].tolist()
-        rotation = local @ np.array(body_axes.py_func((w, x, y, z))).T
+        rotation = local @ rotation_of(state[6:10])
         velocity = (local @ state[3:6]).tolist()
         for name, value in (
             ("lat-geod-deg", here.latitude),

@@ -1,9 +1,9 @@
 """A vehicle as a JSBSim model: the aircraft file, written from a ``VehicleConfig``.
 
-It is whole by itself. What it is given are the properties ``rotor-i/command-rad_sec``, the speeds asked of the
-motors, and ``rotor-i/left``, what each rotor has left of its motor's speed. Motor lag, thrust, torque, rotor
-drag and rolling moment are JSBSim functions, so that they feel JSBSim's own air; the rigid body, gravity, the
-turning Earth and the ground are JSBSim's.
+It is whole by itself. What it is given are the properties ``rotor-i/command-rad_sec``, the speeds asked of
+the motors, and ``rotor-i/left``, what each rotor has left of its motor's speed. Motor lag, thrust, torque,
+rotor drag and rolling moment are JSBSim functions, so that they feel JSBSim's own air; the rigid body,
+gravity, the turning Earth and the ground are JSBSim's.
 
 Functions work in SI and end in pounds and feet, as ``<aerodynamics>`` wants them. Places are in JSBSim's
 structural frame, x aft, y right, z up, with the centre of mass at its origin.
@@ -100,10 +100,9 @@ def _ground_reactions(root: Element, config: VehicleConfig) -> None:
         angle = math.tau * (leg + 0.5) / _LEGS
         x, y = config.gear_radius * math.cos(angle), config.gear_radius * math.sin(angle)
         _contact(reactions, f"leg-{leg}", (x, y, foot), stiffness / _LEGS, damping / _LEGS, config)
-    reach = 0.5 * config.span
     for index, rotor in enumerate(config.rotors):
         x, y, z = rotor.position
-        share = reach / rotor.arm
+        share = max(1.0, 0.5 * config.span / rotor.arm)
         _contact(
             reactions,
             f"tip-{index}",

@@ -23,6 +23,7 @@ from sitl.pipeline import FLYING, LANDED, STATE_SIZE, command_motors
 from sitl.rotors import wrench
 from sitl.vectors import Axes, Vector, plus, times, to_body, to_ned
 
+
 @kernel
 def ned_rows(latitude: float, longitude: float) -> Axes:
     """North, east and down (rad in, ECEF out) at a geodetic latitude and a longitude."""

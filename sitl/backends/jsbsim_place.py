@@ -52,6 +52,14 @@ def ned_axes(latitude: float, longitude: float) -> FloatArray:
     return axes
 
 
+def rotation_of(attitude: FloatArray) -> FloatArray:
+    """The rotation (3, 3) from body to NED of an attitude (4,): w, x, y, z."""
+    w, (x, y, z) = attitude[0], attitude[1:]
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: FloatArray = np.eye(3) + 2.0 * (w * skew + skew @ skew)
+    return rotation
+
+
 def euler_angles(rotation: FloatArray) -> tuple[float, float, float]:
     """Roll, pitch, yaw (rad) of a rotation (3, 3) from body (FRD) to NED."""
     return (

@@ -44,7 +44,12 @@ class JsbsimVehicle:
         self._engine = Engine(config, place, self._state, ground, air)
 
     def advance(
-        self, steps: int, reference: Reference | None, wind: ArrayLike = (0.0, 0.0, 0.0), *, idle: bool = False
+        self,
+        steps: int,
+        reference: Reference | None,
+        wind: ArrayLike = (0.0, 0.0, 0.0),
+        *,
+        idle: bool = False,
     ) -> FloatArray:
         """As ``Physics`` says. JSBSim takes the wind as of the NED of where the vehicle is, which 1 km from
         the site's origin is tilted by 0.16 mrad."""
