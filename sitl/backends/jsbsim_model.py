@@ -25,8 +25,8 @@ POUND: Final = 0.45359237 * 9.80665
 
 _STIFFEST: Final = 50.0
 """Most that the landing gear's own frequency is to be (rad/s): a weight that sinks in by 4 mm."""
-_STIFFEST_PER_STEP: Final = 0.2
-"""Most that it turns in one physics step (rad): beyond, JSBSim's explicit integration makes contacts ring."""
+_STIFFEST_PER_STEP: Final = 0.4
+"""Most that it turns in one physics step (rad), which JSBSim's explicit integration can follow."""
 _LEGS: Final = 4
 _TIP_SHARE: Final = 0.1
 """Stiffness of a rotor tip that touches the ground, over that of the whole gear."""

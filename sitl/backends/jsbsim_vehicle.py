@@ -78,6 +78,11 @@ class JsbsimVehicle:
         self._engine.leave(index, left)
 
     @property
+    def measured(self) -> FloatArray:
+        """What JSBSim said after the last step, a row of ``jsbsim_engine``; an own copy."""
+        return self._engine.measured.copy()
+
+    @property
     def state(self) -> VehicleState:
         """The true state after the last step."""
         return state_of(self._state)

@@ -37,8 +37,11 @@ def physics(
     seed: int,
     system_id: int,
 ) -> Physics:
-    """The vehicle in ``site``; ``seed`` (≥ 0) and ``system_id`` make JSBSim's turbulence. Raises ValueError for a place to hover that is on the ground or a weather
-    that this physics cannot make, ModuleNotFoundError without JSBSim, and BackendError."""
+    """The vehicle in ``site``; ``seed`` (≥ 0) and ``system_id`` make JSBSim's turbulence.
+
+    Raises ValueError for a place to hover that is on the ground or a weather that this physics cannot make,
+    ModuleNotFoundError without JSBSim, and BackendError.
+    """
     if name == "own":
         if weather.needs_jsbsim:
             raise ValueError(f"the weather has {weather.needs_jsbsim}, which needs physics: jsbsim")

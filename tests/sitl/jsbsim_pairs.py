@@ -1,4 +1,4 @@
-"""The same vehicle twice, once with each physics, from the same state row; and the flights they are put through."""
+"""The same vehicle twice, once with each physics, from the same state row; and what both are flown on."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def gravity() -> float:
 
 
 class Pair:
-    """Both begin as the ``row`` says. The controllers of both reckon with JSBSim's gravity, and ours has it."""
+    """Both begin as the ``row`` says. Both controllers, and our physics, have JSBSim's gravity."""
 
     def __init__(self, config: VehicleConfig, row: np.ndarray, air: Air = STILL) -> None:
         self.jsbsim = JsbsimVehicle(config, PLACE, row, 0.0, gravity(), air)
@@ -89,7 +89,7 @@ def lap(t: float) -> Reference:
     a, r, w = t, 5.0, 1.0
     c, s, cd, sd = np.cos(a), np.sin(a), np.cos(0.5 * a), np.sin(0.5 * a)
     return Reference(
-        HIGH + (r * (c - 1.0), r * s, -sd),
+        HIGH + np.array([r * (c - 1.0), r * s, -sd]),
         np.array([-r * w * s, r * w * c, -0.5 * cd]),
         np.array([-r * w**2 * c, -r * w**2 * s, 0.25 * sd]),
         np.array([r * w**3 * s, -r * w**3 * c, 0.125 * cd]),

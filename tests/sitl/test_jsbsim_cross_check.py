@@ -1,7 +1,7 @@
 """JSBSim against our own physics, at 4 ms. Ours has JSBSim's gravity and flies in the wind that JSBSim says.
 
-The bars are 0.1° for a tumble, 10 mm for a step of 5 m, 5 mm for a minute of windy laps and 1 mm for the height
-at rest. What is held here is nearer to what is seen, so that a hundredth more mass or thrust is noticed.
+The bars are 0.1° for a tumble, 10 mm for a step of 5 m, 5 mm for a minute of windy laps and 1 mm for the
+height at rest. What is held here is nearer to what is seen, so that a hundredth more thrust is noticed.
 """
 
 from __future__ import annotations
