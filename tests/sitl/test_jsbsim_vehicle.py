@@ -290,6 +290,11 @@ def test_what_is_not_finite_is_refused_and_moves_nothing(value, which):
     assert np.all(np.isfinite(vehicle_.advance(2, Reference.hover(HIGH, 0.3))))
 
 
+def test_a_vehicle_may_be_called_anything():
+    config = FIREFLY.model_copy(update={"name": '../<a> & "b"'})
+    assert flying(config).advance(5, Reference.hover(HIGH, 0.3)).shape == (5, 3)
+
+
 def test_a_state_that_is_lost_in_jsbsim_does_not_pass_silently():
     row = initial_states(FIREFLY, HIGH, [0.3], 0.0, hovering=True)[0]
     row[3] = np.nan
