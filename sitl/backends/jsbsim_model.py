@@ -28,6 +28,7 @@ _STIFFEST: Final = 50.0
 _STIFFEST_PER_STEP: Final = 0.4
 """Most that it turns in one physics step (rad), which JSBSim's explicit integration can follow."""
 _LEGS: Final = 4
+_AT_REST: Final = 1e-3
 _TIP_SHARE: Final = 0.1
 """Stiffness of a rotor tip that touches the ground, over that of the whole gear."""
 
@@ -135,7 +136,8 @@ def _contact(
 
 
 def _motors(root: Element, config: VehicleConfig) -> None:
-    """First-order lag, solved exactly for a command that is held: ω ← c + e^(−h/τ) (ω − c)."""
+    """First-order lag, solved exactly for a command that is held: ω ← c + e^(−h/τ) (ω − c). A motor that is
+    told to stop ends at zero instead of creeping through denormal numbers."""
     system = SubElement(root, "system", name="motors")
     step = config.physics_period * 1e-6
     rising, falling = (math.exp(-step / tau) for tau in (config.tau_up, config.tau_down))
@@ -147,7 +149,9 @@ def _motors(root: Element, config: VehicleConfig) -> None:
         excess = _of("difference", motor, command)
         kept = _of("ifthen", _of("gt", motor, command), falling, rising)
         component = SubElement(channel, "fcs_function", name=motor)
-        SubElement(component, "function").append(_of("sum", command, _of("product", kept, excess)))
+        speed = _of("sum", command, _of("product", kept, excess))
+        turning = _of("gt", _of("sum", motor, command), _AT_REST)
+        SubElement(component, "function").append(_of("ifthen", turning, speed, 0.0))
 
 
 def _aerodynamics(root: Element, config: VehicleConfig, *, isa: bool) -> None:

@@ -106,6 +106,8 @@ def test_the_motors_are_those_of_our_own_physics():
         own.advance(steps, None, idle=idle)
         jsbsim.advance(steps, None, idle=idle)
         np.testing.assert_allclose(jsbsim.state.rotor_speeds, own.state.rotor_speeds, rtol=1e-12)
+    jsbsim.advance(400, None)
+    assert np.all(jsbsim.state.rotor_speeds == 0.0)
 
 
 @given(st.floats(-np.pi, np.pi), st.floats(-1.5, 1.5), st.floats(-np.pi, np.pi))
