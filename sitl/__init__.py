@@ -10,5 +10,5 @@ and what is believed of it (``sensors`` with their ``profiles``, ``positioning``
 ArduPilot and PX4 do differently, ``shaper`` makes every reference flyable, ``course`` shifts it by the
 estimate's error, ``origin`` turns the vehicle's own frame into the site's. ``pipeline`` is the compiled part
 from controller to body, with ``observer`` between them; ``lanes`` let the same kernels run on eight vehicles
-at once (``batch``).
+at once (``batch``). ``backends`` can put JSBSim in the place of all from rotors to body.
 """

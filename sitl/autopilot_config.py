@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from sitl.backends.physics import PhysicsName
 from sitl.battery import BatteryConfig
 from sitl.profiles import ProfileName
 
@@ -59,6 +60,7 @@ class AutopilotConfig(BaseModel):
         "quiet", description="quiet: ``rates``, what companions need; normal: what ground stations expect"
     )
     sensors: ProfileName = Field("truth", description="how good its estimate is: truth, rtk or gnss")
+    physics: PhysicsName = Field("own", description="what moves the vehicle: our own integrator, or JSBSim")
     start_height: float = Field(
         0.0,
         ge=0.0,

@@ -36,5 +36,5 @@ def sources_digest(*names: str) -> int:
     """A number that changes with the text of these files of the package, for an ``entry``'s closure."""
     digest = hashlib.sha256()
     for name in names:
-        digest.update(Path(__file__).with_name(name).read_bytes())
+        digest.update((Path(__file__).parent / name).read_bytes())
     return int.from_bytes(digest.digest()[:7], "big")

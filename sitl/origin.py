@@ -19,14 +19,14 @@ class Origin:
     """An origin at whole degE7 and mm, so that the GPS_GLOBAL_ORIGIN (49) that is sent is exact.
 
     p_site = R p_local + t: ``rotation`` R (3, 3), ``position`` t (3,) m, site NED; ``turn`` (rad) is the yaw
-    in the site of the local north.
+    in the site of the local north; ``site`` the site itself.
     """
 
     def __init__(self, site: FleetFrame, latitude: float, longitude: float, altitude: float) -> None:
         self.latitude = round(latitude * 1e7) / 1e7
         self.longitude = round(longitude * 1e7) / 1e7
         self.altitude = round(altitude * 1e3) / 1e3
-        self._site = site
+        self.site = site
         frame = site.local(self.latitude, self.longitude, self.altitude)
         # Row i of ``axes`` is the local axis i in the site: the transpose of R, as rows of vectors need it.
         axes = enu_to_ned(frame.velocity_to_fleet(np.eye(3)))
@@ -60,8 +60,8 @@ class Origin:
 
     def local(self, latitude: float, longitude: float, altitude: float) -> Vector:
         """The position (m, local NED) of a place (deg, deg, m)."""
-        return self.position_to_local(enu_to_ned(self._site.to_enu(latitude, longitude, altitude)))
+        return self.position_to_local(enu_to_ned(self.site.to_enu(latitude, longitude, altitude)))
 
     def geodetic(self, local: Vector) -> tuple[float, float, float]:
         """Latitude (deg), longitude (deg), altitude (m) of a position (m, local NED)."""
-        return self._site.to_geodetic(ned_to_enu(self.motion_to_site([local])[0]))
+        return self.site.to_geodetic(ned_to_enu(self.motion_to_site([local])[0]))

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from mavlink_bridge.messages import Vector
 from sitl.autopilot_config import AutopilotConfig
+from sitl.backends.selection import Start, physics
 from sitl.config import VehicleConfig
 from sitl.course import Course, Level, believed
 from sitl.guidance import Guidance
@@ -16,7 +17,7 @@ from sitl.origin import Origin
 from sitl.profiles import PROFILES
 from sitl.sensors import Estimate, Sensors
 from sitl.setpoints import ZERO
-from sitl.vehicle import Reference, Vehicle, VehicleState
+from sitl.vehicle import Reference, VehicleState
 from sitl.weather import Weather, WeatherConfig
 
 # The reference is renewed at least this often (µs), as real position loops run at 50 to 100 Hz; the vehicle's
@@ -27,8 +28,7 @@ _RENEWAL: Final = 10_000
 class Plant:
     """Moves the vehicle and the guidance that leads it, in strides on a fixed grid from time 0.
 
-    ``sensors`` is the estimator, ``course`` what is tracked; ``wind`` (m/s, site NED) is the velocity of the
-    air in the last stride.
+    ``sensors`` is the estimator, ``course`` what is tracked.
     """
 
     def __init__(
@@ -46,9 +46,9 @@ class Plant:
         ground = float(origin.position[2]) + vehicle.rest_height
         start = origin.motion_to_site([(0.0, 0.0, -config.start_height)])[0]
         flying = config.start_height > 0.0
-        self.vehicle = Vehicle(vehicle, start, config.yaw + origin.turn, ground, hovering=flying)
+        begin = Start(start, config.yaw + origin.turn, ground, flying)
+        self.vehicle = physics(config.physics, vehicle, begin, origin.site, weather, seed, config.system_id)
         self.course = Course(guidance, origin)
-        self.wind: Vector = ZERO
         profile = PROFILES[config.sensors]
         self.sensors = Sensors(profile, origin, self.vehicle.state, patience, seed, config.system_id)
         air = Weather(weather, seed, config.system_id)
@@ -76,13 +76,12 @@ class Plant:
         while self._steps < last:
             count = min(last - self._steps, stride - self._steps % stride)
             begin, step = self._steps * period, count * period
-            if self._weather is not None:
-                self.wind = self._air(self._weather, begin)
+            wind = self._air(begin)
             reference = self.course.next(step)
             if reference is not None and not self.sensors.exact:
                 reference = self._believed(reference)
             idle = armed and reference is None
-            self._trace.append(vehicle.advance(count, reference, self.wind, idle=idle))
+            self._trace.append(vehicle.advance(count, reference, wind, idle=idle))
             guidance.advance(begin, step)
             self._steps += count
             self._truth = self._belief = None
@@ -100,6 +99,11 @@ class Plant:
         if self._truth is None:
             self._truth = self.vehicle.state
         return self._truth
+
+    @property
+    def wind(self) -> Vector:
+        """Velocity of the air (m/s, site NED) in the last physics step."""
+        return self.vehicle.air
 
     def estimate(self) -> Estimate:
         """What is believed of it."""
@@ -141,7 +145,10 @@ class Plant:
 
     # Within a stride
 
-    def _air(self, weather: Weather, now: int) -> Vector:
+    def _air(self, now: int) -> Vector:
+        weather = self._weather
+        if weather is None:
+            return ZERO
         if not weather.turbulent:
             return weather.wind(now)
         u, v, w = self.state.velocity.tolist()

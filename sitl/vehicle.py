@@ -8,6 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mavlink_bridge.messages import Vector
 from sitl.airframe import FloatArray, airframe, airframe_record, hover_speeds
 from sitl.batch import advance_rows
 from sitl.config import VehicleConfig
@@ -137,8 +138,24 @@ def advance_many(
     return tracks.reshape(-1, steps, 3)
 
 
+def state_of(row: FloatArray) -> VehicleState:
+    """The state that a state row (STATE_SIZE + 2 n,) tells of; own copies."""
+    row = row.copy()
+    motors, left = row[STATE_SIZE:].reshape(2, -1)
+    return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], motors * left, row[13:16], row[20:23])
+
+
+def checked_rotor(config: VehicleConfig, index: int, left: float) -> None:
+    """Raises IndexError for a rotor that the vehicle has not, ValueError for a part that is not 0 to 1."""
+    n = len(config.rotors)
+    if not 0 <= index < n:
+        raise IndexError(f"rotor {index} of {config.name}: its rotors are 0 to {n - 1}")
+    if not 0.0 <= left <= 1.0:
+        raise ValueError(f"rotor {index} of {config.name}: {left} left, allowed is 0 to 1")
+
+
 class Vehicle:
-    """One vehicle over flat ground."""
+    """One vehicle over flat ground, moved by our own physics."""
 
     def __init__(
         self,
@@ -160,7 +177,7 @@ class Vehicle:
         self._states = initial_states(config, position, [yaw], ground, hovering=hovering, gravity=gravity)
         self._commands = np.zeros((1, COMMAND_SIZE))
         self._state, self._command = self._states[0], self._commands[0]
-        self._motors, self._left = self._state[STATE_SIZE:].reshape(2, -1)
+        self._left = self._state[STATE_SIZE:].reshape(2, -1)[1]
         self._ground = ground
 
     def advance(
@@ -182,19 +199,13 @@ class Vehicle:
         Its thrust and its torques fall with the square. Nothing tells the controller. Raises IndexError and
         ValueError.
         """
-        n = len(self.config.rotors)
-        if not 0 <= index < n:
-            raise IndexError(f"rotor {index} of {self.config.name}: its rotors are 0 to {n - 1}")
-        if not 0.0 <= left <= 1.0:
-            raise ValueError(f"rotor {index} of {self.config.name}: {left} left, allowed is 0 to 1")
+        checked_rotor(self.config, index, left)
         self._left[index] = left
 
     @property
     def state(self) -> VehicleState:
         """The true state after the last step."""
-        row = self._state.copy()
-        speeds = self._motors * self._left
-        return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], speeds, row[13:16], row[20:23])
+        return state_of(self._state)
 
     @property
     def yaw(self) -> float:
@@ -206,3 +217,9 @@ class Vehicle:
     def on_ground(self) -> bool:
         """Whether the vehicle stands on the ground after the last step."""
         return bool(self._state[LANDED])
+
+    @property
+    def air(self) -> Vector:
+        """Velocity of the air (m/s, NED) in the last step."""
+        north, east, down = self._command[19:22].tolist()
+        return north, east, down

@@ -7,7 +7,7 @@ what comes out is NED in the site's frame as the physics wants it.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -52,6 +52,24 @@ class WeatherConfig(BaseModel):
         "none", description="Dryden, of MIL-F-8785C: a severity, or the wind at 20 feet behind it (m/s)"
     )
 
+    turbulence_by: Literal["own", "jsbsim"] = Field(
+        "own",
+        description="who makes the turbulence: our filters, or JSBSim's, which needs physics: jsbsim, takes "
+        "heights above the sea, and is none for a vehicle at rest in still air",
+    )
+    atmosphere: Literal["uniform", "isa"] = Field(
+        "uniform",
+        description="density of the air: what the vehicle's numbers were found in, everywhere, or that of "
+        "the standard atmosphere (ISA), where they are those at sea level; isa needs physics: jsbsim",
+    )
+
+    @property
+    def needs_jsbsim(self) -> str:
+        """The setting that only JSBSim can make; empty if there is none."""
+        if self.turbulence_by == "jsbsim":
+            return "turbulence_by: jsbsim"
+        return "atmosphere: isa" if self.atmosphere == "isa" else ""
+
     @property
     def w20(self) -> float:
         """The wind at 20 feet (m/s) that makes the turbulence; 0 for none."""
@@ -64,8 +82,8 @@ class WeatherConfig(BaseModel):
 
 
 class Weather:
-    """The air around one vehicle. ``still``: there is never any wind; ``turbulent``: it depends on where the
-    vehicle is."""
+    """The air around one vehicle, but for turbulence that JSBSim makes. ``still``: there is never any wind;
+    ``turbulent``: it depends on where the vehicle is."""
 
     def __init__(self, config: WeatherConfig, seed: int, system_id: int) -> None:
         """``seed`` (≥ 0) and ``system_id`` make the turbulence, which is a different one for each vehicle."""
@@ -77,7 +95,9 @@ class Weather:
         # Along the wind; where there is none, north is as good as any.
         self._ahead = (north / level, east / level) if level else (1.0, 0.0)
         self._turbulence = (
-            Turbulence(config.w20, np.random.default_rng([seed, system_id, _STREAM])) if config.w20 else None
+            Turbulence(config.w20, np.random.default_rng([seed, system_id, _STREAM]))
+            if config.w20 and config.turbulence_by == "own"
+            else None
         )
         self.still = config.still
         self.turbulent = self._turbulence is not None

@@ -52,6 +52,7 @@ def swarm(
     sensors: Annotated[Optional[str], typer.Option(help="truth, rtk or gnss.")] = None,  # noqa: UP045
     wind: Annotated[Optional[str], typer.Option(help="m/s towards east, or EAST,NORTH[,UP].")] = None,  # noqa: UP045
     replan_hz: Annotated[Optional[float], typer.Option(help="Plans per second.")] = None,  # noqa: UP045
+    physics: Annotated[Optional[str], typer.Option(help="own or jsbsim.")] = None,  # noqa: UP045
     real_time: Annotated[
         bool, typer.Option("--real-time", help="Under the wall clock: a process per node, over UDP.")
     ] = False,
@@ -68,7 +69,9 @@ def swarm(
     from outrider.report.command import NAME, make, write
     from outrider.summary import exit_status
 
-    options = flying.Options(method, avoidance, planar, vehicles, loss, delay_ms, sensors, replan_hz, wind)
+    options = flying.Options(
+        method, avoidance, planar, vehicles, loss, delay_ms, sensors, replan_hz, wind, physics
+    )
     prepared = flying.prepare(scenario, options)
     directory = flying.run_directory(out, prepared.scenario, seed)
     with progress(prepared.scenario.duration_s) as watch:

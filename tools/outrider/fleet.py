@@ -131,6 +131,7 @@ class Fleet:
             altitude=altitude,
             yaw=float(np.pi / 2 - facing),
             sensors=self.scenario.sensors,
+            physics=self.scenario.physics,
             **self.scenario.autopilot.model_dump(),
             start_height=float(start[2]) if self.scenario.airborne else 0.0,
         )

@@ -33,6 +33,7 @@ class Options(NamedTuple):
     sensors: str | None = None
     replan_hz: float | None = None
     wind: str | None = None
+    physics: str | None = None
 
 
 def apply(scenario: Scenario, options: Options) -> Scenario:
@@ -54,6 +55,8 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
         changes["vehicles"] = _vehicles(options.vehicles, scenario)
     if options.sensors is not None:
         changes["sensors"] = options.sensors
+    if options.physics is not None:
+        changes["physics"] = options.physics
     if options.wind is not None:
         changes["weather"] = {**scenario.weather.model_dump(), "wind": _wind(options.wind)}
     if options.replan_hz is not None:

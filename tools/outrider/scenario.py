@@ -74,6 +74,9 @@ class Scenario(Part):
     origin: Origin = Origin()
     starts: Starts
     bystanders: tuple[Bystander, ...] = Field((), max_length=50)
+    physics: Literal["own", "jsbsim"] = Field(
+        "own", description="what moves the vehicles: our own integrator, or JSBSim (extra sitl)"
+    )
     airborne: bool = Field(
         False, description="begin in the air, hovering at the starts, and end there: no take-off, no landing"
     )
@@ -132,7 +135,12 @@ class Scenario(Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scenario:
-        found = (*self._timing_faults(), *self._place_faults(), *self._name_faults())
+        found = (
+            *self._timing_faults(),
+            *self._place_faults(),
+            *self._weather_faults(),
+            *self._name_faults(),
+        )
         for fault in (*found, *overlaps(self.faults, self.partitions)):
             raise ValueError(fault)
         return self
@@ -172,6 +180,10 @@ class Scenario(Part):
                 yield f"task {self.task!r} needs a target of kind 'fixed': what the vehicles face"
             if self.companion.task != "goto":
                 yield f"task {self.task!r} needs companion.task: goto; it is {self.companion.task!r}"
+
+    def _weather_faults(self) -> Iterator[str]:
+        if self.physics == "own" and (setting := self.weather.needs_jsbsim):
+            yield f"weather.{setting} needs physics: jsbsim; it is 'own'"
 
     def _name_faults(self) -> Iterator[str]:
         allowed = f"{self.systems[0]} to {self.systems[-1]}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,6 +69,9 @@ def prepare(name: str, options: Options) -> Prepared:
         origin = scenario.origin
         frame = FleetFrame(origin.latitude, origin.longitude, origin.altitude)
         load_log(scenario.target, config_root() / "logs" / scenario.target.log, frame)
+    if scenario.physics == "jsbsim":
+        # Nor does a package that is missing.
+        import_module("jsbsim")
     vehicle = load(find("vehicles", scenario.vehicle), VehicleConfig)
     last = len(vehicle.rotors) - 1
     wrong = [

@@ -34,7 +34,6 @@ from outrider.realtime.workers import Remains
 from outrider.scenario import Scenario
 from outrider.truth import SAMPLE
 from sitl.config import VehicleConfig
-from sitl.vehicle import Vehicle
 
 _START, _START_WITH_PRIORITY = 1_000_000, 3_000_000
 """µs between forking and the first step: who becomes real-time while others still start makes them late."""
@@ -73,7 +72,9 @@ class RealTimeFlight:
     def run(self) -> None:
         """Fly to the end; ``outcome`` then says how it was. OutriderError if a process ended by a fault."""
         # Compiled before forking, so that not every process has to.
-        Vehicle(self.fleet.vehicle, np.zeros(3)).advance(1, None)
+        first = self.fleet.autopilot(0)
+        for now in (0, self.fleet.vehicle.physics_period):
+            first.step(now, [])
         board = Board(self.scenario.size)
         wiring = wire(self.scenario.size, self._clock, len(self.scenario.moving), len(self.fleet.helmed))
         with TemporaryDirectory() as folder, self._interruptible():

@@ -1,0 +1,206 @@
+"""JSBSim itself, with one vehicle in it: motor commands and wind in, what is measured of the motion out.
+
+JSBSim is imported when the first engine is made: the extra ``sitl`` brings it, where there is a wheel.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from mavlink_bridge.messages import Vector
+from sitl.backends.jsbsim_model import FOOT, aircraft, command_property, left_property, motor_property
+from sitl.backends.jsbsim_place import euler_angles, rotation_of
+from sitl.backends.physics import BackendError
+from sitl.config import VehicleConfig
+from sitl.pipeline import STATE_SIZE
+
+if TYPE_CHECKING:
+    from sitl.airframe import FloatArray
+    from sitl.backends.jsbsim_place import Place
+
+MEASURED: Final = (
+    *(f"position/ecef-{axis}-ft" for axis in "xyz"),
+    *(f"velocities/ecef-{axis}-fps" for axis in "xyz"),
+    *(f"attitude/{angle}-rad" for angle in ("phi", "theta", "psi")),
+    "position/lat-geod-rad",
+    "position/long-gc-rad",
+    *(f"velocities/{rate}-rad_sec" for rate in "pqr"),
+    *(f"forces/fb{axis}-total-lbs" for axis in "xyz"),
+    *(f"moments/{axis}-total-lbsft" for axis in "lmn"),
+    "forces/fbz-gear-lbs",
+)
+"""What is read after each step, before the motors' speeds."""
+GROUND: Final = len(MEASURED) - 1
+"""Where the push of the ground is: gear/wow does not count points without wheels."""
+
+_AIR: Final = ("north", "east", "down")
+
+# JSBSim's codes of integrators. Its default ones turn a free tumble by 13° in 10 s.
+_EULER, _ADAMS_BASHFORTH_3, _BUSS_2 = 1.0, 4.0, 7.0
+_RATES: Final = ("simulation/integrator/rate/rotational", "simulation/integrator/rate/translational")
+_POSITIONS: Final = {
+    "simulation/integrator/position/rotational": _BUSS_2,
+    "simulation/integrator/position/translational": _ADAMS_BASHFORTH_3,
+}
+_MILSPEC: Final = 3.0
+_QUIET: Final = "JSBSIM_DEBUG"
+
+
+class Air(NamedTuple):
+    """What of the air is JSBSim's own doing."""
+
+    w20: float = 0.0  # m/s, wind at 20 feet behind its turbulence (MIL-F-8785C); 0 for none
+    severity: int = 0  # of its table for more than 1000 feet above the sea: 3 light, 4 moderate, 6 severe
+    seed: int = 0
+    isa: bool = False  # density falls with height, and thrust and drag with it
+
+
+STILL: Final = Air()
+
+
+class Engine:
+    """A JSBSim instance. ``measured`` (len(MEASURED) + n,) is what was read after the last step, in JSBSim's
+    feet and pounds, then the motors' speeds (rad/s); ``place`` (12,) is a place row of ``jsbsim_pilot``."""
+
+    def __init__(
+        self, config: VehicleConfig, place: Place, state: FloatArray, ground: float, air: Air
+    ) -> None:
+        """At the motion and the motor speeds of a ``state`` row (as in ``sitl.pipeline``; site NED). The
+        ground is at z = ``ground`` (m) there and level all around. Raises BackendError."""
+        n = len(config.rotors)
+        self._name = config.name
+        self._fdm = _loaded(config, isa=air.isa)
+        self._fdm.set_dt(config.physics_period * 1e-6)
+        self._commands = [self._node(command_property(i)) for i in range(n)]
+        self._left = [self._node(left_property(i)) for i in range(n)]
+        motors = [self._node(motor_property(i)) for i in range(n)]
+        self._readings = [self._node(name) for name in MEASURED] + motors
+        self._wind = [self._node(f"atmosphere/wind-{axis}-fps") for axis in _AIR]
+        self._total_wind = [self._node(f"atmosphere/total-wind-{axis}-fps") for axis in _AIR]
+        self._rates = [self._node(name) for name in _RATES]
+        self._standing: bool | None = None
+        self.measured = np.zeros(len(MEASURED) + n)
+        for name, code in _POSITIONS.items():
+            self._set(name, code)
+        self._begin(place, state, ground, motors)
+        self._stir(air)
+        self._read()
+        # JSBSim finds a latitude to within 0.1 mm only; what is asked for is where it began.
+        origin = FOOT * self.measured[0:3] - state[0:3] @ place.axes
+        self.place = np.concatenate((origin, place.axes.ravel()))
+
+    def step(self, commanded: list[float], wind: list[float]) -> None:
+        """One physics step with the motors held at ``commanded`` (n,) (rad/s), in a wind (m/s, NED) that
+        JSBSim's own turbulence is added to."""
+        for node, speed in zip(self._commands, commanded, strict=True):
+            node.set_double_value(speed)
+        for node, part in zip(self._wind, wind, strict=True):
+            node.set_double_value(part / FOOT)
+        if not self._fdm.run():
+            raise BackendError(f"JSBSim stopped at {self._fdm.get_sim_time():.3f} s with {self._name}")
+        self._read()
+
+    def leave(self, rotor: int, left: float) -> None:
+        """From now on a rotor has the part ``left`` (0…1) of its motor's speed."""
+        self._left[rotor].set_double_value(left)
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start."""
+        return float(self._fdm.get_sim_time())
+
+    @property
+    def air(self) -> Vector:
+        """Velocity of the air (m/s, NED), turbulence included."""
+        north, east, down = (FOOT * node.get_double_value() for node in self._total_wind)
+        return north, east, down
+
+    def _read(self) -> None:
+        self.measured[:] = [node.get_double_value() for node in self._readings]
+        standing = bool(self.measured[GROUND] != 0.0)
+        if standing is not self._standing:
+            # Friction is worked out as what stops the vehicle in one step of Euler's. Given to a method that
+            # carries accelerations on, the vehicle slides for ever.
+            for node in self._rates:
+                node.set_double_value(_EULER if standing else _ADAMS_BASHFORTH_3)
+            self._standing = standing
+
+    def _begin(self, place: Place, state: FloatArray, ground: float, motors: list[Any]) -> None:
+        here = place.geodetic(state[0:3])
+        below = place.geodetic((state[0], state[1], ground))
+        local = place.local_axes(here)
+        rotation = local @ rotation_of(state[6:10])
+        velocity = (local @ state[3:6]).tolist()
+        for name, value in (
+            ("lat-geod-deg", here.latitude),
+            ("long-gc-deg", here.longitude),
+            ("terrain-elevation-ft", below.altitude / FOOT),
+            # JSBSim's h-sl is not along the vertical: 3 mm less at 500 m.
+            ("h-agl-ft", (here.altitude - below.altitude) / FOOT),
+            *zip(("phi-rad", "theta-rad", "psi-true-rad"), euler_angles(rotation), strict=True),
+            *((f"v{axis}-fps", part / FOOT) for axis, part in zip("ned", velocity, strict=True)),
+            *((f"{axis}-rad_sec", part) for axis, part in zip("pqr", state[10:13].tolist(), strict=True)),
+        ):
+            self._set(f"ic/{name}", value)
+        speeds = state[STATE_SIZE : STATE_SIZE + len(motors)].tolist()
+        for motor, command, speed in zip(motors, self._commands, speeds, strict=True):
+            motor.set_double_value(speed)
+            command.set_double_value(speed)
+        if not self._fdm.run_ic():
+            raise BackendError(f"JSBSim does not take the start of {self._name}: {here}")
+
+    def _stir(self, air: Air) -> None:
+        """After the start, which sets the wind back."""
+        self._set("simulation/randomseed", float(air.seed))
+        self._set("atmosphere/turb-type", _MILSPEC if air.w20 else 0.0)
+        self._set("atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps", air.w20 / FOOT)
+        self._set("atmosphere/turbulence/milspec/severity", float(air.severity))
+
+    def _set(self, name: str, value: float) -> None:
+        self._node(name).set_double_value(value)
+
+    def _node(self, name: str) -> Any:
+        """A property that is there: JSBSim makes a new one of a name that it does not know."""
+        node = self._fdm.get_property_manager().get_node(name)
+        if node is None:
+            raise BackendError(f"this JSBSim has no property {name}; allowed is version 1.2.3 or newer")
+        return node
+
+
+def _loaded(config: VehicleConfig, *, isa: bool) -> Any:
+    """A JSBSim with the model of a vehicle, and nothing printed."""
+    import jsbsim
+
+    with tempfile.TemporaryDirectory(prefix="outrider-jsbsim-") as folder, _silence():
+        root = Path(folder)
+        for name in ("engine", "systems"):
+            (root / name).mkdir()
+        # A name that is a file's whatever the vehicle is called.
+        model = root / "aircraft" / "vehicle"
+        model.mkdir(parents=True)
+        (model / "vehicle.xml").write_text(aircraft(config, isa=isa), encoding="utf-8")
+        fdm = jsbsim.FGFDMExec(folder)
+        if not fdm.load_model("vehicle"):
+            raise BackendError(f"JSBSim {jsbsim.__version__} cannot load the model of {config.name}")
+    return fdm
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """JSBSim reads how much to say from the environment, when it is made."""
+    before = os.environ.get(_QUIET)
+    os.environ[_QUIET] = "0"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_QUIET]
+        else:
+            os.environ[_QUIET] = before
