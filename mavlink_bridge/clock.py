@@ -70,13 +70,13 @@ class PacedClock:
     def __init__(self, clock: Clock, speed: float, stride: int) -> None:
         self._clock, self._speed, self._stride = clock, speed, stride
         self._start = clock.now()
-        self._reached = 0
+        self._awaited = 0
         self.lost = 0
 
     def now(self) -> int:
         """Simulated time, µs."""
         shown = int((self._clock.now() - self._start) * self._speed) - self.lost
-        beyond = shown - self._reached - self._stride
+        beyond = shown - self._awaited - self._stride
         if beyond > 0:
             self.lost += beyond
             shown -= beyond
@@ -84,10 +84,10 @@ class PacedClock:
 
     def wait_until(self, instant: int) -> None:
         """Until it is ``instant`` (µs, simulated)."""
+        self._awaited = max(self._awaited, instant)
         while self.now() < instant:
             # Within the loop, as what is lost meanwhile makes it later; a µs more, for the rounding.
             self._clock.wait_until(self._start + int((instant + self.lost) / self._speed) + 1)
-        self._reached = max(self._reached, instant)
 
 
 class SkewedClock:
