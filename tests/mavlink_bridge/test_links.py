@@ -75,6 +75,34 @@ def test_a_listener_remembers_a_bounded_number_of_peers() -> None:
         link.close()
 
 
+def test_a_listener_with_a_peer_speaks_first_and_to_others_too() -> None:
+    """As an autopilot's port: its ground station need say nothing, and is never forgotten."""
+    clock = SimulatedClock()
+    station = UdpListener(UdpIn(HOST, 0), clock)
+    listener = UdpListener(UdpIn(HOST, 0, (HOST, station.address[1])), clock)
+    listener.send(frame(1))
+    assert gather(station, bool) == [frame(1)]
+    assert listener.peers == 0
+    other = UdpCaller(UdpOut(HOST, listener.address[1]))
+    for speaker in (station, other):
+        speaker.send(frame(2))
+        gather(listener, bool)
+    assert listener.peers == 2
+    listener.send(frame(3))
+    assert gather(station, bool) == gather(other, bool) == [frame(3)]
+    clock.wait_until(2 * REMEMBERED)
+    assert listener.peers == 0
+    listener.send(frame(4))
+    assert gather(station, bool) == [frame(4)]
+    for link in (listener, station, other):
+        link.close()
+
+
+def test_a_listener_and_its_peer_speak_one_protocol() -> None:
+    with pytest.raises(LinkError, match="one is an IPv4 and the other an IPv6 address"):
+        open_link("udpin:127.0.0.1:0,[::1]:14550", SimulatedClock())
+
+
 def test_a_caller_hears_nobody_but_whom_it_called() -> None:
     listener = UdpListener(UdpIn(HOST, 0), SimulatedClock())
     caller = UdpCaller(UdpOut(HOST, listener.address[1]))

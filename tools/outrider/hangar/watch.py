@@ -16,6 +16,12 @@ from outrider.hangar.request import Request
 from outrider.hangar.screen import Screen
 
 
+def announce(asked: Request) -> None:
+    """On a terminal, that they are being started: the first start on a machine compiles for some seconds."""
+    if sys.stderr.isatty():
+        _write(f"starting {asked.count} × {asked.vehicle.name}, {asked.flavour} …")
+
+
 @contextmanager
 def watching(asked: Request, places: Sequence[Address], board: Board) -> Iterator[Callable[[], None]]:
     """Inside it, call what it gives a few times a second. The vehicles are up."""
