@@ -82,10 +82,9 @@ class Guidance:
 
     @property
     def reached(self) -> bool:
-        """Whether a takeoff is where it leads, and all but at rest."""
-        position, velocity, _ = self.motion
-        gap = self._setpoint.position[2] - position[2]
-        return abs(gap) < _REACHED[0] and math.hypot(*velocity) < _REACHED[1]
+        """Whether a takeoff is where it leads, and all but at rest; what lags behind it comes along."""
+        gap = self._setpoint.position[2] - self._shaper.position[2]
+        return abs(gap) < _REACHED[0] and math.hypot(*self._shaper.velocity) < _REACHED[1]
 
     def wanted(self, now: int) -> Setpoint:
         """The set-point that is followed, extrapolated to ``now`` (µs) and within the limits."""
@@ -162,8 +161,7 @@ class Guidance:
         dt = step * 1e-6
         if activity is Activity.TRACK:
             if end > self._deadline:
-                self.hold()
-                self.timed_out = True
+                self._expire(self.wanted(self._deadline))
             wanted = self.wanted(end)
         else:
             if activity is Activity.HOLD and self._resting:
@@ -174,6 +172,15 @@ class Guidance:
         if self._response is not None:
             shaper = self._shaper
             self._response.advance((shaper.position, shaper.velocity, shaper.acceleration), dt)
+
+    def _expire(self, last: Setpoint) -> None:
+        """Set-points come no more: brake and hold. ArduPilot forgets what velocity it was told, but not the
+        position, which stops where it has got to; the vehicle goes back there."""
+        persists = self._response is not None and self._config.flavour == "ardupilot"
+        if persists and last.levels[0] == POSITION:
+            self._shaper.restart(last.position)
+        self.hold()
+        self.timed_out = True
 
     @property
     def _resting(self) -> bool:

@@ -41,7 +41,7 @@ from outrider.errors import OutriderError
 from outrider.resources import find
 from outrider.yaml_file import load
 from sitl.config import VehicleConfig
-from sitl.response import RESPONSES, Loop, Response
+from sitl.response import RESPONSES, Response, Stage
 from sitl.setpoints import IGNORE_ACCELERATION, POSITION, ZERO, Setpoint
 
 LOGS: Final = Path(__file__).parents[2] / "tests" / "data" / "flights"
@@ -54,16 +54,16 @@ _FIRST_STRIDE, _LAST_STRIDE = 0.1, 0.0005
 """Where the search for drag (1/s) and lag (s) begins, and by how much it goes on."""
 _WAYS: Final = [(up, later) for up in (-1.0, 0.0, 1.0) for later in (-1.0, 0.0, 1.0) if up or later]
 
-Loops = tuple[Loop, ...]
+Stages = tuple[Stage, ...]
 
 
-def led(flight: RecordedFlight, loops: Loops, end: float) -> Array:
+def led(flight: RecordedFlight, stages: Stages, end: float) -> Array:
     """Where the response alone leads along the figure-eight until ``end`` (s): (n, 4), s and m, NED. It
     begins where the vehicle was, at rest."""
     waiting = [(time, _setpoint(message)) for time, message in reversed(trajectory(flight))]
     begin, setpoint = waiting.pop()
     since = begin
-    response = Response(loops)
+    response = Response(stages)
     north, east, down = flight.told.position(np.array([begin]))[0].tolist()
     response.restart((north, east, down))
     path = []
@@ -76,25 +76,25 @@ def led(flight: RecordedFlight, loops: Loops, end: float) -> Array:
     return np.array(path)
 
 
-def off(flight: RecordedFlight, part: Part, loops: Loops) -> Array:
+def off(flight: RecordedFlight, part: Part, stages: Stages) -> Array:
     """How far (n,), m, the response alone leads from where the vehicle was."""
     end = float(during(flight, part, flight.told.track)[-1, 0])
-    return distances(flight, part, led(flight, loops, end))
+    return distances(flight, part, led(flight, stages, end))
 
 
-def fit(flight: RecordedFlight, part: Part, loops: Loops) -> Loops:
-    """The loops with those drag and lag of the last one that lead nearest: steps to all sides, ever shorter.
+def fit(flight: RecordedFlight, part: Part, stages: Stages) -> Stages:
+    """The stages with those drag and lag of the last one that lead nearest: steps to all sides, ever shorter.
     What they have does not count."""
     console = Console(stderr=True)
-    loops = (*loops[:-1], loops[-1]._replace(drag=_BEGIN[0], lag=_BEGIN[1]))
-    best, least = loops, _square(off(flight, part, loops))
+    stages = (*stages[:-1], stages[-1]._replace(drag=_BEGIN[0], lag=_BEGIN[1]))
+    best, least = stages, _square(off(flight, part, stages))
     stride = _FIRST_STRIDE
     with console.status("") as status:
         while stride > _LAST_STRIDE:
             last = best[-1]
             status.update(f"{part}: drag {last.drag:.3f} 1/s, lag {last.lag:.3f} s, rms {least**0.5:.3f} m")
             tried = [
-                (*loops[:-1], last._replace(drag=last.drag + stride * up, lag=last.lag + stride * later))
+                (*stages[:-1], last._replace(drag=last.drag + stride * up, lag=last.lag + stride * later))
                 for up, later in _WAYS
             ]
             errors = [
@@ -116,9 +116,9 @@ def fits(flights: dict[str, RecordedFlight]) -> Table:
         table.add_column(head)
     for here, there in FITS:
         flight, other = flights[here.log], flights[there.log]
-        loops = fit(flight, here, RESPONSES[flight.flavour])
-        inside, outside = (Percentiles.of(off(*where, loops)) for where in ((flight, here), (other, there)))
-        last = loops[-1]
+        stages = fit(flight, here, RESPONSES[flight.flavour])
+        inside, outside = (Percentiles.of(off(*where, stages)) for where in ((flight, here), (other, there)))
+        last = stages[-1]
         numbers = f"{last.drag:.3f}", f"{last.lag:.3f}"
         table.add_row(str(here), *numbers, _said(inside), str(there), _said(outside))
     return table
