@@ -22,7 +22,7 @@ _SINKING: Final = 0.6
 
 class Commander:
     """The state of one vehicle. A verb returns None, also when what it asks is already so, or why it is
-    denied."""
+    denied. ``doubts``: what speaks against arming, whatever the mode."""
 
     def __init__(
         self,
@@ -49,6 +49,9 @@ class Commander:
         self._touched_at: int | None = None
         self._blind_since: int | None = None
         self._disarm_at = 0
+        self._chosen = flavour.boot_mode
+        self._lost = False
+        self.doubts: Callable[[], list[str]] = list
         self.armed = False
         self.landed = True
         self.ready = False
@@ -88,8 +91,9 @@ class Commander:
         if not forced:
             if not self.ready:
                 return Denial(TEMPORARILY_REJECTED, "Arming refused: no position yet")
-            if reason := self._flavour.arming_denial(self.status(now)):
-                return Denial(FAILED, f"Arming refused: {reason}")
+            reason = self._flavour.arming_denial(self.status(now))
+            if doubts := [reason] if reason else self.doubts():
+                return Denial(FAILED, f"Arming refused: {doubts[0]}")
         self.armed = True
         self._postpone(now)
         self._voice.inform("Armed")
@@ -107,6 +111,22 @@ class Commander:
             self._stop("Disarmed")
         return None
 
+    def cut(self, why: str) -> None:
+        """Stop the motors, wherever it is."""
+        if self.armed:
+            self._stop(why)
+
+    def fail_safe(self, mode: Mode, now: int) -> None:
+        """Change to ``mode`` because something is wrong; on the ground there is nothing to do."""
+        if not self.armed or self.landed or mode is self.mode:
+            return
+        self._switch(mode if self.ready else Mode.LAND, now)
+
+    @property
+    def level_speed(self) -> float:
+        """m/s, when nobody says another."""
+        return self._config.waypoint_speed
+
     def take_off(self, altitude: float, relative: bool | None, now: int) -> Denial | None:
         """As NAV_TAKEOFF (22); arguments as for ``Flavour.takeoff``."""
         verdict = self._flavour.takeoff(altitude, relative, self._home.altitude, self.status(now))
@@ -120,6 +140,7 @@ class Commander:
 
     def enter(self, mode: Mode, now: int) -> Denial | None:
         """Change to ``mode``."""
+        self._lost = False
         if mode is self.mode:
             return None
         status = self.status(now)
@@ -129,7 +150,14 @@ class Commander:
         if denial := self._flavour.mode_denial(mode, status):
             return denial
         self._switch(mode, now)
+        if not self.armed:
+            self._chosen = mode
         return None
+
+    def steered(self, now: int) -> None:
+        """A usable set-point came: PX4 goes on with OFFBOARD if nothing but their silence had ended it."""
+        if self._lost and self.armed:
+            self._switch(Mode.GUIDED, now)
 
     # What happens
 
@@ -177,6 +205,8 @@ class Commander:
 
     def _switch(self, mode: Mode, now: int) -> None:
         self.mode = mode
+        self._lost = False
+        self._journeys.following.active = mode is Mode.FOLLOW
         if self.armed and mode is Mode.MISSION:
             self._journeys.begin(mode, self._estimate())
             return
@@ -190,7 +220,7 @@ class Commander:
         match mode:
             case Mode.LAND:
                 self._guidance.land(self._config.land_speed)
-            case Mode.RETURN:
+            case Mode.RETURN | Mode.FOLLOW:
                 self._journeys.begin(mode, self._estimate())
             case Mode.GUIDED:
                 self._steering.resume(self._estimate().pose, now)
@@ -202,6 +232,7 @@ class Commander:
         self._voice.warn("Set-points timed out")
         if self._flavour.after_loss is not self.mode:
             self._switch(self._flavour.after_loss, now)
+            self._lost = self._flavour.keeps_choice
         if self.mode is Mode.POSITION:
             self._guidance.land(_SINKING)
 
@@ -238,7 +269,9 @@ class Commander:
         self.armed = False
         self._guidance.idle()
         self._journeys.itinerary.landed()
-        if self.mode is Mode.LAND:
+        if self._flavour.keeps_choice:
+            self.mode = self._chosen
+        elif self.mode is Mode.LAND:
             self.mode = self._flavour.after_landing
         elif self.mode is Mode.RETURN:
             self.mode = self._flavour.after_return

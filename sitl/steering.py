@@ -9,10 +9,13 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from mavlink_bridge.messages import SetpointLocal
+from mavlink_bridge.messages import SetpointAttitude, SetpointGlobal, SetpointLocal
 from sitl.flavours import Flavour, Status
+from sitl.global_setpoints import localised
 from sitl.guidance import Activity, Guidance
-from sitl.setpoints import POSITION, Pose, Setpoint, Stop
+from sitl.home import Home
+from sitl.origin import Origin
+from sitl.setpoints import POSITION, Pose, Reading, Setpoint, Stop
 from sitl.voice import Voice
 
 _SECOND: Final = 1_000_000
@@ -43,26 +46,39 @@ class Stream(NamedTuple):
 class Steering:
     """Turns set-point messages into what the guidance follows."""
 
-    def __init__(self, flavour: Flavour, guidance: Guidance, voice: Voice) -> None:
+    def __init__(
+        self, flavour: Flavour, guidance: Guidance, origin: Origin, home: Home, voice: Voice
+    ) -> None:
+        """``origin`` and ``home`` are what places on the globe and heights count from."""
         self._flavour = flavour
         self._guidance = guidance
+        self._origin = origin
+        self._home = home
         self._voice = voice
         self.stream = Stream()
 
-    def steer(self, message: SetpointLocal, status: Status, here: Pose, now: int) -> None:
-        """Act on one set-point addressed to this vehicle that arrived at ``now`` (µs)."""
-        reading = self._flavour.read(message, here)
+    def steer(
+        self,
+        message: SetpointLocal | SetpointGlobal | SetpointAttitude,
+        status: Status,
+        here: Pose,
+        now: int,
+    ) -> bool:
+        """Act on one set-point addressed to this vehicle that arrived at ``now`` (µs); whether it is one that
+        can be flown."""
+        reading = self._read(message, here)
         if not isinstance(reading, Setpoint):
             self._voice.complain(reading.reason, now)
             if isinstance(reading, Stop) and self._guidance.activity is Activity.TRACK:
                 self._guidance.hold()
-            return
+            return False
         self.stream = Stream(reading, now, self.stream.newest)
         denial = self._flavour.steering_denial(status)
         if denial is None:
             self._follow(reading, here, now)
         elif denial:
             self._voice.complain(denial, now)
+        return True
 
     def resume(self, here: Pose, now: int) -> None:
         """Follow the newest set-point of a stream that began before it was allowed to steer, or hold."""
@@ -71,6 +87,14 @@ class Steering:
             self._follow(setpoint, here, now)
         else:
             self._guidance.hold()
+
+    def _read(self, message: SetpointLocal | SetpointGlobal | SetpointAttitude, here: Pose) -> Reading:
+        if isinstance(message, SetpointAttitude):
+            return self._flavour.read_attitude(message)
+        if isinstance(message, SetpointGlobal):
+            local = localised(message, self._origin, self._home, stops=self._flavour.stops)
+            return self._flavour.read(local, here) if isinstance(local, SetpointLocal) else local
+        return self._flavour.read(message, here)
 
     def _follow(self, setpoint: Setpoint, here: Pose, now: int) -> None:
         if self._guidance.activity is Activity.IDLE and not _rises(setpoint, here):

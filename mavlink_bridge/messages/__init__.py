@@ -16,12 +16,16 @@ from mavlink_bridge.messages.flight import (
     CommandLong,
     EkfStatus,
     ExtendedSysState,
+    FenceStatus,
+    FollowTarget,
     GlobalPosition,
     GpsGlobalOrigin,
     Heartbeat,
     LocalPosition,
     Ping,
     PositionTarget,
+    SetpointAttitude,
+    SetpointGlobal,
     SetpointLocal,
     StatusText,
     SysStatus,
@@ -64,6 +68,9 @@ from mavlink_bridge.messages.status import (
     BatteryStatus,
     EstimatorStatus,
     GpsRaw,
+    HighresImu,
+    RawImu,
+    SimState,
     VfrHud,
 )
 
@@ -80,8 +87,12 @@ Message = (
     | CommandLong
     | CommandAck
     | SetpointLocal
+    | SetpointGlobal
+    | SetpointAttitude
     | PositionTarget
     | Timesync
+    | FollowTarget
+    | FenceStatus
     | EkfStatus
     | ExtendedSysState
     | StatusText
@@ -116,6 +127,9 @@ Message = (
     | Altitude
     | BatteryStatus
     | EstimatorStatus
+    | RawImu
+    | HighresImu
+    | SimState
 )
 
 __all__ = [
@@ -130,11 +144,14 @@ __all__ = [
     "EkfStatus",
     "EstimatorStatus",
     "ExtendedSysState",
+    "FenceStatus",
     "FileTransfer",
+    "FollowTarget",
     "GlobalPosition",
     "GpsGlobalOrigin",
     "GpsRaw",
     "Heartbeat",
+    "HighresImu",
     "HomePosition",
     "LocalPosition",
     "Message",
@@ -157,11 +174,15 @@ __all__ = [
     "ParamValue",
     "Ping",
     "PositionTarget",
+    "RawImu",
     "RequestDataStream",
     "SetGpsGlobalOrigin",
     "SetHomePosition",
     "SetMode",
+    "SetpointAttitude",
+    "SetpointGlobal",
     "SetpointLocal",
+    "SimState",
     "Source",
     "StatusText",
     "SysStatus",

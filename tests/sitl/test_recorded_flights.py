@@ -27,8 +27,6 @@ LANDING = {"ardupilot": 1.5, "px4": 8.5}
 """s, for what the ground brings about: ours counts as landed after 0.5 s and is disarmed at once. PX4's
 detector took 6 s from when it touched down (its height went on rising), and 2 s more to disarm."""
 
-PENDING = pytest.mark.xfail(strict=True, reason="the flavours do not do it yet")
-
 
 class Pair(NamedTuple):
     """A recorded flight, and what ours told when it was sent the same."""
@@ -58,7 +56,6 @@ def answers(flight: RecordedFlight, told: Told) -> list[tuple[float, int, list[i
     return found
 
 
-@PENDING
 @pytest.mark.parametrize("log", LOGS)
 def test_every_command_gets_the_same_answer(pairs: dict[str, Pair], log: str) -> None:
     flight, ours = pairs[log]
@@ -67,7 +64,6 @@ def test_every_command_gets_the_same_answer(pairs: dict[str, Pair], log: str) ->
     assert answers(flight, ours) == recorded
 
 
-@PENDING
 @pytest.mark.parametrize("log", LOGS)
 def test_modes_and_arming_change_alike(pairs: dict[str, Pair], log: str) -> None:
     flight, ours = pairs[log]
@@ -79,7 +75,7 @@ def test_modes_and_arming_change_alike(pairs: dict[str, Pair], log: str) -> None
         assert mine.time == pytest.approx(theirs.time, abs=patience), theirs
 
 
-@pytest.mark.parametrize("log", [*LOGS[:2], pytest.param(LOGS[2], marks=PENDING)])
+@pytest.mark.parametrize("log", LOGS)
 def test_it_is_on_the_ground_and_in_the_air_alike(pairs: dict[str, Pair], log: str) -> None:
     flight, ours = pairs[log]
     recorded = flight.told.landings

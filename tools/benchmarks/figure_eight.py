@@ -50,8 +50,8 @@ class Percentiles(NamedTuple):
 
 def settings(flight: RecordedFlight) -> dict[str, Any]:
     """The firmware's defaults as the recorded vehicle had them, for ``AutopilotConfig``. It was ready before
-    it was asked."""
-    return {"ready_after": 4.0, **_AS_RECORDED[flight.flavour]}
+    it was asked, and told what a ground station expects."""
+    return {"ready_after": 4.0, "streams": "normal", **_AS_RECORDED[flight.flavour]}
 
 
 def trajectory(flight: RecordedFlight) -> list[tuple[float, SetpointLocal]]:

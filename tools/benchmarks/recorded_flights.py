@@ -33,7 +33,6 @@ from mavlink_bridge.tlog import read_tlog
 from outrider.errors import InputError
 from sitl.autopilot_config import AutopilotConfig
 from sitl.config import VehicleConfig
-from sitl.flavours import ARMED
 from sitl.node import LINK, Autopilot
 
 Array = npt.NDArray[np.float64]
@@ -56,11 +55,11 @@ class Ack(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A HEARTBEAT (0) that tells another ``custom_mode``, or ``armed``, than the one before."""
+    """A HEARTBEAT (0) with another mode than the one before; ``base_mode`` says whether it is armed, too."""
 
     time: float
     custom_mode: int
-    armed: bool
+    base_mode: int
 
 
 class Landing(NamedTuple):
@@ -131,7 +130,7 @@ def tell(heard: Iterable[tuple[float, Message]], begin: float = 0.0) -> Told:
             case CommandAck():
                 told.acks.append(Ack(time, message.command, message.result))
             case Heartbeat():
-                change = Change(time, message.custom_mode, bool(message.base_mode & ARMED))
+                change = Change(time, message.custom_mode, message.base_mode)
                 if not told.modes or change[1:] != told.modes[-1][1:]:
                     told.modes.append(change)
             case ExtendedSysState():
