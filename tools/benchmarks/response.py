@@ -130,8 +130,9 @@ def flown(flights: dict[str, RecordedFlight], vehicle: VehicleConfig) -> Table:
     for head in ("log", "firmware, m", "exact, m", "yaw, °"):
         table.add_column(head)
     for name, flight in flights.items():
-        lagging = fly(flight, vehicle, response="firmware", **settings(flight))
-        exact = fly(flight, vehicle, response="exact", **settings(flight))
+        with Console(stderr=True).status(f"{name}: {flight.told.track[-1, 0]:.0f} s, flown twice"):
+            lagging = fly(flight, vehicle, response="firmware", **settings(flight))
+            exact = fly(flight, vehicle, response="exact", **settings(flight))
         for part in (part for part in (FULL, PVY, FIRST, SECOND) if part.log == name):
             rows = (distances(flight, part, one.track) for one in (lagging, exact))
             yaw = np.degrees(turns(flight, part, lagging))
