@@ -94,11 +94,11 @@ class _Udp:
 
 
 class UdpListener(_Udp):
-    """``udpin``: binds, and sends everything to all peers heard in the last 10 s, or else to the last one;
-    and always to the endpoint's own peer, if it has one.
+    """``udpin``: binds, and sends everything to all peers heard in the last 10 s, or else to the last one.
 
     As pymavlink and unlike mavlink-router's server mode, which answers the last one only: with two peers
     (an autopilot's two ports, a ground station beside a script) each would then see half of the stream.
+    The endpoint's own peer, if it has one, is sent everything always.
     """
 
     def __init__(self, endpoint: UdpIn, clock: Clock) -> None:
