@@ -4,8 +4,11 @@ what they keep comes back."""
 from __future__ import annotations
 
 import io
+import os
 import re
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +31,7 @@ from outrider.hangar.request import Options, Request, checked
 from outrider.hangar.screen import Screen
 from outrider.hangar.squad import SPREAD, Squad
 from outrider.hangar.traffic import Traffic
+from outrider.hangar.watch import watching
 
 GCS = Source(255, 190)
 PERIOD = 20_000
@@ -290,6 +294,24 @@ def test_what_happens_is_told_once() -> None:
     ]
     assert all("12.5 s" in line for line in lines)
     assert chronicle.look() == []
+
+
+def test_a_pipe_that_nobody_reads_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    request = asked(count=4)
+    board = Board(4, 1)
+    near, far = os.pipe()
+    os.set_blocking(far, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(far, bytes(4096))
+    os.set_blocking(far, True)
+    with open(far, "w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stderr", full)
+        with watching(request, addresses("ardupilot", 4, None, "127.0.0.1", ()), board) as look:
+            board.show(0, Gauges(up=True, armed=True))
+            look()
+        monkeypatch.undo()
+    os.close(near)
 
 
 @pytest.mark.parametrize(("width", "height", "count"), [(80, 24, 3), (80, 24, 50), (200, 60, 12)])
