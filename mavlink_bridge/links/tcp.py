@@ -31,8 +31,9 @@ class TcpCaller(StreamLink):
     side may be started later."""
 
     def __init__(self, endpoint: TcpOut, clock: Clock) -> None:
-        super().__init__(clock, BACKLOG)
+        # First, so that a host without address leaves nothing open.
         self._family, self._address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
+        super().__init__(clock, BACKLOG)
         self._calling: socket.socket | None = None
         self._called_at = 0
         self.receive()
@@ -80,8 +81,8 @@ class TcpListener(StreamLink):
     """``tcpin``: what is sent goes to everyone who has called."""
 
     def __init__(self, endpoint: TcpIn, clock: Clock) -> None:
-        super().__init__(clock, BACKLOG)
         family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
+        super().__init__(clock, BACKLOG)
         self._door = door = socket.socket(family, socket.SOCK_STREAM)
         try:
             # Or a restart would have to wait a minute for the port.

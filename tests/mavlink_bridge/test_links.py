@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import socket
 import tty
@@ -416,9 +417,12 @@ def test_a_closed_log_says_nothing_more(tmp_path: Path) -> None:
         ("tlog:/no/such/log.tlog", "cannot be read"),
     ],
 )
-def test_what_cannot_be_opened_is_said_in_one_line(text: str, said: str) -> None:
+def test_what_cannot_be_opened_is_said_in_one_line_and_leaves_nothing_open(text: str, said: str) -> None:
+    gc.collect()
+    before = set(os.listdir("/dev/fd"))
     with pytest.raises(BridgeError) as caught:
         open_link(text, SimulatedClock())
+    assert set(os.listdir("/dev/fd")) == before
     message = str(caught.value)
     assert said in message
     assert text.partition(":")[2] in message
