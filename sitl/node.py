@@ -14,8 +14,9 @@ import numpy.typing as npt
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_TYPE
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, Source, Vector
+from mavlink_bridge.messages import Message, SetupSigning, Source, Vector
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
 from sitl.airframe import hover_speeds
 from sitl.autopilot_config import AutopilotConfig
 from sitl.battery import Battery
@@ -48,6 +49,7 @@ from sitl.services import Services
 from sitl.steering import Steering
 from sitl.streams import usual_rates
 from sitl.telemetry import Telemetry
+from sitl.trust import Trust
 from sitl.vehicle import Reference, VehicleState
 from sitl.voice import Voice
 from sitl.weather import WeatherConfig
@@ -80,10 +82,12 @@ class Autopilot:
         seed: int,
         weather: WeatherConfig | None = None,
         saved: Saved | None = None,
+        signing: Signing | None = None,
     ) -> None:
         """On the ground at the configured place, which becomes the origin of its local frame, or as high
         above it as the configuration says. ``seed`` (≥ 0) with the system id for all noise. ``weather`` is
-        the air around it; without, the air stands still. ``saved``: what it kept of an earlier time."""
+        the air around it; without, the air stands still. ``saved``: what it kept of an earlier time.
+        ``signing``: its own, with the key of all who may command it; without, whoever can may."""
         saved = saved or Saved()
         rotors = len(vehicle.rotors)
         self._values = Values(_TABLES[config.flavour](rotors), config, saved.parameters)
@@ -179,8 +183,15 @@ class Autopilot:
         self._reception = Reception(
             self._source, self._outbox, voice, self._commander, orders, steering, self._services.handlers
         )
+        if signing is None and config.signing_setup == "obeyed":
+            signing = Signing()
+        if signing is not None:
+            signing.resume(saved.signed_until)
+        self._signing = signing
+        self._trust = Trust(self._source, signing, config.signing_setup, lambda: self._commander.armed, voice)
+        self._services.handlers[SetupSigning] = self._trust.set_up
         heard = _HEARD | {BY_TYPE[kind].id for kind in self._services.handlers}
-        self._codec = Codec(accept=lambda message_id, _system, _component: message_id in heard)
+        self._codec = Codec(lambda message_id, _system, _component: message_id in heard, signing)
         # What nearly every step finds empty and undue is looked at here, not asked for.
         self._reached = itinerary.reached
         self._work_due = self._services.next_due
@@ -203,6 +214,8 @@ class Autopilot:
             self._boot = now
             self._telemetry.start(0)
         self._now = now - self._boot
+        if self._signing is not None:
+            self._signing.present(self.config.epoch + self._now)
         self._plant.move(self._now, armed=self._commander.armed)
         self._watch()
         for datagram in inbox:
@@ -220,8 +233,9 @@ class Autopilot:
     def _listen(self, datagram: Datagram) -> None:
         if datagram.link != LINK:
             return
-        for message in self._codec.feed(datagram.data):
+        for message in self._codec.feed(datagram.data, whole=True):
             self._reception.handle(message, self._now, self._plant.estimate())
+        self._trust.watch(self._now)
         self._work_due = self._services.next_due
 
     def _tell(self) -> list[Datagram]:
@@ -250,7 +264,8 @@ class Autopilot:
     @property
     def saved(self) -> Saved:
         """What there is to keep for the next boot."""
-        return Saved(parameters=self._values.changed, plans=self._plans.all)
+        until = 0 if self._signing is None else self._signing.newest
+        return Saved(parameters=self._values.changed, plans=self._plans.all, signed_until=until)
 
     # Events and faults, from the next step on
 

@@ -56,6 +56,7 @@ from mavlink_bridge.messages.services import (
     SetGpsGlobalOrigin,
     SetHomePosition,
     SetMode,
+    SetupSigning,
 )
 from mavlink_bridge.messages.source import Source, Vector
 from mavlink_bridge.messages.status import (
@@ -116,6 +117,7 @@ Message = (
     | Altitude
     | BatteryStatus
     | EstimatorStatus
+    | SetupSigning
 )
 
 __all__ = [
@@ -162,6 +164,7 @@ __all__ = [
     "SetHomePosition",
     "SetMode",
     "SetpointLocal",
+    "SetupSigning",
     "Source",
     "StatusText",
     "SysStatus",
