@@ -75,11 +75,10 @@ class Signing:
         self._floor = max(self._floor, self.newest)
 
     def use(self, key: Key | None, since: int = 0) -> None:
-        """Another key, or none, from now on; nothing that was signed before the stamp ``since`` counts."""
+        """Another key, or none, from now on; it is at least the stamp ``since``."""
         if key != self.key:
             self.key, self._floor = key, 0
             self._streams.clear()
-        self._floor = max(self._floor, min(since, LATEST) - 1)
         self.newest = max(self.newest, min(since, LATEST))
 
     def sign(self, frame: bytes, link: int) -> bytes:

@@ -242,13 +242,14 @@ def test_who_has_no_key_makes_no_stream(sources: list[tuple[int, int, int]]) -> 
 # Another key
 
 
-def test_another_key_counts_from_when_it_was_made() -> None:
+def test_another_key_counts_instead_and_says_what_time_it_is() -> None:
     mine = signing()
     assert mine.check(frame_of(signed(STAMP + 10))) is None
-    mine.use(OTHER, STAMP + 20)
-    assert mine.check(frame_of(signed(STAMP + 30))) is Refusal.FORGED
-    assert mine.check(frame_of(signed(STAMP + 19, key=OTHER))) is Refusal.OLD
-    assert mine.check(frame_of(signed(STAMP + 20, key=OTHER))) is None
+    since = STAMP + 2 * MINUTE
+    mine.use(OTHER, since)
+    assert mine.check(frame_of(signed(since + 1))) is Refusal.FORGED
+    assert mine.check(frame_of(signed(STAMP + 20, key=OTHER))) is Refusal.OLD
+    assert mine.check(frame_of(signed(since - MINUTE, key=OTHER))) is None
     mine.use(None)
     assert mine.check(frame_of(Codec().encode(beat()))) is None
 
