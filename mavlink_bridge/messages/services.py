@@ -146,8 +146,8 @@ class MessageInterval(NamedTuple):
 
 
 class SetupSigning(NamedTuple):
-    """SETUP_SIGNING (256): sign with ``key`` from now on, which is ``since`` (10 µs since 2015); zeros in both
-    end signing."""
+    """SETUP_SIGNING (256): sign with ``key`` from now on, which is ``since`` (10 µs since 2015); zeros in
+    both end signing."""
 
     source: Source
     since: int
