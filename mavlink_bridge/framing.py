@@ -18,7 +18,7 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as dialect
 
 START_V1, START_V2 = 0xFE, 0xFD
-_DATAGRAM = 2048
+_DATAGRAM = 512
 LONGEST_FRAME = 280  # version 2: 10 header, 255 payload, 2 checksum, 13 signature
 SIGNATURE_LENGTH = 13
 SIGNED_FLAG = 0x01
@@ -103,7 +103,7 @@ def frame_at(data: bytes, start: int) -> Frame | Flaw:
     )
 
 
-@lru_cache(maxsize=2048)
+@lru_cache(maxsize=1024)
 def _leading(data: bytes) -> tuple[tuple[Frame, ...], int]:
     frames: list[Frame] = []
     at, size = 0, len(data)

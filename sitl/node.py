@@ -16,6 +16,7 @@ from mavlink_bridge.converters import BY_TYPE
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, SetupSigning, Source, Vector
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.parcels import parcels
 from mavlink_bridge.signing import Signing
 from sitl.airframe import hover_speeds
 from sitl.autopilot_config import AutopilotConfig
@@ -206,7 +207,8 @@ class Autopilot:
         return f"sitl-{self.config.system_id}"
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Move to ``now``, then act on what arrived, then tell what is due: at most one datagram.
+        """Move to ``now``, then act on what arrived, then tell what is due: one datagram, or none, but for a
+        flood of questions.
 
         What arrives at ``now`` steers from ``now`` on. The first call is the boot.
         """
@@ -249,9 +251,9 @@ class Autopilot:
             messages = messages + self._telemetry.collect(self._now, self._gauges.read(self._now))
         if not messages:
             return []
-        data = b"".join(map(self._codec.encode, messages))
+        data = parcels([self._codec.encode(message) for message in messages])
         self._outbox.clear()
-        return [Datagram(LINK, data)]
+        return [Datagram(LINK, parcel) for parcel in data]
 
     def _configure(self) -> None:
         """Take over the parameters that are settings, but for the system id, which counts from the next boot

@@ -12,12 +12,14 @@ from mavlink_bridge.links.stream import Stream
 
 RETRY: Final = 1_000_000
 """µs between two attempts to get a lost connection back."""
-_READS: Final = 16
+HUNG: Final = 30_000_000
+"""µs after which a peer that takes nothing of what waits for it is given up: it would hold its place for
+ever."""
 
 
 class StreamLink:
-    """A link over any number of streams. A stream that breaks is dropped, and if none is left, ``_reopen`` is
-    called once a second.
+    """A link over any number of streams. A stream that breaks or hangs is dropped, and if none is left,
+    ``_reopen`` is called once a second.
 
     The two threads that may use a link share its streams, hence the lock; nothing within it waits.
     """
@@ -118,18 +120,16 @@ class StreamLink:
             self._reopen(now)
 
     def _serve(self, stream: Stream, found: list[bytes]) -> None:
-        for _ in range(_READS):
-            data = stream.read()
-            if data is None:
-                break
-            if data:
-                found.append(data)
+        # A little of each, so that who says most is not all that is heard; the rest is there the next time.
+        data = stream.read()
+        if data:
+            found.append(data)
         stream.flush()
         self._settle(stream)
 
     def _settle(self, stream: Stream) -> None:
-        """Watch for room only while something waits for it; drop what is broken."""
-        if not stream.alive:
+        """Watch for room only while something waits for it; drop what is broken or hangs."""
+        if not stream.alive or (stream.waits and stream.stuck(self._clock.now()) > HUNG):
             self._selector.unregister(stream)
             self._streams.remove(stream)
             stream.close()
