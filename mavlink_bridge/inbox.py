@@ -19,6 +19,8 @@ ROOM: Final = 1 << 20
 HANDFUL: Final = 16384
 """Bytes of each link that one step is given: what it can see through in some milliseconds, were it garbage of
 the worst kind, and ten times what a busy swarm says meanwhile."""
+FINGERS: Final = 256
+"""Datagrams of a handful."""
 _ROUND: Final = 0.02
 # s; in so long no link fills the buffer that the system keeps for it, not even a fast serial port.
 
@@ -99,10 +101,10 @@ class _Queue:
     def handful(self) -> list[Datagram]:
         """The oldest, and all that fit beside it."""
         found: list[Datagram] = []
-        size = 0
-        while self._waiting and (not found or size + len(self._waiting[0].data) <= HANDFUL):
+        room = HANDFUL
+        while self._waiting and len(found) < FINGERS and (len(self._waiting[0].data) <= room or not found):
             found.append(self._pop())
-            size += len(found[-1].data)
+            room -= len(found[-1].data)
         return found
 
     def _pop(self) -> Datagram:

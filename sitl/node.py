@@ -62,6 +62,8 @@ LINK: Final = "autopilot"
 _COMPONENT: Final = 1
 # SET_MODE, PING, COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED, TIMESYNC; and the services'.
 _HEARD: Final = frozenset((4, 11, 75, 76, 84, 111))
+# Messages, in answer to one datagram at most; what is more in it counts no more.
+_ANSWERS: Final = 32
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
 _FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
 
@@ -235,7 +237,11 @@ class Autopilot:
     def _listen(self, datagram: Datagram) -> None:
         if datagram.link != LINK:
             return
+        enough = len(self._outbox) + _ANSWERS
         for message in self._codec.feed(datagram.data, whole=True):
+            if len(self._outbox) >= enough:
+                # Answers go to all: what one asks beyond measure would be in the way of all others.
+                break
             self._reception.handle(message, self._now, self._plant.estimate())
         self._trust.watch(self._now)
         self._work_due = self._services.next_due
@@ -248,7 +254,9 @@ class Autopilot:
             self._work_due = self._services.next_due
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
-            messages = messages + self._telemetry.collect(self._now, self._gauges.read(self._now))
+            told = self._telemetry.collect(self._now, self._gauges.read(self._now))
+            # Where there are many answers, what comes first has the better chance to find room on its way.
+            messages = told + messages if len(messages) > _ANSWERS else messages + told
         if not messages:
             return []
         data = parcels([self._codec.encode(message) for message in messages])
