@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from autopilot_rig import ARM, FLAVOURS, SET_MODE, TAKEOFF, Rig, setpoint
 from outside_client import Client
+from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.codec import Codec
@@ -26,10 +28,13 @@ def rig(flavour: str = "ardupilot", **more: Any) -> Rig:
 
 
 def enter(client: Client, key: Key | None = KEY, stamp: int = STAMP + 1) -> Client:
-    """As mavutil's ``setup_signing``."""
-    signing = client.peer.signing
-    signing.secret_key = None if key is None else bytes(key)
-    signing.sign_outgoing, signing.timestamp = key is not None, stamp
+    """With pymavlink's own function for it, which wants a connection."""
+    connection = SimpleNamespace(mav=client.peer)
+    if key is None:
+        mavutil.mavfile.disable_signing(connection)
+    else:
+        allowed = client.peer.signing.allow_unsigned_callback
+        mavutil.mavfile.setup_signing(connection, bytes(key), True, allowed, stamp, 0)
     return client
 
 
