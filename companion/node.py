@@ -29,6 +29,7 @@ from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source, Timesync, Tunnel
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
 
 COMPONENT = 195
 """MAV_COMP_ID_PATHPLANNER."""
@@ -61,7 +62,8 @@ class Tally(NamedTuple):
 class Companion:
     """One vehicle's companion, a ``Node``. Links: ``autopilot``, ``swarm``, ``target``, ``ground``.
 
-    ``stopwatch`` (ns) only measures how long planning takes; nothing depends on it.
+    ``stopwatch`` (ns) only measures how long planning takes; nothing depends on it. ``signing``: its own, for
+    all links, whose number in ``LINKS`` is the link id; without, whatever it hears counts.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class Companion:
         target_system: int,
         fleet: FleetFrame,
         stopwatch: Callable[[], int],
+        signing: Signing | None = None,
     ) -> None:
         self.config = config
         self.name = f"companion-{system}"
@@ -82,7 +85,11 @@ class Companion:
         self.guard = Guard(config)
         self.pilot = Pilot(config, self._source, fleet.altitude)
         self._sharing = Sharing(config, self._source, fleet)
-        self._codecs = {link: Codec(accepts(link, system, target_system)) for link in LINKS}
+        self._signing = signing
+        self._codecs = {
+            link: Codec(accepts(link, system, target_system), signing, number)
+            for number, link in enumerate(LINKS)
+        }
         self.plan: Plan | None = None
         self._frame: LocalFrame | None = None
         self._goal: Array | None = None
@@ -120,6 +127,8 @@ class Companion:
         """Handle what arrived and do what is due at ``now`` (µs)."""
         if self._boot is None:
             self._boot = self._next_plan = self._next_setpoint = now
+        if self._signing is not None:
+            self._signing.present(now)
         answers = self._receive(now, inbox)
         if not self._has_to_act(now):
             return self._encode(ground=answers)
@@ -148,7 +157,7 @@ class Companion:
     def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
         answers: list[Message] = []
         for link, data in inbox:
-            for message in self._codecs[link].feed(data):
+            for message in self._codecs[link].feed(data, whole=True):
                 if link == "ground":
                     answers += self._obey(message)
                     continue
