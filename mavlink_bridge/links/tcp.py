@@ -20,10 +20,26 @@ PATIENCE: Final = 5_000_000
 """µs for which one call is left ringing: a lost packet is repeated after one second and after three."""
 
 
+_UNHEARD: Final = 30
+# s without a sign of life from the other machine: what it has not acknowledged, and probes when all is quiet.
+_WATCH: Final = {
+    "TCP_USER_TIMEOUT": 1000 * _UNHEARD,
+    "TCP_KEEPIDLE": 15,
+    "TCP_KEEPINTVL": 5,
+    "TCP_KEEPCNT": 3,
+}
+
+
 def _quick(connection: socket.socket) -> None:
-    """Small packets at once, and a notice within some time that the other machine is gone."""
+    """Small packets at once, little that waits in the system beside the own backlog, and a notice within
+    half a minute, where the system can give it, that the other machine is gone."""
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BACKLOG)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in _WATCH.items():
+        option = getattr(socket, name, None)
+        if option is not None:
+            connection.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
 class TcpCaller(StreamLink):
@@ -110,8 +126,9 @@ class TcpListener(StreamLink):
             if self.peers >= MOST_CALLERS:
                 caller.close()
                 return
-            _quick(caller)
-            self._adopt(caller.detach())
+            with caller:
+                _quick(caller)
+                self._adopt(caller.detach())
 
     def _release(self) -> None:
         self._door.close()

@@ -244,6 +244,14 @@ def report(
 
 
 @app.command()
+def key(file: Annotated[Path, typer.Argument(help="New; only you may read it.")]) -> None:
+    """Make a key with which vehicles and those who may command them sign what they say (docs/signing.md)."""
+    from outrider.key_files import new_key
+
+    sys.stdout.write(f"{new_key(file)}\n")
+
+
+@app.command()
 def bench(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer rounds, no flight.")] = False,
