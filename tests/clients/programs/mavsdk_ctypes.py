@@ -21,19 +21,18 @@ from telling import clock, tell
 
 def drone_of(system: Any) -> Drone:
     """The plugins of one system."""
-    telemetry = TelemetryAsync(system)
     return Drone(
         ActionAsync(system),
         InfoAsync(system),
-        MissionRawAsync(system),
         MissionAsync(system),
+        MissionRawAsync(system),
         OffboardAsync(system),
         ParamAsync(system),
-        telemetry,
-        offboard,
+        TelemetryAsync(system),
         mission,
-        mission_raw.MissionItem,
-        lambda name: getattr(telemetry, f"subscribe_{name}")(),
+        mission_raw,
+        offboard,
+        lambda plugin, name: getattr(plugin, f"subscribe_{name}")(),
     )
 
 

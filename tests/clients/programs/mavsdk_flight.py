@@ -7,55 +7,58 @@ Everything is waited for with an end; what does not come ends the program with w
 from __future__ import annotations
 
 import asyncio
+import gc
 import math
-import sys
 import traceback
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
+from contextlib import aclosing
 from typing import Any, NamedTuple
 
 from telling import clock, tell
 
 PATIENCE = 30.0
 HEIGHT = 4.0
-MIXED = ("mission item", "waypoint")
-HERE, WAYPOINT, TAKEOFF, LAND = 0, 16, 22, 21
-ABOVE_HOME = 6
-"""MAV_FRAME_GLOBAL_RELATIVE_ALT_INT."""
-FENCE_CORNER, RALLY = 5001, 5100
+WAYPOINT, TAKEOFF, FENCE_CORNER, RALLY = 16, 22, 5001, 5100
+"""MAV_CMD of items."""
+ABOVE_SEA, ABOVE_HOME = 0, 6
+"""MAV_FRAME_GLOBAL, MAV_FRAME_GLOBAL_RELATIVE_ALT_INT."""
+DEGREE = 111_200.0
+"""m of latitude, near enough."""
 
 
 class Drone(NamedTuple):
-    """One vehicle: plugins, and the classes of values that they take. ``watch(name)``: the stream of a kind of
-    telemetry."""
+    """One vehicle: its plugins, and the modules with the classes of values that they take.
+    ``stream(plugin, name)``: what a plugin tells again and again."""
 
     action: Any
     info: Any
-    mission_raw: Any
     mission: Any
+    mission_raw: Any
     offboard: Any
     param: Any
     telemetry: Any
-    offboard_types: Any
     mission_types: Any
-    RawItem: Callable[..., Any]
-    watch: Callable[[str], AsyncIterator[Any]]
+    mission_raw_types: Any
+    offboard_types: Any
+    stream: Callable[[Any, str], AsyncGenerator[Any, None]]
+
+
+async def told(stream: AsyncGenerator[Any, None], is_it: Callable[[Any], bool], what: str) -> Any:
+    """The first value that is as wanted. Raises TimeoutError with the last one."""
+    last = None
+    try:
+        async with asyncio.timeout(PATIENCE), aclosing(stream):
+            async for last in stream:
+                if is_it(last):
+                    return last
+    except TimeoutError:
+        raise TimeoutError(f"{what} after {PATIENCE:.0f} s: {last}") from None
+    raise EOFError(f"{what} has ended")
 
 
 async def seen(drone: Drone, name: str, is_it: Callable[[Any], bool] = lambda _: True) -> Any:
-    """The first value of a kind of telemetry that is as wanted. Raises TimeoutError with the last one."""
-    last = None
-
-    async def wait() -> Any:
-        nonlocal last
-        async for last in drone.watch(name):
-            if is_it(last):
-                return last
-        raise EOFError(f"{name} has ended")
-
-    try:
-        return await asyncio.wait_for(wait(), PATIENCE)
-    except TimeoutError:
-        raise TimeoutError(f"{name} after {PATIENCE:.0f} s: {last}") from None
+    """Of telemetry."""
+    return await told(drone.stream(drone.telemetry, name), is_it, name)
 
 
 async def ready(drone: Drone, connected_at: float) -> None:
@@ -82,81 +85,55 @@ async def look(drone: Drone) -> None:
     tell("info", version=version, identity=identity, product=await drone.info.get_product())
 
 
-async def adjust(drone: Drone, number: str, fraction: str) -> None:
-    """All parameters; an integer and a float there and back."""
-    began = clock()
-    found = await drone.param.get_all_params()
-    tell(
-        "parameters",
-        after=round(clock() - began, 3),
-        integers=len(found.int_params),
-        floats=len(found.float_params),
-    )
-    was = await drone.param.get_param_int(number)
-    await drone.param.set_param_int(number, was + 1)
-    tell("integer", was=was, now=await drone.param.get_param_int(number))
-    await drone.param.set_param_int(number, was)
-    was = await drone.param.get_param_float(fraction)
-    await drone.param.set_param_float(fraction, was + 0.25)
-    tell("float", was=was, now=await drone.param.get_param_float(fraction))
-    await drone.param.set_param_float(fraction, was)
+async def adjust(drone: Drone, integer: tuple[str, int], fraction: tuple[str, float]) -> None:
+    """All parameters; an integer and a float set and read back."""
+    param, began = drone.param, clock()
+    found = await param.get_all_params()
+    counts = {"integers": len(found.int_params), "floats": len(found.float_params)}
+    tell("parameters", after=round(clock() - began, 3), **counts)
+    name, whole = integer
+    was = await param.get_param_int(name)
+    await param.set_param_int(name, whole)
+    tell("integer", name=name, was=was, set=whole, now=await param.get_param_int(name))
+    name, value = fraction
+    was = await param.get_param_float(name)
+    await param.set_param_float(name, value)
+    tell("float", name=name, was=was, set=value, now=await param.get_param_float(name))
 
 
-def raw_plan(drone: Drone, home: Any, *, has_home: bool) -> list[Any]:
-    """Up, a few metres north, then east, and down; ArduPilot keeps home as item 0."""
-    latitude, longitude = home.latitude_deg, home.longitude_deg
-    east = 1.0 / math.cos(math.radians(latitude))
-    legs = [(TAKEOFF, 0.0, 0.0, HEIGHT), (WAYPOINT, 8.0, 0.0, HEIGHT), (WAYPOINT, 8.0, 8.0, HEIGHT + 2.0)]
-    places = [(ABOVE_HOME, *leg) for leg in legs]
-    if has_home:
-        places.insert(0, (HERE, WAYPOINT, 0.0, 0.0, home.absolute_altitude_m))
-    return [
-        drone.RawItem(
-            seq,
-            frame,
-            command,
-            int(seq == 0),
-            1,
-            0.0,
-            0.0,
-            0.0,
-            math.nan if command == TAKEOFF and not has_home else 0.0,
-            round((latitude + north / 111_200.0) * 1e7),
-            round((longitude + to_east * east / 111_200.0) * 1e7),
-            up,
-            0,
-        )
-        for seq, (frame, command, north, to_east, up) in enumerate(places)
-    ]
-
-
-def simple(item: Any) -> list[float | None]:
-    """A raw item as numbers that JSON has."""
-    fields = (item.seq, item.frame, item.command, item.param1, item.param2, item.param3, item.param4)
-    return [None if math.isnan(value) else value for value in (*fields, item.x, item.y, item.z)]
-
-
-async def plan(drone: Drone, *, has_home: bool) -> None:
-    """Mission, fence and rally points, up and down again."""
+async def plan(drone: Drone, *, ardupilot: bool) -> None:
+    """Mission, fence and rally points, up and down again. ArduPilot keeps home as item 0."""
     home = await seen(drone, "home")
-    items = raw_plan(drone, home, has_home=has_home)
-    await drone.mission_raw.upload_mission(items)
-    back = await drone.mission_raw.download_mission()
-    tell("mission", up=[simple(item) for item in items], down=[simple(item) for item in back])
-
-    x, y = items[-1].x, items[-1].y
-    corners = [(x, y + 1000), (x + 1000, y), (x, y - 1000)]
+    raw, item = drone.mission_raw, drone.mission_raw_types.MissionItem
+    start = item(0, ABOVE_SEA, WAYPOINT, 1, 1, *(0.0,) * 4, *at(home), home.absolute_altitude_m, 0)
+    items = [start] if ardupilot else []
+    for command, north, east, up in (
+        (TAKEOFF, 0.0, 0.0, HEIGHT),
+        (WAYPOINT, 5.0, 0.0, HEIGHT),
+        (WAYPOINT, 5.0, 5.0, HEIGHT + 1.0),
+    ):
+        seq = len(items)
+        place = at(home, north, east)
+        items.append(item(seq, ABOVE_HOME, command, int(seq == 0), 1, *(0.0,) * 4, *place, up, 0))
+    corners = [at(home, *offset) for offset in ((-50.0, -50.0), (50.0, 0.0), (-50.0, 50.0))]
     fence = [
-        drone.RawItem(seq, 0, FENCE_CORNER, 0, 1, 3.0, 0.0, 0.0, 0.0, *place, 0.0, 1)
+        item(seq, ABOVE_SEA, FENCE_CORNER, 0, 1, 3.0, 0.0, 0.0, 0.0, *place, 0.0, 1)
         for seq, place in enumerate(corners)
     ]
-    await drone.mission_raw.upload_geofence(fence)
-    back = await drone.mission_raw.download_geofence()
-    tell("fence", up=[simple(item) for item in fence], down=[simple(item) for item in back])
-    rally = [drone.RawItem(0, ABOVE_HOME, RALLY, 0, 1, 0.0, 0.0, 0.0, 0.0, x, y, 10.0, 2)]
-    await drone.mission_raw.upload_rally_points(rally)
-    back = await drone.mission_raw.download_rallypoints()
-    tell("rally", up=[simple(item) for item in rally], down=[simple(item) for item in back])
+    await raw.upload_geofence(fence)
+    tell("fence", up=fence, down=await raw.download_geofence())
+    points = [item(0, ABOVE_HOME, RALLY, 0, 1, *(0.0,) * 4, *at(home, 10.0, 10.0), 10.0, 2)]
+    await raw.upload_rally_points(points)
+    tell("rally", up=points, down=await raw.download_rallypoints())
+    await raw.upload_mission(items)
+    tell("mission", up=items, down=await raw.download_mission())
+
+
+def at(home: Any, north: float = 0.0, east: float = 0.0) -> tuple[int, int]:
+    """Latitude and longitude (degE7) of a place some metres from home."""
+    latitude, longitude = home.latitude_deg, home.longitude_deg
+    longitude += east / DEGREE / math.cos(math.radians(latitude))
+    return round((latitude + north / DEGREE) * 1e7), round(longitude * 1e7)
 
 
 async def take_off(drone: Drone) -> None:
@@ -214,6 +191,17 @@ def _differs(velocity: Any, wanted: Any) -> float:
     )
 
 
+async def follow_plan(drone: Drone) -> None:
+    """The mission that is there, from the air, to its end."""
+    await drone.mission_raw.start_mission()
+    mode = await seen(drone, "flight_mode", lambda mode: mode.name == "MISSION")
+    progress = await told(
+        drone.stream(drone.mission_raw, "mission_progress"), lambda p: p.current >= p.total > 0, "progress"
+    )
+    position = await seen(drone, "position_velocity_ned", lambda state: state.position.east_m > 3.0)
+    tell("mission flown", mode=mode, progress=progress, position=position.position)
+
+
 async def land(drone: Drone) -> None:
     """Down, until it has disarmed itself; then disarming has nothing to do and must not fail."""
     await drone.action.land()
@@ -221,8 +209,7 @@ async def land(drone: Drone) -> None:
     await seen(drone, "landed_state", lambda state: state.name == "ON_GROUND")
     await seen(drone, "armed", lambda armed: not armed)
     await drone.action.disarm()
-    position = await seen(drone, "position")
-    tell("landed", mode=mode, position=position)
+    tell("landed", mode=mode, position=await seen(drone, "position"))
 
 
 async def fly(drone: Drone, flavour: str, connected_at: float) -> None:
@@ -230,20 +217,27 @@ async def fly(drone: Drone, flavour: str, connected_at: float) -> None:
     ardupilot = flavour == "ardupilot"
     await ready(drone, connected_at)
     await look(drone)
-    await adjust(drone, *(("FS_THR_ENABLE", "WPNAV_SPEED") if ardupilot else ("COM_DL_LOSS_T", "EKF2_REQ_EPH")))
-    await plan(drone, has_home=ardupilot)
+    if ardupilot:
+        await adjust(drone, ("LAND_SPEED", 150), ("WPNAV_SPEED", 400.0))
+    else:
+        await adjust(drone, ("COM_DL_LOSS_T", 12), ("MPC_LAND_SPEED", 1.5))
+    await plan(drone, ardupilot=ardupilot)
     await take_off(drone)
     await steer(drone)
+    await follow_plan(drone)
     await land(drone)
 
 
 def run(flight: Callable[[], Awaitable[None]]) -> int:
     """The program's exit status; a failure is told as well."""
+    status = 0
     try:
         asyncio.run(flight())
+        tell("done")
     except Exception as error:
-        traceback.print_exc(file=sys.stderr)
+        traceback.print_exc()
         tell("failed", error=type(error).__name__, text=str(error))
-        return 1
-    tell("done")
-    return 0
+        status = 1
+    # MAVSDK 3 stops its server when the last reference to it goes, and the program waits for that.
+    gc.collect()
+    return status

@@ -3,12 +3,11 @@ started by ``System``."""
 
 from __future__ import annotations
 
-import asyncio
 import sys
 from importlib.metadata import version
 
 from mavsdk import System, mission, mission_raw, offboard
-from mavsdk_flight import PATIENCE, Drone, fly, run
+from mavsdk_flight import Drone, fly, run, told
 from telling import clock, tell
 
 
@@ -17,26 +16,21 @@ async def flight() -> None:
     system = System(port=int(port))
     await system.connect(system_address=url)
 
-    async def connected() -> None:
-        async for state in system.core.connection_state():
-            if state.is_connected:
-                return
-
-    await asyncio.wait_for(connected(), PATIENCE)
+    await told(system.core.connection_state(), lambda state: state.is_connected, "connection")
     at = clock()
     tell("discovered", client=version("mavsdk"))
     drone = Drone(
         system.action,
         system.info,
-        system.mission_raw,
         system.mission,
+        system.mission_raw,
         system.offboard,
         system.param,
         system.telemetry,
-        offboard,
         mission,
-        mission_raw.MissionItem,
-        lambda name: getattr(system.telemetry, name)(),
+        mission_raw,
+        offboard,
+        lambda plugin, name: getattr(plugin, name)(),
     )
     await fly(drone, flavour, at)
 

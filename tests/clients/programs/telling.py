@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from enum import Enum
@@ -17,17 +18,19 @@ def clock() -> float:
 
 
 def tell(what: str, **facts: Any) -> None:
-    """One line. Enums are told by name, objects by their fields."""
-    sys.stdout.write(json.dumps({"what": what, "at": round(clock(), 3), **facts}, default=_plain) + "\n")
+    """One line. Enums are told by name, objects by their fields, what is no number as null."""
+    line = {"what": what, "at": round(clock(), 3), **{name: _plain(value) for name, value in facts.items()}}
+    sys.stdout.write(json.dumps(line, allow_nan=False) + "\n")
     sys.stdout.flush()
 
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.name
-    return {name: _plain_enum(field) for name, field in vars(value).items()}
-
-
-def _plain_enum(value: Any) -> Any:
-    # An IntEnum would be told as a number.
-    return value.name if isinstance(value, Enum) else value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: _plain(field) for name, field in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(field) for field in value]
+    return value if isinstance(value, int | str | None) else _plain(vars(value))
