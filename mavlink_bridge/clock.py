@@ -61,6 +61,35 @@ class WallClock:
             time.sleep(left * 1e-6)
 
 
+class PacedClock:
+    """Simulated time: from 0 on, ``speed`` times as fast as ``clock``. It is never more than ``stride`` (µs)
+    past the instant last waited for: what whoever runs by it cannot keep up with is given up, and counted in
+    ``lost`` (µs), so that nobody ever has to make up for more than a stride at once.
+    """
+
+    def __init__(self, clock: Clock, speed: float, stride: int) -> None:
+        self._clock, self._speed, self._stride = clock, speed, stride
+        self._start = clock.now()
+        self._reached = 0
+        self.lost = 0
+
+    def now(self) -> int:
+        """Simulated time, µs."""
+        shown = int((self._clock.now() - self._start) * self._speed) - self.lost
+        beyond = shown - self._reached - self._stride
+        if beyond > 0:
+            self.lost += beyond
+            shown -= beyond
+        return shown
+
+    def wait_until(self, instant: int) -> None:
+        """Until it is ``instant`` (µs, simulated)."""
+        while self.now() < instant:
+            # Within the loop, as what is lost meanwhile makes it later; a µs more, for the rounding.
+            self._clock.wait_until(self._start + int((instant + self.lost) / self._speed) + 1)
+        self._reached = max(self._reached, instant)
+
+
 class SkewedClock:
     """The clock of a computer that is wrong: ``skew`` of what the true ``clock`` shows."""
 

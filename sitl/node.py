@@ -320,6 +320,16 @@ class Autopilot:
         return self._commander.mode
 
     @property
+    def custom_mode(self) -> int:
+        """The flight mode as HEARTBEAT (0) says it."""
+        return self._flavour.custom_mode(self._commander.mode)
+
+    @property
+    def charge(self) -> float:
+        """What is left in the battery, 0…1; 1 without one."""
+        return 1.0 if self._battery is None else self._battery.charge.remaining
+
+    @property
     def estimate(self) -> Estimate:
         """What is believed, in the own local NED."""
         return self._plant.estimate()

@@ -4,6 +4,7 @@ The forms are those of pymavlink and MAVProxy; ``//`` after the colon, as MAVSDK
 
     udpin:HOST:PORT        listen; answer whoever speaks          tcp:HOST:PORT      call, again and again
     udpout:HOST:PORT       speak first                            tcpin:HOST:PORT    be called
+    udpin:HOST:PORT,HOST:PORT    listen, and speak to the second, too, from the beginning
     mcast:[GROUP[:PORT]][,INTERFACE]                              /dev/DEVICE,BAUD   serial port
     tlog:PATH              a log, at the times it was recorded at
 
@@ -46,13 +47,16 @@ def _address(host: str, port: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class UdpIn:
-    """Bind to ``host``, ``port`` (0: a free one of the system's choice)."""
+    """Bind to ``host``, ``port`` (0: a free one of the system's choice). ``peer``: host and port of someone
+    who is sent everything though it has not spoken yet, as autopilots do with a ground station."""
 
     host: str
     port: int
+    peer: tuple[str, int] | None = None
 
     def __str__(self) -> str:
-        return f"udpin:{_address(self.host, self.port)}"
+        place = f"udpin:{_address(self.host, self.port)}"
+        return place if self.peer is None else f"{place},{_address(*self.peer)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +155,9 @@ def _parse(text: str) -> Endpoint:
 
 
 def _udp_in(rest: str) -> UdpIn:
-    return UdpIn(*_host_port("udpin", rest, lowest=0))
+    place, comma, peer = rest.partition(",")
+    host, port = _host_port("udpin", place, lowest=0)
+    return UdpIn(host, port, _host_port("udpin:HOST:PORT,HOST:PORT", peer, lowest=1) if comma else None)
 
 
 def _udp_out(rest: str) -> UdpOut:
@@ -222,7 +228,7 @@ _KINDS: Final[dict[str, Callable[[str], Endpoint]]] = {
 
 
 def _host_port(scheme: str, rest: str, lowest: int) -> tuple[str, int]:
-    form = f"{scheme}:HOST:PORT"
+    form = scheme if ":" in scheme else f"{scheme}:HOST:PORT"
     host, colon, port = rest.removeprefix("//").rpartition(":")
     if not colon:
         raise _FormError(f"the port is missing; the form is {form}")

@@ -94,7 +94,8 @@ class _Udp:
 
 
 class UdpListener(_Udp):
-    """``udpin``: binds, and sends everything to all peers heard in the last 10 s, or else to the last one.
+    """``udpin``: binds, and sends everything to all peers heard in the last 10 s, or else to the last one;
+    and always to the endpoint's own peer, if it has one.
 
     As pymavlink and unlike mavlink-router's server mode, which answers the last one only: with two peers
     (an autopilot's two ports, a ground station beside a script) each would then see half of the stream.
@@ -102,6 +103,9 @@ class UdpListener(_Udp):
 
     def __init__(self, endpoint: UdpIn, clock: Clock) -> None:
         family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_DGRAM)
+        self._always: tuple[Address, ...] = ()
+        if endpoint.peer is not None:
+            self._always = (_peer_address(endpoint, *endpoint.peer, family),)
         one = socket.socket(family, socket.SOCK_DGRAM)
         try:
             one.bind(address)
@@ -111,6 +115,12 @@ class UdpListener(_Udp):
         super().__init__(one, one)
         self._clock = clock
         self._peers: dict[Address, int] = {}
+
+    @property
+    def peers(self) -> int:
+        """How many were heard in the last 10 s."""
+        now = self._clock.now()
+        return sum(now - time <= REMEMBERED for time in self._peers.values())
 
     def _heard(self, source: Address) -> bool:
         # Another dictionary each time: the sending thread may be going through this one. Last heard is last.
@@ -127,6 +137,7 @@ class UdpListener(_Udp):
     def _send(self, data: bytes) -> bool:
         peers, now = self._peers, self._clock.now()
         recent = [peer for peer, time in peers.items() if now - time <= REMEMBERED] or list(peers)[-1:]
+        recent += [peer for peer in self._always if peer not in recent]
         reached = 0
         for peer in recent:
             try:
@@ -135,6 +146,13 @@ class UdpListener(_Udp):
                 continue
             reached += 1
         return reached > 0
+
+
+def _peer_address(endpoint: UdpIn, host: str, port: int, family: socket.AddressFamily) -> Address:
+    found, address = resolved(endpoint, host, port, socket.SOCK_DGRAM)
+    if found is not family:
+        raise LinkError(f"{endpoint}: one is an IPv4 and the other an IPv6 address; allowed: both the same")
+    return address
 
 
 class UdpCaller(_Udp):

@@ -86,6 +86,52 @@ def swarm(
 
 
 @app.command()
+def sitl(
+    count: Annotated[int, typer.Option(min=1, max=254, help="Vehicles.")] = 1,
+    flavour: Annotated[str, typer.Option(help="ardupilot or px4.")] = "ardupilot",
+    speedup: Annotated[
+        float, typer.Option("--speedup", min=0.01, max=1000.0, help="Times as fast as the clock on the wall.")
+    ] = 1.0,
+    port_base: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(min=1, max=65535, help="In place of 5760 (ardupilot) or 14540 (px4)."),
+    ] = None,
+    to: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(help="One more endpoint for all vehicles: udpout:127.0.0.1:14550, mcast:, …"),
+    ] = None,
+    host: Annotated[str, typer.Option(help="Interface to listen on.")] = "127.0.0.1",
+    first_id: Annotated[int, typer.Option(min=1, max=254, help="System id of the first vehicle.")] = 1,
+    vehicle: Annotated[str, typer.Option(help="A file, or firefly, hummingbird.")] = "firefly",
+    sensors: Annotated[str, typer.Option(help="truth, rtk or gnss.")] = "truth",
+    physics: Annotated[str, typer.Option(help="own or jsbsim.")] = "own",
+    startup: Annotated[
+        str, typer.Option(help="quick, or realistic: GPS and estimator take their time.")
+    ] = "quick",
+    origin: Annotated[Optional[str], typer.Option(help="LATITUDE,LONGITUDE[,ALTITUDE].")] = None,  # noqa: UP045
+    spacing: Annotated[float, typer.Option(min=0.0, max=1000.0, help="m between vehicles.")] = 3.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of sensors' noise.")] = 1,
+    state: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Directory where parameters and missions are kept."),
+    ] = None,
+    seconds: Annotated[Optional[float], typer.Option(min=0.0, help="End by itself after that.")] = None,  # noqa: UP045
+    as_json: Annotated[
+        bool,
+        typer.Option("--json", help="One JSON object on standard output when all are up, one at the end."),
+    ] = False,
+) -> None:
+    """Emulate vehicles that MAVSDK, MAVProxy, pymavlink and ground stations can connect to, until Ctrl-C."""
+    from outrider.hangar.command import Options, run
+    from outrider.hangar.request import request
+
+    asked = request(
+        count, first_id, flavour, vehicle, sensors, physics, startup, origin, spacing, speedup, seed
+    )
+    raise typer.Exit(run(asked, Options(port_base, tuple(to or ()), host, state, seconds, as_json)))
+
+
+@app.command()
 def sweep(
     name: Annotated[str, typer.Argument(help="A file, or the name of a shipped sweep.")],
     runs: Annotated[Optional[int], typer.Option(min=1, max=1_000_000, help="Seeds per cell.")] = None,  # noqa: UP045

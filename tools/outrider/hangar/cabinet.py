@@ -1,0 +1,65 @@
+"""What vehicles keep from one start to the next, a JSON file for each: parameters and plans."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from outrider.errors import InputError
+from outrider.hangar.squad import Squad
+from sitl.saved import Saved
+
+
+class Cabinet:
+    """The files in ``directory``, FLAVOUR-ID.json, by the id that a vehicle was started with; nothing is kept
+    without a directory."""
+
+    def __init__(self, directory: Path | None, flavour: str) -> None:
+        self._directory, self._flavour = directory, flavour
+        self._kept: dict[int, Saved] = {}
+
+    def saved(self, system: int) -> Saved:
+        """What vehicle ``system`` kept; InputError if its file is damaged."""
+        kept = Saved()
+        path = self._path(system)
+        if path is not None and path.exists():
+            try:
+                kept = Saved.model_validate_json(path.read_bytes())
+            except (OSError, ValidationError) as error:
+                why = error.strerror if isinstance(error, OSError) else "it is damaged"
+                raise InputError(
+                    f"{path}: cannot be used: {why}; allowed: what a vehicle left there, or no such file"
+                ) from None
+        self._kept[system] = kept
+        return kept
+
+    def keep(self, squad: Squad) -> None:
+        """Write what has changed since the last time, so that a file is always whole."""
+        if self._directory is None:
+            return
+        for seat in squad.seats:
+            found = seat.node.saved
+            if found != self._kept[seat.system]:
+                self._kept[seat.system] = found
+                path = self._path(seat.system)
+                if path is not None:
+                    beside = path.with_suffix(".new")
+                    beside.write_text(found.model_dump_json(indent=1), encoding="utf-8")
+                    beside.replace(path)
+
+    def _path(self, system: int) -> Path | None:
+        return None if self._directory is None else self._directory / f"{self._flavour}-{system}.json"
+
+
+def prepare(directory: Path | None, flavour: str, systems: range) -> None:
+    """Make the directory, and look whether all that is in it can be used. InputError."""
+    if directory is None:
+        return
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--state {directory}: cannot be made: {error.strerror}") from None
+    cabinet = Cabinet(directory, flavour)
+    for system in systems:
+        cabinet.saved(system)

@@ -1,0 +1,108 @@
+"""``outrider sitl``: opens what vehicles are reached by, starts them, shows them, and ends them."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Final, NamedTuple
+
+from mavlink_bridge.clock import WallClock
+from mavlink_bridge.errors import EndpointError
+from outrider.errors import InputError
+from outrider.hangar.addresses import Address, addresses, exposed, extra
+from outrider.hangar.cabinet import prepare
+from outrider.hangar.crew import Crew
+from outrider.hangar.figures import Value, ready, summary
+from outrider.hangar.request import Request
+from outrider.hangar.watch import watching
+from outrider.hangar.wiring import wire
+
+_LOOK: Final = 0.1
+"""s between two looks at the board."""
+
+
+class Options(NamedTuple):
+    """How it runs. ``seconds`` of wall time until it ends by itself."""
+
+    port_base: int | None
+    to: tuple[str, ...]
+    host: str
+    state: Path | None
+    seconds: float | None
+    as_json: bool
+
+
+def run(asked: Request, options: Options) -> int:
+    """Until Ctrl-C, SIGTERM, or the time is over; the exit status. InputError for what cannot be opened,
+    OutriderError if a process ends by itself."""
+    began = time.monotonic()
+    prepare(options.state, asked.flavour, asked.systems)
+    places = _addresses(asked, options)
+    crew = Crew(asked, wire(places, WallClock()), options.state)
+    with _stopping() as stopped:
+        try:
+            crew.start()
+            _wait(crew, stopped, asked.count)
+            until = math.inf if options.seconds is None else time.monotonic() + options.seconds
+            if options.as_json and not stopped:
+                _say(ready(asked, places))
+            with watching(asked, places, crew.board) as look:
+                while not stopped and time.monotonic() < until:
+                    time.sleep(_LOOK)
+                    crew.check()
+                    look()
+        finally:
+            crew.stop()
+    if options.as_json:
+        _say(summary(asked, crew.board, time.monotonic() - began))
+    return 0
+
+
+def _addresses(asked: Request, options: Options) -> list[Address]:
+    try:
+        more = tuple(extra(text, asked.count) for text in options.to)
+        places = addresses(asked.flavour, asked.count, options.port_base, options.host, more)
+    except EndpointError as error:
+        raise InputError(f"--to {error}") from None
+    open_to_all = [str(one) for one in places[0].endpoints if exposed(one)]
+    if open_to_all:
+        sys.stderr.write(
+            f"outrider sitl: {', '.join(open_to_all)}: beyond this machine; unsigned MAVLink obeys everyone "
+            "who can send there\n"
+        )
+    return places
+
+
+@contextmanager
+def _stopping() -> Iterator[list[int]]:
+    """The signals that have come and would otherwise have ended the process."""
+    came: list[int] = []
+
+    def note(which: int, _frame: FrameType | None) -> None:
+        came.append(which)
+
+    before = {which: signal.signal(which, note) for which in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield came
+    finally:
+        for which, handler in before.items():
+            signal.signal(which, handler)
+
+
+def _wait(crew: Crew, stopped: Sequence[int], count: int) -> None:
+    """Until all vehicles are up."""
+    while not stopped and not all(crew.board.gauges(index).up for index in range(count)):
+        time.sleep(0.02)
+        crew.check()
+
+
+def _say(value: dict[str, Value]) -> None:
+    sys.stdout.write(json.dumps(value) + "\n")
+    sys.stdout.flush()

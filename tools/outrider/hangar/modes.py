@@ -1,0 +1,44 @@
+"""Names of flight modes by their numbers in HEARTBEAT.custom_mode, as ground stations write them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from pymavlink.dialects.v20 import all as dialect
+
+_PREFIX: Final = "COPTER_MODE_"
+_COPTER: Final[dict[int, str]] = {
+    number: entry.name.removeprefix(_PREFIX)
+    for number, entry in dialect.enums["COPTER_MODE"].items()
+    if entry.name.startswith(_PREFIX) and not entry.name.endswith("ENUM_END")
+}
+# Main modes, and the sub-modes of the fourth, AUTO: px4_custom_mode.h.
+_MAIN: Final = {
+    1: "MANUAL",
+    2: "ALTCTL",
+    3: "POSCTL",
+    4: "AUTO",
+    5: "ACRO",
+    6: "OFFBOARD",
+    7: "STABILIZED",
+    8: "RATTITUDE",
+}
+_AUTO: Final = {
+    1: "READY",
+    2: "TAKEOFF",
+    3: "HOLD",
+    4: "MISSION",
+    5: "RETURN",
+    6: "LAND",
+    8: "FOLLOW",
+    9: "PRECLAND",
+}
+
+
+def mode_name(flavour: str, custom_mode: int) -> str:
+    """The name, or the number if it has none."""
+    if flavour == "ardupilot":
+        return _COPTER.get(custom_mode, str(custom_mode))
+    main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
+    name = _AUTO.get(sub) if main == 4 else _MAIN.get(main)
+    return name or f"{main}.{sub}"

@@ -1,0 +1,47 @@
+"""What passes by in datagrams of whole frames: how many, and the STATUSTEXTs among them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from mavlink_bridge.framing import claimed_length
+
+_STATUSTEXT: Final = 253
+_HEADER: Final = 10
+_TEXT: Final = 50
+# Of the payload: severity, 50 characters, id, number of the piece.
+_PIECE: Final = 53
+
+
+class Traffic:
+    """Counts the frames of one vehicle: ``received``, ``sent``; ``sayings`` are the texts that it sent since
+    they were taken out."""
+
+    def __init__(self) -> None:
+        self.received = 0
+        self.sent = 0
+        self.sayings: list[str] = []
+
+    def receive(self, data: bytes) -> None:
+        """``data`` came in, which may be anything."""
+        at = 0
+        while at < len(data) and (length := claimed_length(data, at)) is not None:
+            at += length
+            self.received += 1
+
+    def send(self, data: bytes) -> None:
+        """``data`` goes out, version 2 frames."""
+        at = 0
+        while at < len(data):
+            length = data[at + 1]
+            if data[at + 7] == _STATUSTEXT and not data[at + 8] and not data[at + 9]:
+                self._note(data[at + _HEADER : at + _HEADER + length])
+            at += claimed_length(data, at) or len(data)
+            self.sent += 1
+
+    def _note(self, payload: bytes) -> None:
+        text = payload[1 : 1 + _TEXT].rstrip(b"\0").decode("ascii", errors="replace")
+        if len(payload) > _PIECE and payload[_PIECE] and self.sayings:
+            self.sayings[-1] += text
+        else:
+            self.sayings.append(text)

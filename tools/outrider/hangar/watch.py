@@ -1,0 +1,42 @@
+"""What people see of the vehicles: a table on a terminal; elsewhere a line for each vehicle at first, and
+then one for each event. All of it on standard error."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+
+from outrider.hangar.addresses import Address
+from outrider.hangar.board import Board
+from outrider.hangar.chronicle import Chronicle
+from outrider.hangar.request import Request
+from outrider.hangar.screen import Screen
+
+
+@contextmanager
+def watching(asked: Request, places: Sequence[Address], board: Board) -> Iterator[Callable[[], None]]:
+    """Inside it, call what it gives a few times a second. The vehicles are up."""
+    console = Console(stderr=True)
+    if console.is_terminal:
+        screen = Screen(asked, places, board, console)
+        with screen.live:
+            yield screen.look
+        return
+    for system, place in zip(asked.systems, places, strict=True):
+        ends = " ".join(map(str, place.endpoints))
+        _write(f"vehicle {system} ({asked.flavour}, {asked.vehicle.name}): {ends}")
+    chronicle = Chronicle(asked, board)
+
+    def look() -> None:
+        for line in chronicle.look():
+            _write(line)
+
+    yield look
+
+
+def _write(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
