@@ -15,21 +15,31 @@ import pytest
 
 PROGRAMS: Final = Path(__file__).parent / "programs"
 ENVIRONMENTS: Final = Path(__file__).parents[2] / ".venv" / "clients"
-OURS: Final = Path(sys.executable)
-"""The interpreter of the tests themselves, which has pymavlink."""
 PATIENCE: Final = 240.0
 """s for a whole flight; on a machine that is not busy it takes a tenth of that."""
 
 
+def available(client: str) -> bool:
+    """Whether it can be flown: in CI always, so that it fails there if it cannot."""
+    return client == "pymavlink" or _interpreter(client).exists() or bool(os.environ.get("CI"))
+
+
 def python(client: str) -> Path:
-    """The interpreter of a client's environment. Where there is none the test is skipped, but never in CI."""
-    found = ENVIRONMENTS / client / "bin" / "python"
+    """The interpreter of a client's environment; pymavlink's is that of the tests. Where there is none the test
+    is skipped, but fails in CI."""
+    if client == "pymavlink":
+        return Path(sys.executable)
+    found = _interpreter(client)
     if not found.exists():
         reason = f"no environment for {client}: run make .venv/clients/.made"
         if os.environ.get("CI"):
             pytest.fail(reason)
         pytest.skip(reason)
     return found
+
+
+def _interpreter(client: str) -> Path:
+    return ENVIRONMENTS / client / "bin" / "python"
 
 
 class Flight:
