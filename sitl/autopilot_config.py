@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from sitl.autonomy_config import BatteryFailsafeConfig, FenceConfig, FollowConfig
 from sitl.backends.physics import PhysicsName
 from sitl.battery import BatteryConfig
 from sitl.profiles import ProfileName
@@ -74,6 +75,9 @@ class AutopilotConfig(BaseModel):
     )
     epoch: int = Field(0, ge=0, description="Unix time of the boot (µs); 0: it does not know the time")
     battery: BatteryConfig | None = Field(None, description="none: its state is not told")
+    battery_failsafe: BatteryFailsafeConfig = BatteryFailsafeConfig()
+    fence: FenceConfig = FenceConfig()
+    follow: FollowConfig = FollowConfig()
     disarm_delay: Seconds = Field(10.0, description="armed on the ground for this long: disarmed again")
     touchdown_time: Seconds = Field(0.5, description="on the ground for this long: landed")
 

@@ -22,7 +22,7 @@ _SINKING: Final = 0.6
 
 class Commander:
     """The state of one vehicle. A verb returns None, also when what it asks is already so, or why it is
-    denied."""
+    denied. ``doubts``: what speaks against arming, whatever the mode."""
 
     def __init__(
         self,
@@ -49,6 +49,7 @@ class Commander:
         self._touched_at: int | None = None
         self._blind_since: int | None = None
         self._disarm_at = 0
+        self.doubts: Callable[[], list[str]] = list
         self.armed = False
         self.landed = True
         self.ready = False
@@ -88,8 +89,9 @@ class Commander:
         if not forced:
             if not self.ready:
                 return Denial(TEMPORARILY_REJECTED, "Arming refused: no position yet")
-            if reason := self._flavour.arming_denial(self.status(now)):
-                return Denial(FAILED, f"Arming refused: {reason}")
+            reason = self._flavour.arming_denial(self.status(now))
+            if doubts := [reason] if reason else self.doubts():
+                return Denial(FAILED, f"Arming refused: {doubts[0]}")
         self.armed = True
         self._postpone(now)
         self._voice.inform("Armed")
@@ -106,6 +108,22 @@ class Commander:
         if self.armed:
             self._stop("Disarmed")
         return None
+
+    def cut(self, why: str) -> None:
+        """Stop the motors, wherever it is."""
+        if self.armed:
+            self._stop(why)
+
+    def fail_safe(self, mode: Mode, now: int) -> None:
+        """Change to ``mode`` because something is wrong; on the ground there is nothing to do."""
+        if not self.armed or self.landed or mode is self.mode:
+            return
+        self._switch(mode if self.ready else Mode.LAND, now)
+
+    @property
+    def level_speed(self) -> float:
+        """m/s, when nobody says another."""
+        return self._config.waypoint_speed
 
     def take_off(self, altitude: float, relative: bool | None, now: int) -> Denial | None:
         """As NAV_TAKEOFF (22); arguments as for ``Flavour.takeoff``."""
@@ -177,6 +195,7 @@ class Commander:
 
     def _switch(self, mode: Mode, now: int) -> None:
         self.mode = mode
+        self._journeys.following.active = mode is Mode.FOLLOW
         if self.armed and mode is Mode.MISSION:
             self._journeys.begin(mode, self._estimate())
             return
@@ -190,7 +209,7 @@ class Commander:
         match mode:
             case Mode.LAND:
                 self._guidance.land(self._config.land_speed)
-            case Mode.RETURN:
+            case Mode.RETURN | Mode.FOLLOW:
                 self._journeys.begin(mode, self._estimate())
             case Mode.GUIDED:
                 self._steering.resume(self._estimate().pose, now)

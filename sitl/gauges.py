@@ -11,6 +11,7 @@ from sitl.autopilot_config import AutopilotConfig
 from sitl.battery import Battery
 from sitl.commander import Commander
 from sitl.config import VehicleConfig
+from sitl.failsafes import Failsafes
 from sitl.flavours import ARMED, Flavour
 from sitl.guidance import Activity, Guidance
 from sitl.home import Home
@@ -42,6 +43,7 @@ class Gauges:
         plant: Plant,
         battery: Battery | None,
         mission: Callable[[], MissionCurrent],
+        failsafes: Failsafes,
     ) -> None:
         self._config = config
         self._source = source
@@ -53,6 +55,7 @@ class Gauges:
         self._plant = plant
         self._battery = battery
         self._mission = mission
+        self._failsafes = failsafes
         self._version = version(source, config.flavour)
         self._rotors = len(vehicle.rotors)
         self._hovering = _squares(hover_speeds(vehicle).tolist())
@@ -89,10 +92,12 @@ class Gauges:
             self._home,
             None if self._battery is None else self._battery.charge,
             self._throttle,
-            self._unbreached,
+            0 if self._failsafes.breached else self._unbreached,
             self._config.epoch,
             self._version,
             self._mission,
+            commander.ready and (commander.armed or not self._failsafes.doubts()),
+            self._failsafes.fence_status,
         )
 
     def _target(self) -> Setpoint | None:

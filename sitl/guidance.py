@@ -31,6 +31,9 @@ class Activity(Enum):
     LAND = "land"
 
 
+_INTERRUPTIBLE: Final = (Activity.GO, Activity.TRACK, Activity.HOLD)
+
+
 class Guidance:
     """One reference, moved on in steps of some ms.
 
@@ -46,6 +49,7 @@ class Guidance:
         self._setpoint = _STAY
         self._received = 0
         self._deadline = _FOR_EVER
+        self._interrupted: tuple[Activity, Setpoint] | None = None
         self.activity = Activity.IDLE
         self.timed_out = False
 
@@ -105,6 +109,7 @@ class Guidance:
     def idle(self) -> None:
         """No reference."""
         self.activity = Activity.IDLE
+        self._interrupted = None
 
     def takeoff(self, height: float, here: Pose) -> None:
         """Straight up to ``height`` (m above the origin)."""
@@ -122,11 +127,41 @@ class Guidance:
     def track(self, setpoint: Setpoint, received: int, timeout: int | None, here: Pose, now: int) -> None:
         """Follow ``setpoint``, which is for the time ``received`` (µs), until ``timeout`` µs after that."""
         self._leave_ground(here)
-        self._begin(Activity.TRACK, setpoint)
         self._received = received
         self._deadline = _FOR_EVER if timeout is None else received + timeout
+        if self._interrupted is not None:
+            self._interrupted = Activity.TRACK, setpoint
+            return
+        self._begin(Activity.TRACK, setpoint)
         # A trajectory that is being passed through takes effect at once, not at the end of the next step.
         self._shaper.advance(self.wanted(now), self._limits[Activity.TRACK], 0.0)
+
+    def hasten(self, speed: float) -> None:
+        """From now on at up to ``speed`` (m/s) to where it goes."""
+        if self.activity is Activity.GO:
+            self._limits[Activity.GO] = self._limits[Activity.GO]._replace(speed=speed)
+
+    def look(self, yaw: float) -> None:
+        """To ``yaw`` (rad), until something else says where to look."""
+        self._setpoint = self._setpoint._replace(yaw=yaw, yaw_rate=None)
+
+    @property
+    def paused(self) -> bool:
+        """Whether it stays on ``pause``."""
+        return self._interrupted is not None
+
+    def pause(self) -> None:
+        """Brake and stay. ``go_on`` goes on with what it does now, or what ``track`` is told meanwhile."""
+        if self._interrupted is None and self.activity in _INTERRUPTIBLE:
+            interrupted = self.activity, self._setpoint
+            self.hold()
+            self._interrupted = interrupted
+
+    def go_on(self) -> None:
+        """End of ``pause``."""
+        if self._interrupted is not None:
+            activity, setpoint = self._interrupted
+            self._begin(activity, setpoint)
 
     def hover(self, here: Pose) -> None:
         """Stay ``here``, where it is at rest in the air."""
@@ -171,15 +206,21 @@ class Guidance:
                 self.timed_out = True
             wanted = self.wanted(end)
         else:
-            if activity is Activity.HOLD and self._shaper.at_rest and self._heading.yaw_rate == 0.0:
-                return
             wanted = self._setpoint
+            if (
+                activity is Activity.HOLD
+                and wanted.yaw is None
+                and self._shaper.at_rest
+                and self._heading.yaw_rate == 0.0
+            ):
+                return
         self._shaper.advance(wanted, self._limits[self.activity], dt)
         self._heading.advance(wanted.yaw, wanted.yaw_rate, dt)
 
     def _begin(self, activity: Activity, setpoint: Setpoint) -> None:
         self.activity = activity
         self.timed_out = False
+        self._interrupted = None
         self._setpoint = setpoint
 
     def _leave_ground(self, here: Pose) -> None:

@@ -7,9 +7,10 @@ from typing import Final
 
 from mavlink_bridge.messages import AutopilotVersion, Source
 
-# MAV_PROTOCOL_CAPABILITY: missions as float and int, parameters, COMMAND_INT, set-points in local NED,
-# MAVLink 2, fence, rally points. Files, terrain and the calibration of compasses are not there.
-_BOTH: Final = 0x1 | 0x2 | 0x4 | 0x8 | 0x80 | 0x2000 | 0x4000 | 0x8000
+# MAV_PROTOCOL_CAPABILITY: missions as float and int, parameters, COMMAND_INT, set-points as attitude, in
+# local NED and on the globe, MAVLink 2, flight termination, fence, rally points. Files, terrain and the
+# calibration of compasses are not there.
+_BOTH: Final = 0x1 | 0x2 | 0x4 | 0x8 | 0x40 | 0x80 | 0x100 | 0x800 | 0x2000 | 0x4000 | 0x8000
 _BYTEWISE: Final = 0x10
 
 # Four bytes: major, minor, patch, and 255 for an official release. ArduCopter 4.6.3, PX4 1.16.1.

@@ -21,15 +21,19 @@ from sitl.autopilot_config import AutopilotConfig
 from sitl.battery import Battery
 from sitl.commander import Commander
 from sitl.config import VehicleConfig
+from sitl.failsafes import Failsafes
 from sitl.failures import Failures
+from sitl.fences import Fences
 from sitl.flavours import Flavour, Mode
 from sitl.flavours.ardupilot import ArduPilot
 from sitl.flavours.px4 import Px4
+from sitl.following import Following
 from sitl.gauges import Gauges
 from sitl.guidance import Guidance
 from sitl.home import Home
 from sitl.homing import Homing
 from sitl.journeys import Journeys
+from sitl.maneuvers import Maneuvers
 from sitl.missions.itinerary import Itinerary
 from sitl.missions.plans import Plans
 from sitl.missions.service import MissionService
@@ -57,8 +61,9 @@ LINK: Final = "autopilot"
 
 # MAV_COMP_ID_AUTOPILOT1
 _COMPONENT: Final = 1
-# SET_MODE, PING, COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED, TIMESYNC; and the services'.
-_HEARD: Final = frozenset((4, 11, 75, 76, 84, 111))
+# SET_MODE, PING, GLOBAL_POSITION_INT, COMMAND_INT, COMMAND_LONG, SET_ATTITUDE_TARGET,
+# SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT, TIMESYNC, FOLLOW_TARGET; and the services'.
+_HEARD: Final = frozenset((4, 11, 33, 75, 76, 82, 84, 86, 111, 144))
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
 _FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
 
@@ -106,7 +111,7 @@ class Autopilot:
         )
         self._outbox: list[Message] = []
         voice = Voice(self._source, self._outbox)
-        steering = Steering(self._flavour, self._guidance, voice)
+        steering = Steering(self._flavour, self._guidance, self._origin, self._home, voice)
         self._plans = Plans(saved.plans)
         bytewise = self._flavour.bytewise
         itinerary = Itinerary(
@@ -118,7 +123,9 @@ class Autopilot:
             self._flavour.first_item,
             px4=bytewise,
         )
-        self._journeys = Journeys(itinerary, Returning(self._guidance, self._home, config))
+        following = Following(self._guidance, self._origin, self._home, config.follow, px4=bytewise)
+        returning = Returning(self._guidance, self._home, config)
+        self._journeys = Journeys(itinerary, returning, following, self._guidance)
         self._commander = Commander(
             config,
             self._flavour,
@@ -132,6 +139,15 @@ class Autopilot:
         self._battery = None
         if config.battery is not None:
             self._battery = Battery(config.battery, hover_speeds(vehicle).tolist())
+        self._failsafes = Failsafes(
+            self._flavour,
+            self._commander,
+            Fences(self._plans, self._origin, self._home),
+            self._battery,
+            self._plant.estimate,
+            voice,
+        )
+        self._commander.doubts = self._failsafes.doubts
         homing = Homing(
             self._home,
             self._origin,
@@ -174,10 +190,29 @@ class Autopilot:
             self._plant,
             self._battery,
             self._missions.current,
+            self._failsafes,
         )
-        orders = Orders(self._commander, self._flavour, self._services.commands)
+        maneuvers = Maneuvers(
+            self._commander,
+            self._flavour,
+            self._guidance,
+            self._origin,
+            self._home,
+            itinerary,
+            following,
+            self._plant.estimate,
+            self._failsafes.say_doubts,
+        )
+        commands = self._services.commands | maneuvers.commands
         self._reception = Reception(
-            self._source, self._outbox, voice, self._commander, orders, steering, self._services.handlers
+            self._source,
+            self._outbox,
+            voice,
+            self._commander,
+            Orders(self._commander, self._flavour, commands),
+            steering,
+            following,
+            self._services.handlers,
         )
         heard = _HEARD | {BY_TYPE[kind].id for kind in self._services.handlers}
         self._codec = Codec(accept=lambda message_id, _system, _component: message_id in heard)
@@ -216,6 +251,8 @@ class Autopilot:
             self._telemetry.request(ORIGIN)
         if self._battery is not None and self._battery.due(self._now):
             self._battery.advance(self._now, self._plant.state.rotor_speeds.tolist())
+        if self._now >= self._failsafes.next_due:
+            self._failsafes.watch(self._now)
 
     def _listen(self, datagram: Datagram) -> None:
         if datagram.link != LINK:

@@ -17,6 +17,8 @@ SET_MODE: Final = 176
 ARM: Final = 400
 
 _FORCED: Final = 21196.0
+# INT32_MAX in a field of COMMAND_INT
+NOWHERE: Final = 0x7FFFFFFF
 # MAV_FRAME
 _GLOBAL: Final = (0, 5)
 _RELATIVE: Final = (3, 6)
@@ -37,6 +39,11 @@ class Order(NamedTuple):
         """Parameters 5 to 7 as latitude and longitude (degrees) and altitude (m)."""
         x, y, z = self.params[4:7]
         return (x / 1e7, y / 1e7, z) if self.integer else (x, y, z)
+
+    @property
+    def nowhere(self) -> bool:
+        """Whether an integer latitude or longitude says *as it is*."""
+        return self.integer and NOWHERE in self.params[4:6]
 
 
 class Verdict(NamedTuple):

@@ -9,14 +9,19 @@ from mavlink_bridge.messages import (
     CommandAck,
     CommandInt,
     CommandLong,
+    FollowTarget,
+    GlobalPosition,
     Message,
     Ping,
     SetMode,
+    SetpointAttitude,
+    SetpointGlobal,
     SetpointLocal,
     Source,
     Timesync,
 )
 from sitl.commander import Commander
+from sitl.following import Following
 from sitl.orders import Orders
 from sitl.sensors import Estimate
 from sitl.steering import Steering
@@ -38,6 +43,7 @@ class Reception:
         commander: Commander,
         orders: Orders,
         steering: Steering,
+        following: Following,
         services: Mapping[type[Any], Callable[[Any, int], None]],
     ) -> None:
         """``services``: who handles a message that arrived at some time (µs), by its type."""
@@ -47,17 +53,21 @@ class Reception:
         self._commander = commander
         self._orders = orders
         self._steering = steering
+        self._following = following
         self._services = services
 
     def handle(self, message: Message, now: int, estimate: Estimate) -> None:
         """Act on a message that arrived at ``now`` (µs since boot), when ``estimate`` was believed."""
         match message:
-            case SetpointLocal():
+            case SetpointLocal() | SetpointGlobal() | SetpointAttitude():
                 if self._is_mine(message.target_system, message.target_component):
                     self._steering.steer(message, self._commander.status(now), estimate.pose, now)
             case CommandLong() | CommandInt():
                 if self._is_mine(message.target_system, message.target_component):
                     self._obey(message, now)
+            case FollowTarget() | GlobalPosition():
+                if message.source.system != self._source.system:
+                    self._following.hear(message, estimate.pose, now)
             case Timesync(tc1=0):
                 # Zero would make the reply a request.
                 self._outbox.append(Timesync(self._source, max(1, now * 1000), message.ts1))

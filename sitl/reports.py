@@ -13,6 +13,7 @@ from mavlink_bridge.messages import (
     AutopilotVersion,
     EkfStatus,
     ExtendedSysState,
+    FenceStatus,
     GlobalPosition,
     GpsGlobalOrigin,
     Heartbeat,
@@ -72,7 +73,7 @@ class Snapshot(NamedTuple):
     ``waking`` 0…1: how far GPS and filter have come up, if that is shown; ``charge`` None without a battery;
     ``throttle`` 0…1; ``unbreached``: MAV_SYS_STATUS_GEOFENCE where it is told; ``epoch``: Unix time of the
     boot (µs), 0 if nobody knows; ``version`` is what AUTOPILOT_VERSION says; ``mission`` gives
-    MISSION_CURRENT."""
+    MISSION_CURRENT, ``fence`` FENCE_STATUS. ``armable``: nothing speaks against arming, or it is armed."""
 
     source: Source
     time: int
@@ -98,6 +99,8 @@ class Snapshot(NamedTuple):
     epoch: int
     version: AutopilotVersion
     mission: Callable[[], MissionCurrent]
+    armable: bool
+    fence: Callable[[Source], FenceStatus]
 
 
 def heartbeat(s: Snapshot) -> Message:
@@ -110,6 +113,8 @@ def heartbeat(s: Snapshot) -> Message:
 def sys_status(s: Snapshot) -> Message:
     known = _SENSORS | _GPS | _PREARM
     health = (known if s.ready else _SENSORS) & ~(0 if s.fixed else _GPS) | s.unbreached
+    if not s.armable:
+        health &= ~_PREARM
     if s.charge is None:
         return SysStatus(s.source, known, known, health, None, None)
     known |= _BATTERY

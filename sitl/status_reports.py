@@ -26,6 +26,7 @@ VFR_HUD: Final = 74
 ALTITUDE: Final = 141
 BATTERY_STATUS: Final = 147
 AUTOPILOT_VERSION: Final = 148
+FENCE_STATUS: Final = 162
 ESTIMATOR_STATUS: Final = 230
 HOME: Final = 242
 
@@ -99,6 +100,10 @@ def battery_status(s: Snapshot) -> Message | None:
 
 def autopilot_version(s: Snapshot) -> Message:
     return s.version
+
+
+def fence_status(s: Snapshot) -> Message:
+    return s.fence(s.source)
 
 
 def estimator_status(s: Snapshot) -> Message:

@@ -9,10 +9,13 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from mavlink_bridge.messages import SetpointLocal
+from mavlink_bridge.messages import SetpointAttitude, SetpointGlobal, SetpointLocal
 from sitl.flavours import Flavour, Status
+from sitl.global_setpoints import localised
 from sitl.guidance import Activity, Guidance
-from sitl.setpoints import POSITION, Pose, Setpoint, Stop
+from sitl.home import Home
+from sitl.origin import Origin
+from sitl.setpoints import POSITION, Pose, Reading, Setpoint, Stop
 from sitl.voice import Voice
 
 _SECOND: Final = 1_000_000
@@ -43,15 +46,26 @@ class Stream(NamedTuple):
 class Steering:
     """Turns set-point messages into what the guidance follows."""
 
-    def __init__(self, flavour: Flavour, guidance: Guidance, voice: Voice) -> None:
+    def __init__(
+        self, flavour: Flavour, guidance: Guidance, origin: Origin, home: Home, voice: Voice
+    ) -> None:
+        """``origin`` and ``home`` are what places on the globe and heights count from."""
         self._flavour = flavour
         self._guidance = guidance
+        self._origin = origin
+        self._home = home
         self._voice = voice
         self.stream = Stream()
 
-    def steer(self, message: SetpointLocal, status: Status, here: Pose, now: int) -> None:
+    def steer(
+        self,
+        message: SetpointLocal | SetpointGlobal | SetpointAttitude,
+        status: Status,
+        here: Pose,
+        now: int,
+    ) -> None:
         """Act on one set-point addressed to this vehicle that arrived at ``now`` (µs)."""
-        reading = self._flavour.read(message, here)
+        reading = self._read(message, here)
         if not isinstance(reading, Setpoint):
             self._voice.complain(reading.reason, now)
             if isinstance(reading, Stop) and self._guidance.activity is Activity.TRACK:
@@ -71,6 +85,14 @@ class Steering:
             self._follow(setpoint, here, now)
         else:
             self._guidance.hold()
+
+    def _read(self, message: SetpointLocal | SetpointGlobal | SetpointAttitude, here: Pose) -> Reading:
+        if isinstance(message, SetpointAttitude):
+            return self._flavour.read_attitude(message)
+        if isinstance(message, SetpointGlobal):
+            local = localised(message, self._origin, self._home, stops=self._flavour.stops)
+            return self._flavour.read(local, here) if isinstance(local, SetpointLocal) else local
+        return self._flavour.read(message, here)
 
     def _follow(self, setpoint: Setpoint, here: Pose, now: int) -> None:
         if self._guidance.activity is Activity.IDLE and not _rises(setpoint, here):

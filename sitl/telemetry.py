@@ -52,6 +52,7 @@ class Telemetry:
             q.BATTERY_STATUS: _Stream(q.battery_status, rates.battery_status),
             q.AUTOPILOT_VERSION: _Stream(q.autopilot_version, 0.0),
             q.HOME: _Stream(q.home, rates.home_position),
+            q.FENCE_STATUS: _Stream(q.fence_status, 0.0),
         }
         if not reports_ekf:
             self._streams[q.ALTITUDE] = _Stream(q.altitude, rates.altitude)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import degrees, radians, remainder, tau
+from math import degrees, isfinite, radians, remainder, tau
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
@@ -10,6 +10,9 @@ from mavlink_bridge.fields.units import FULL_CIRCLE_CDEG, UNKNOWN_U16, Fields, d
 
 TEXT_LENGTH = 50
 TUNNEL_LENGTH = 128
+# Bits of FOLLOW_TARGET.est_capabilities.
+HAS_POSITION = 0x1
+HAS_VELOCITY = 0x2
 
 
 def heartbeat(s: m.Source, f: Fields) -> m.Heartbeat:
@@ -185,6 +188,78 @@ def setpoint_fields(x: m.SetpointLocal) -> Fields:
         x.target_component,
         x.frame,
     )
+
+
+def setpoint_global(s: m.Source, f: Fields) -> m.SetpointGlobal:
+    time, x, y, altitude, vx, vy, vz, ax, ay, az, yaw, yaw_rate, mask, system, component, frame = f
+    target = system, component, frame, mask
+    return m.SetpointGlobal(
+        s, time * 1000, *target, x, y, altitude, (vx, vy, vz), (ax, ay, az), yaw, yaw_rate
+    )
+
+
+def setpoint_global_fields(x: m.SetpointGlobal) -> Fields:
+    return (
+        x.time_boot // 1000,
+        x.x,
+        x.y,
+        x.altitude,
+        *x.velocity,
+        *x.acceleration,
+        x.yaw,
+        x.yaw_rate,
+        x.type_mask,
+        x.target_system,
+        x.target_component,
+        x.frame,
+    )
+
+
+def setpoint_attitude(s: m.Source, f: Fields) -> m.SetpointAttitude:
+    return m.SetpointAttitude(s, f[0] * 1000, f[9], f[10], f[11], f[1:5], f[5:8], f[8])
+
+
+def setpoint_attitude_fields(x: m.SetpointAttitude) -> Fields:
+    return (
+        x.time_boot // 1000,
+        *x.attitude,
+        *x.body_rates,
+        x.thrust,
+        x.target_system,
+        x.target_component,
+        x.type_mask,
+    )
+
+
+def follow_target(s: m.Source, f: Fields) -> m.FollowTarget | None:
+    time, _, latitude, longitude, altitude, vx, vy, vz = f[:8]
+    # Covariances and the like are not used, and may be anything.
+    if not (on_globe(latitude, longitude) and f[-1] & HAS_POSITION and isfinite(altitude + vx + vy + vz)):
+        return None
+    velocity = (vx, vy, vz) if f[-1] & HAS_VELOCITY else None
+    return m.FollowTarget(s, time * 1000, latitude / 1e7, longitude / 1e7, altitude, velocity)
+
+
+def follow_target_fields(x: m.FollowTarget) -> Fields:
+    return (
+        x.time_boot // 1000,
+        0,
+        degrees_e7("latitude", x.latitude, 90),
+        degrees_e7("longitude", x.longitude, 180),
+        x.altitude,
+        *(x.velocity or (0.0, 0.0, 0.0)),
+        *(0.0,) * 13,
+        HAS_POSITION | (0 if x.velocity is None else HAS_VELOCITY),
+    )
+
+
+def fence_status(s: m.Source, f: Fields) -> m.FenceStatus:
+    time, count, breached, kind, _ = f
+    return m.FenceStatus(s, time * 1000, bool(breached), count, kind)
+
+
+def fence_status_fields(x: m.FenceStatus) -> Fields:
+    return x.time_boot // 1000, x.breaches, int(x.breached), x.kind, 0
 
 
 def position_target(s: m.Source, f: Fields) -> m.PositionTarget:

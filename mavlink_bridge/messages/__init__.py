@@ -16,12 +16,16 @@ from mavlink_bridge.messages.flight import (
     CommandLong,
     EkfStatus,
     ExtendedSysState,
+    FenceStatus,
+    FollowTarget,
     GlobalPosition,
     GpsGlobalOrigin,
     Heartbeat,
     LocalPosition,
     Ping,
     PositionTarget,
+    SetpointAttitude,
+    SetpointGlobal,
     SetpointLocal,
     StatusText,
     SysStatus,
@@ -80,8 +84,12 @@ Message = (
     | CommandLong
     | CommandAck
     | SetpointLocal
+    | SetpointGlobal
+    | SetpointAttitude
     | PositionTarget
     | Timesync
+    | FollowTarget
+    | FenceStatus
     | EkfStatus
     | ExtendedSysState
     | StatusText
@@ -130,7 +138,9 @@ __all__ = [
     "EkfStatus",
     "EstimatorStatus",
     "ExtendedSysState",
+    "FenceStatus",
     "FileTransfer",
+    "FollowTarget",
     "GlobalPosition",
     "GpsGlobalOrigin",
     "GpsRaw",
@@ -161,6 +171,8 @@ __all__ = [
     "SetGpsGlobalOrigin",
     "SetHomePosition",
     "SetMode",
+    "SetpointAttitude",
+    "SetpointGlobal",
     "SetpointLocal",
     "Source",
     "StatusText",

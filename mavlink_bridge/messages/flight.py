@@ -144,6 +144,39 @@ class SetpointLocal(NamedTuple):
     yaw_rate: float
 
 
+class SetpointGlobal(NamedTuple):
+    """SET_POSITION_TARGET_GLOBAL_INT (86): as sent; ``x``, ``y`` are the raw int32 (degE7), ``altitude`` (m)
+    counts from what ``frame`` says."""
+
+    source: Source
+    time_boot: int
+    target_system: int
+    target_component: int
+    frame: int
+    type_mask: int
+    x: int
+    y: int
+    altitude: float
+    velocity: Vector
+    acceleration: Vector
+    yaw: float
+    yaw_rate: float
+
+
+class SetpointAttitude(NamedTuple):
+    """SET_ATTITUDE_TARGET (82): attitude (w, x, y, z; FRD body to NED), body rates (rad/s) and thrust, as
+    sent, ignored fields included."""
+
+    source: Source
+    time_boot: int
+    target_system: int
+    target_component: int
+    type_mask: int
+    attitude: tuple[float, float, float, float]
+    body_rates: Vector
+    thrust: float
+
+
 class PositionTarget(NamedTuple):
     """POSITION_TARGET_LOCAL_NED (85): the autopilot's echo of what it follows."""
 
@@ -164,6 +197,29 @@ class Timesync(NamedTuple):
     source: Source
     tc1: int
     ts1: int
+
+
+class FollowTarget(NamedTuple):
+    """FOLLOW_TARGET (144): where one to be followed is. Degrees, m above mean sea level, m/s NED;
+    ``velocity`` is None where the sender knows none."""
+
+    source: Source
+    time_boot: int
+    latitude: float
+    longitude: float
+    altitude: float
+    velocity: Vector | None
+
+
+class FenceStatus(NamedTuple):
+    """FENCE_STATUS (162): since when (µs since boot) which kind (FENCE_BREACH) of limit has been broken, and
+    how often."""
+
+    source: Source
+    time_boot: int
+    breached: bool
+    breaches: int
+    kind: int
 
 
 class EkfStatus(NamedTuple):

@@ -7,11 +7,14 @@ and PX4 1.16.1 as flown and measured.
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 from typing import Final, NamedTuple, Protocol
 
-from mavlink_bridge.messages import SetpointLocal
+from mavlink_bridge.messages import SetpointAttitude, SetpointLocal
 from sitl.autopilot_config import AutopilotConfig
+from sitl.battery import Charge
+from sitl.fences import Rules
 from sitl.setpoints import Pose, Reading, Setpoint
 
 # MAV_RESULT
@@ -41,6 +44,16 @@ class Mode(Enum):
     LAND = "land"
     MISSION = "mission"
     RETURN = "return"
+    FOLLOW = "follow"
+
+
+ACTIONS: Final = {"warn": None, "hold": Mode.HOLD, "land": Mode.LAND, "return": Mode.RETURN}
+"""The mode that follows, by what the settings call it."""
+
+
+def limit(setting: float | None, usual: float) -> float:
+    """A limit (m): the ``usual`` one if nothing is set, none if it is 0."""
+    return (usual if setting is None else setting) or math.inf
 
 
 class Status(NamedTuple):
@@ -59,6 +72,14 @@ class Status(NamedTuple):
     stream_gap: float
     items: int = 0
     takes_off: bool = False
+
+
+class Worry(NamedTuple):
+    """How bad it is about a battery (0: not at all), in a word, and the mode that follows, if any."""
+
+    level: int
+    word: str = ""
+    mode: Mode | None = None
 
 
 class Takeoff(NamedTuple):
@@ -83,6 +104,8 @@ class Flavour(Protocol):
     boot_mode: Mode
     stream_first: bool
     """Whether set-points count before GUIDED is entered, and can take the vehicle off the ground in it."""
+    stops: bool
+    """Whether a set-point in a frame that it does not know means *stop*; else it is refused."""
     reports_ekf: bool
     """Whether EKF_STATUS_REPORT (193) is streamed."""
     echoes_yaw: bool
@@ -110,6 +133,19 @@ class Flavour(Protocol):
     """µs; flying without a position for so long, it lands."""
     blind_text: str
     """STATUSTEXT (253) of that."""
+
+    doubt_prefix: str
+    """STATUSTEXT (253) of what speaks against arming begins so."""
+    repeats_doubts: bool
+    """Whether it says them without being asked."""
+    battery_patience: int
+    """µs; a battery counts as low when it has been so for as long."""
+    loiter: Mode
+    """Of NAV_LOITER_UNLIM (17)."""
+    repositioning: Mode
+    """In which DO_REPOSITION (192) moves it."""
+    fence_rules: Rules
+    """When a fence is breached, and what follows."""
 
     def configure(self, config: AutopilotConfig) -> None:
         """Other settings from now on."""
@@ -139,6 +175,10 @@ class Flavour(Protocol):
         """Why ``mode`` must not be entered now."""
         ...
 
+    def worry(self, charge: Charge, /) -> Worry:
+        """How bad it is about the battery."""
+        ...
+
     def takeoff(
         self, altitude: float, relative: bool | None, ground: float, status: Status, /
     ) -> Takeoff | Denial:
@@ -149,6 +189,10 @@ class Flavour(Protocol):
 
     def read(self, message: SetpointLocal, here: Pose) -> Reading:
         """What a set-point asks for; offsets and body axes are resolved with ``here``."""
+        ...
+
+    def read_attitude(self, message: SetpointAttitude, /) -> Reading:
+        """What an attitude and a thrust ask for."""
         ...
 
     def steering_denial(self, status: Status) -> str | None:

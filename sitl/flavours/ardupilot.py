@@ -6,9 +6,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from mavlink_bridge.messages import SetpointLocal, Vector
+from mavlink_bridge.messages import SetpointAttitude, SetpointLocal, Vector
+from sitl.attitude_setpoints import climbing
 from sitl.autopilot_config import AutopilotConfig
+from sitl.battery import Charge
+from sitl.fences import Rules
 from sitl.flavours import (
+    ACTIONS,
     CUSTOM,
     DENIED,
     FAILED,
@@ -20,6 +24,8 @@ from sitl.flavours import (
     Mode,
     Status,
     Takeoff,
+    Worry,
+    limit,
 )
 from sitl.setpoints import (
     ACCELERATION,
@@ -53,6 +59,7 @@ _NUMBERS: Final = {
     Mode.RETURN: 6,
     Mode.LAND: 9,
     Mode.HOLD: 17,
+    Mode.FOLLOW: 23,
 }
 _MODES: Final = {
     0: Mode.STANDBY,
@@ -62,15 +69,16 @@ _MODES: Final = {
     6: Mode.RETURN,
     9: Mode.LAND,
     17: Mode.HOLD,
+    23: Mode.FOLLOW,
 }
 _NAMES: Final = {Mode.MISSION: "AUTO", Mode.RETURN: "RTL"}
-_NOT_ARMABLE: Final = (Mode.LAND, Mode.HOLD, Mode.MISSION, Mode.RETURN)
+_NOT_ARMABLE: Final = (Mode.LAND, Mode.HOLD, Mode.MISSION, Mode.RETURN, Mode.FOLLOW)
 _FRAMES: Final = (LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED)
 _TRIPLES: Final = (IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION)
 
 
 class ArduPilot:
-    """STABILIZE 0, AUTO 3, GUIDED 4, LOITER 5, RTL 6, LAND 9, BRAKE 17.
+    """STABILIZE 0, AUTO 3, GUIDED 4, LOITER 5, RTL 6, LAND 9, BRAKE 17, FOLLOW 23.
 
     The force bit of a set-point means nothing to it: MAVProxy's velocity command has it set.
     """
@@ -78,6 +86,7 @@ class ArduPilot:
     autopilot = 3
     boot_mode = Mode.STANDBY
     stream_first = False
+    stops = True
     reports_ekf = True
     echoes_yaw = False
     # Streams are served from the 400 Hz loop, and not faster than 80 % of it.
@@ -95,12 +104,29 @@ class ArduPilot:
     coasting = 7.0
     blind_patience = 1_000_000
     blind_text = "EKF Failsafe: changed to LAND Mode"
+    doubt_prefix = "PreArm: "
+    repeats_doubts = True
+    # BATT_LOW_TIMER.
+    battery_patience = 10_000_000
+    repositioning = Mode.GUIDED
+    loiter = Mode.POSITION
 
     def __init__(self, config: AutopilotConfig) -> None:
         self.configure(config)
 
     def configure(self, config: AutopilotConfig) -> None:
         self._timeout = round(config.guided_timeout * 1e6)
+        self._climb, self._sink = config.waypoint_climb, config.waypoint_sink
+        self._battery = config.battery_failsafe
+        self._follows = config.follow.enabled == "on"
+        fence = config.fence
+        self.fence_rules = Rules(
+            fence.enabled == "on",
+            False,
+            limit(fence.height, 100.0),
+            limit(fence.radius, 300.0),
+            fence.action or "return",
+        )
 
     def custom_mode(self, mode: Mode) -> int:
         return _NUMBERS[mode]
@@ -124,11 +150,21 @@ class ArduPilot:
             return Denial(FAILED, "STABILIZE in flight needs a pilot")
         if mode not in (Mode.STANDBY, Mode.LAND) and not status.ready:
             return Denial(FAILED, "Mode change failed: requires position")
+        if mode is Mode.FOLLOW and not self._follows:
+            return Denial(FAILED, "Mode change to FOLLOW failed: FOLL_ENABLE is 0")
         if mode is Mode.MISSION and not status.items:
             return Denial(FAILED, "Mode change to AUTO failed: no mission")
         if mode is Mode.MISSION and status.armed and status.landed and not status.takes_off:
             return Denial(FAILED, "Auto: Missing Takeoff Cmd")
         return None
+
+    def worry(self, charge: Charge, /) -> Worry:
+        battery = self._battery
+        if charge.voltage < battery.critical_voltage:
+            return Worry(2, "critical", ACTIONS[battery.critical_action])
+        if charge.voltage < battery.low_voltage:
+            return Worry(1, "low", ACTIONS[battery.low_action])
+        return Worry(0)
 
     def takeoff(
         self, altitude: float, relative: bool | None, _ground: float, status: Status, /
@@ -170,6 +206,9 @@ class ArduPilot:
             None if mask & IGNORE_YAW_RATE else message.yaw_rate,
             complete=position and velocity,
         )
+
+    def read_attitude(self, message: SetpointAttitude, /) -> Reading:
+        return climbing(message, self._climb, self._sink)
 
     def steering_denial(self, status: Status) -> str | None:
         if status.mode is not Mode.GUIDED:

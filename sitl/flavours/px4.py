@@ -6,9 +6,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from mavlink_bridge.messages import SetpointLocal, Vector
+from mavlink_bridge.messages import SetpointAttitude, SetpointLocal, Vector
+from sitl.attitude_setpoints import thrusting
 from sitl.autopilot_config import AutopilotConfig
+from sitl.battery import Charge
+from sitl.fences import Rules
 from sitl.flavours import (
+    ACTIONS,
     AUTO,
     CUSTOM,
     DENIED,
@@ -20,6 +24,8 @@ from sitl.flavours import (
     Mode,
     Status,
     Takeoff,
+    Worry,
+    limit,
 )
 from sitl.setpoints import (
     ACCELERATION,
@@ -47,6 +53,7 @@ _NUMBERS: Final = {
     Mode.MISSION: (4, 4),
     Mode.RETURN: (4, 5),
     Mode.LAND: (4, 6),
+    Mode.FOLLOW: (4, 8),
     Mode.GUIDED: (6, 0),
 }
 _MODES: Final = {number: mode for mode, number in _NUMBERS.items() if mode is not Mode.STANDBY}
@@ -56,12 +63,13 @@ _SLOWEST: Final = 0.5
 
 
 class Px4:
-    """POSCTL 3, AUTO 4 (TAKEOFF 2, LOITER 3, MISSION 4, RTL 5, LAND 6), OFFBOARD 6; custom_mode is
-    main << 16 | sub << 24."""
+    """POSCTL 3, AUTO 4 (TAKEOFF 2, LOITER 3, MISSION 4, RTL 5, LAND 6, FOLLOW 8), OFFBOARD 6;
+    custom_mode is main << 16 | sub << 24."""
 
     autopilot = 12
     boot_mode = Mode.HOLD
     stream_first = True
+    stops = False
     reports_ekf = False
     echoes_yaw = True
     shortest_interval = 1000
@@ -77,6 +85,11 @@ class Px4:
     coasting = 5.0
     blind_patience = 0
     blind_text = "Failsafe: no position, blind land"
+    doubt_prefix = "Preflight Fail: "
+    repeats_doubts = False
+    battery_patience = 0
+    repositioning = Mode.HOLD
+    loiter = Mode.HOLD
 
     def __init__(self, config: AutopilotConfig) -> None:
         self.configure(config)
@@ -85,6 +98,11 @@ class Px4:
         self.after_loss = _LOSS[config.offboard_loss]
         self._timeout = round(config.offboard_timeout * 1e6)
         self._takeoff_height = config.takeoff_height
+        self._battery = config.battery_failsafe
+        fence = config.fence
+        self.fence_rules = Rules(
+            True, True, limit(fence.height, 0.0), limit(fence.radius, 0.0), fence.action or "hold"
+        )
 
     def custom_mode(self, mode: Mode) -> int:
         main, sub = _NUMBERS[mode]
@@ -104,6 +122,8 @@ class Px4:
     def arming_denial(self, status: Status) -> str | None:
         if status.mode is Mode.GUIDED and not _streaming(status):
             return "no offboard signal"
+        if status.mode is Mode.FOLLOW:
+            return "FOLLOW mode is not armable"
         return None
 
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
@@ -114,6 +134,14 @@ class Px4:
         if mode is Mode.MISSION and not status.items:
             return Denial(TEMPORARILY_REJECTED, "Mode change refused: no valid mission")
         return None
+
+    def worry(self, charge: Charge, /) -> Worry:
+        battery = self._battery
+        if charge.remaining < battery.emergency:
+            return Worry(3, "at its end", None if battery.action == "warn" else Mode.LAND)
+        if charge.remaining < battery.critical:
+            return Worry(2, "critical", ACTIONS[battery.action])
+        return Worry(1, "low") if charge.remaining < battery.low else Worry(0)
 
     def takeoff(
         self, altitude: float, relative: bool | None, ground: float, status: Status, /
@@ -155,6 +183,9 @@ class Px4:
             None if mask & IGNORE_YAW_RATE else message.yaw_rate,
             complete=all(positions) and all(velocities),
         )
+
+    def read_attitude(self, message: SetpointAttitude, /) -> Reading:
+        return thrusting(message)
 
     def steering_denial(self, status: Status) -> str | None:
         return None if status.mode is Mode.GUIDED and status.armed else ""

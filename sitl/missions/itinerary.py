@@ -132,6 +132,10 @@ class Itinerary:
         self._jumps.clear()
         return True
 
+    def hasten(self, speed: float | None) -> None:
+        """Fly on at ``speed`` (m/s); None: the usual one."""
+        self._speed = speed
+
     def pause(self) -> None:
         """Something else flies now; it goes on with the same item."""
         if self.phase is not Phase.DONE:

@@ -34,6 +34,9 @@ STREAMS: Final = {
 }
 """MAV_DATA_STREAM of the SR0_ parameters, which say how often its messages go out."""
 
+_SWITCH: Final = ((0, "off"), (1, "on"))
+_ACTIONS: Final = ((0, "warn"), (1, "land"), (2, "return"))
+
 BOUND: Final = {
     "SYSID_THISMAV": Bound("system_id"),
     "GUID_TIMEOUT": Bound("guided_timeout"),
@@ -45,6 +48,21 @@ BOUND: Final = {
     "WPNAV_RADIUS": Bound("acceptance_radius", 0.01),
     "RTL_ALT": Bound("return_height", 0.01),
     "RTL_LOIT_TIME": Bound("return_pause", 0.001),
+    "BATT_LOW_VOLT": Bound("battery_failsafe.low_voltage"),
+    "BATT_CRT_VOLT": Bound("battery_failsafe.critical_voltage"),
+    "BATT_FS_LOW_ACT": Bound("battery_failsafe.low_action", options=_ACTIONS),
+    "BATT_FS_CRT_ACT": Bound("battery_failsafe.critical_action", options=_ACTIONS),
+    "FENCE_ENABLE": Bound("fence.enabled", options=_SWITCH),
+    "FENCE_ALT_MAX": Bound("fence.height"),
+    "FENCE_RADIUS": Bound("fence.radius"),
+    "FENCE_ACTION": Bound("fence.action", options=((0, "warn"), (1, "return"), (2, "land"), (4, "hold"))),
+    "FOLL_ENABLE": Bound("follow.enabled", options=_SWITCH),
+    "FOLL_SYSID": Bound("follow.system"),
+    "FOLL_DIST_MAX": Bound("follow.limit"),
+    "FOLL_OFS_TYPE": Bound("follow.axes", options=((0, "north"), (1, "heading"))),
+    "FOLL_OFS_X": Bound("follow.x"),
+    "FOLL_OFS_Y": Bound("follow.y"),
+    "FOLL_OFS_Z": Bound("follow.z"),
 }
 
 
@@ -210,6 +228,16 @@ _ROWS: Final[tuple[_Row, ...]] = (
     ("FENCE_ALT_MIN", _F32, -10, -100, 100, "m"),
     ("FENCE_RADIUS", _F32, 300, 30, 10000, "m"),
     ("FENCE_MARGIN", _F32, 2, 1, 10, "m"),
+    ("FOLL_ENABLE", _I8, 0, 0, 1),
+    ("FOLL_SYSID", _I16, 0, 0, 255),
+    ("FOLL_DIST_MAX", _F32, 100, 1, 1000, "m"),
+    ("FOLL_OFS_TYPE", _I8, 0, 0, 1),
+    ("FOLL_OFS_X", _F32, 0, -100, 100, "m"),
+    ("FOLL_OFS_Y", _F32, 0, -100, 100, "m"),
+    ("FOLL_OFS_Z", _F32, 0, -100, 100, "m"),
+    ("FOLL_YAW_BEHAVE", _I8, 1, 0, 3),
+    ("FOLL_POS_P", _F32, 0.1, 0.01, 1),
+    ("FOLL_ALT_TYPE", _I8, 1, 0, 1),
     ("RALLY_LIMIT_KM", _F32, 0.3, 0, math.inf, "km"),
     ("RALLY_INCL_HOME", _I8, 1, 0, 1),
     ("MIS_RESTART", _I8, 0, 0, 1),

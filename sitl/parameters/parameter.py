@@ -25,7 +25,10 @@ _BITS: Final = {Kind.INT8: 8, Kind.INT16: 16, Kind.INT32: 32}
 
 
 class Bound(NamedTuple):
-    """The setting of ``AutopilotConfig`` that a parameter is: value × ``scale``, or one of ``options``."""
+    """The setting of ``AutopilotConfig`` that a parameter is: value × ``scale``, or one of ``options``.
+
+    ``setting`` may be one of a group (``fence.height``); one that is None is as the firmware has it.
+    """
 
     setting: str
     scale: float = 1.0
@@ -52,7 +55,7 @@ class Parameter(NamedTuple):
         """Why it cannot have ``value``, which is as ``fitted`` makes it or not finite."""
         if not math.isfinite(value):
             return f"{self.name}: not a number"
-        if not self.low <= value <= self.high:
+        if not self._held(self.low) <= value <= self._held(self.high):
             allowed = f"{_SHOWN} to {_SHOWN}".format(self.low, self.high)
             return f"{self.name}: {_SHOWN.format(value)} is not in {allowed}"
         if self.kind in _BITS and not -(1 << _BITS[self.kind] - 1) <= value < 1 << _BITS[self.kind] - 1:
@@ -60,3 +63,7 @@ class Parameter(NamedTuple):
         if self.bound and self.bound.options and value not in dict(self.bound.options):
             return f"{self.name}: {value:.0f} is not simulated"
         return None
+
+    def _held(self, end: float) -> float:
+        """An end of the range as the type holds it: 0.03 is a little less in float32."""
+        return self.fitted(end) if math.isfinite(end) else end

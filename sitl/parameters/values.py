@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from typing import Final
 
 from sitl.autopilot_config import AutopilotConfig
@@ -68,11 +69,16 @@ class Values:
     def configured(self, config: AutopilotConfig) -> AutopilotConfig:
         """``config`` with the settings that changed parameters are."""
         changed = self.changed
-        update = {
-            parameter.bound.setting: _setting(parameter.bound, changed[parameter.name])
-            for parameter in self.table
-            if parameter.bound and parameter.name in changed
-        }
+        update: dict[str, object] = {}
+        groups: dict[str, dict[str, object]] = {}
+        for parameter in self.table:
+            if parameter.bound is None or parameter.name not in changed:
+                continue
+            value = _setting(parameter.bound, changed[parameter.name])
+            group, _, setting = parameter.bound.setting.rpartition(".")
+            (groups.setdefault(group, {}) if group else update)[setting] = value
+        for group, settings in groups.items():
+            update[group] = getattr(config, group).model_copy(update=settings)
         return config.model_copy(update=update) if update else config
 
     def digest(self) -> int:
@@ -85,13 +91,15 @@ class Values:
 
 
 def _initial(parameter: Parameter, config: AutopilotConfig) -> float:
-    if parameter.bound is None:
+    bound = parameter.bound
+    value = None if bound is None else attrgetter(bound.setting)(config)
+    if bound is None or value is None:
         return parameter.fitted(parameter.default)
-    value = getattr(config, parameter.bound.setting)
-    for number, word in parameter.bound.options:
+    for number, word in bound.options:
         if word == value:
             return number
-    return parameter.fitted(value / parameter.bound.scale)
+    # A setting that this firmware has no number for reads as its usual one.
+    return parameter.fitted(parameter.default if bound.options else value / bound.scale)
 
 
 def _setting(bound: Bound, value: float) -> object:

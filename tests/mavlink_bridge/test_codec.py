@@ -19,6 +19,7 @@ from wire_values import (
     scaled,
     signed,
     source,
+    speed,
     text,
     u8,
     u16,
@@ -68,6 +69,29 @@ KINDS: dict[type[m.Message], st.SearchStrategy[Any]] = {
     m.SetpointLocal: st.builds(
         m.SetpointLocal, source, boot, u8, u8, u8, u16, vector(f32), vector(f32), vector(f32), f32, f32
     ),
+    m.SetpointGlobal: st.builds(
+        m.SetpointGlobal,
+        source,
+        boot,
+        u8,
+        u8,
+        u8,
+        u16,
+        signed(32),
+        signed(32),
+        f32,
+        vector(f32),
+        vector(f32),
+        f32,
+        f32,
+    ),
+    m.SetpointAttitude: st.builds(
+        m.SetpointAttitude, source, boot, u8, u8, u8, st.tuples(f32, f32, f32, f32), vector(f32), f32
+    ),
+    m.FollowTarget: st.builds(
+        m.FollowTarget, source, boot, latitude, longitude, speed, st.none() | vector(speed)
+    ),
+    m.FenceStatus: st.builds(m.FenceStatus, source, boot, st.booleans(), u16, u8),
     m.PositionTarget: st.builds(
         m.PositionTarget, source, boot, u8, u16, vector(f32), vector(f32), vector(f32), f32, f32
     ),

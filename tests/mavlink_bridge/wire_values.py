@@ -32,6 +32,7 @@ boot = u32.map(lambda ms: ms * 1000)
 latitude = scaled(st.integers(-900_000_000, 900_000_000), 1e7)
 longitude = scaled(st.integers(-1_800_000_000, 1_800_000_000), 1e7)
 millimetres = scaled(signed(32), 1e3)
+speed = st.floats(-1e6, 1e6, width=32)
 yaw = st.none() | scaled(st.integers(0, 35999), 100).map(
     lambda deg: math.remainder(math.radians(deg), math.tau)
 )

@@ -118,6 +118,14 @@ def messages(fingerprint: int = 0, now: int = NOW) -> tuple[Known, ...]:
                 (22, (*[NAN] * 6, 5.0)),
                 (511, (30.0, 20_000.0, *[0.0] * 5)),
                 (512, (49.0, *[0.0] * 6)),
+                (17, (0.0,) * 7),
+                (32, (42.0, *[0.0] * 6)),
+                (115, (90.0, 0.0, 1.0, *[0.0] * 4)),
+                (178, (1.0, 3.0, *[0.0] * 5)),
+                (192, (-1.0, 1.0, 0.0, NAN, LATITUDE, LONGITUDE, ALTITUDE + 5.0)),
+                (193, (0.0,) * 7),
+                (193, (1.0, *[0.0] * 6)),
+                (401, (0.0,) * 7),
             )
         ),
         Known("autopilot", CommandAck(AUTOPILOT, 400, 0, 0, 0, 11, 195)),
@@ -130,6 +138,15 @@ def messages(fingerprint: int = 0, now: int = NOW) -> tuple[Known, ...]:
             )
             for frame, mask in ((1, 0x9F8), (1, 0x9C7), (1, 0x000), (8, 0xFC7), (9, 0xDF8), (1, 0xE3F))
         ),
+        Known(
+            "autopilot",
+            m.SetpointGlobal(
+                COMPANION, 0, *me, 6, 0x9F8, round(LATITUDE * 1e7), 85_455_940, 5.0, ZERO, ZERO, 0.5, 0.1
+            ),
+        ),
+        Known("autopilot", m.SetpointAttitude(COMPANION, 0, *me, 7, (1.0, 0.0, 0.0, 0.0), ZERO, 0.5)),
+        Known("autopilot", m.FollowTarget(TARGET, boot, *place, (1.0, 0.0, 0.0))),
+        Known("autopilot", m.FenceStatus(AUTOPILOT, boot, True, 1, 3)),
         Known("autopilot", PositionTarget(AUTOPILOT, 0, 1, 0x9C0, (1.0, 2.0, -5.0), ZERO, ZERO, 0.5, 0.0)),
         Known("autopilot", Timesync(GROUND, 0, 123_456_789)),
         Known("autopilot", EkfStatus(AUTOPILOT, 0x3F)),
