@@ -94,8 +94,8 @@ def make_environment(python: str, folder: str) -> "list[str]":
 
 
 def find_pip(python: str, target: str) -> "list[str]":
-    """A pip that installs for the Python ``target``: its own, or one of the machine that can be told to; empty
-    if none."""
+    """A pip that installs for the Python ``target``: its own, or one of the machine that can be told to; else
+    empty."""
     own = [target, "-m", "pip"]
     steered = [[*pip, "--python", target] for pip in ([python, "-m", "pip"], ["pip3"], ["pip"])]
     return next((pip for pip in (own, *steered) if works([*pip, "--version"])), [])

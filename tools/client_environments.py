@@ -14,7 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from bootstrap import SetupError, find_pip, install, make_environment, say, works
+from bootstrap import SetupError, install, make_environment, say, works
 
 ROOT = Path(__file__).parents[1]
 REQUIREMENTS = ROOT / "tests" / "clients" / "requirements"
@@ -54,11 +54,8 @@ def provide(requirements: Path) -> None:
         run(uv, "venv", "--quiet", "--clear", "--python", sys.executable, str(folder))
         run(uv, "pip", "install", "--python", str(python), *options)
     else:
-        # Without a pip of its own it is made in no time.
-        shutil.rmtree(folder, ignore_errors=True)
-        made = works([sys.executable, "-m", "venv", "--without-pip", str(folder)])
-        pip = find_pip(sys.executable, str(python)) if made else []
-        install([*(pip or make_environment(sys.executable, str(folder))), "install", *options], str(requirements))
+        pip = make_environment(sys.executable, str(folder))
+        install([*pip, "install", *options], str(requirements))
     stamp.write_text(content)
 
 

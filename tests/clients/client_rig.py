@@ -25,8 +25,8 @@ def available(client: str) -> bool:
 
 
 def python(client: str) -> Path:
-    """The interpreter of a client's environment; pymavlink's is that of the tests. Where there is none the test
-    is skipped, but fails in CI."""
+    """The interpreter of a client's environment; pymavlink's is that of the tests. Where there is none, the
+    test is skipped; in CI it fails."""
     if client == "pymavlink":
         return Path(sys.executable)
     found = _interpreter(client)
@@ -50,9 +50,13 @@ class Flight:
 
     def __getitem__(self, what: str) -> dict[str, Any]:
         """The only such line. Fails with everything if there is none."""
-        found = [line for line in self.told if line["what"] == what]
+        found = self.every(what)
         assert len(found) == 1, self.report(f"{len(found)} lines {what!r}")
         return found[0]
+
+    def every(self, what: str) -> list[dict[str, Any]]:
+        """All such lines."""
+        return [line for line in self.told if line["what"] == what]
 
     def report(self, fault: str) -> str:
         """For whoever has to find out why."""

@@ -14,8 +14,8 @@ from types import TracebackType
 from typing import Final, NamedTuple
 
 PATIENCE: Final = 30.0
-# Prompts carry no line end: "GUIDED> GUIDED> Got COMMAND_ACK…".
-_PROMPT: Final = re.compile(r"^(?:[A-Za-z_]+> )+")
+# Prompts carry no line end, so that they stand in the way of other text: "GUIDED> GUIDED> Got COMMAND_ACK…".
+_PROMPT: Final = re.compile(r"[A-Z_]+> ?")
 
 
 class Line(NamedTuple):

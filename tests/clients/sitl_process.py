@@ -29,11 +29,12 @@ class Sitl:
 
     def start(self) -> Sitl:
         """Returns when all vehicles are up. Fails with what it said."""
-        more = ["--to", f"udpout:127.0.0.1:{self.shared}"] if self.flavour == "ardupilot" else []
+        command = [sys.executable, "-m", "outrider", "sitl", "--json", f"--flavour={self.flavour}"]
+        command += [f"--count={self.count}", f"--speedup={self.speedup}", f"--port-base={self.base}"]
+        if self.flavour == "ardupilot":
+            command.append(f"--to=udpout:127.0.0.1:{self.shared}")
         self._process = process = subprocess.Popen(
-            [sys.executable, "-m", "outrider", "sitl", "--json", "--flavour", self.flavour]
-            + ["--count", str(self.count), "--port-base", str(self.base)]
-            + ["--speedup", str(self.speedup), *more],
+            command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

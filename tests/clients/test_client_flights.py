@@ -1,5 +1,5 @@
-"""Other people's clients, as they come from PyPI, each flying a vehicle of ``outrider sitl`` in real time:
-discovery, health, telemetry, parameters, plans, flight.
+"""Other people's clients, as they come from PyPI, each flying a vehicle of ``outrider sitl``: discovery,
+health, telemetry, parameters, plans, flight.
 
 All fly at the same time, as each waits most of the time. Those that speak UDP listen before their vehicle
 boots, so that its first heartbeat is the first that they hear.
@@ -20,7 +20,8 @@ pytestmark = pytest.mark.slow
 FLAVOURS = ("px4", "ardupilot")
 MAVSDK = ("mavsdk3", "mavsdk4")
 CLIENTS = (*MAVSDK, "pymavlink")
-HEIGHT = 4.0
+HEIGHT = 3.0
+SPEEDUP = 2.0
 
 
 def launch(client: str, sitl: Sitl, index: int) -> Client:
@@ -36,7 +37,7 @@ def launch(client: str, sitl: Sitl, index: int) -> Client:
 @pytest.fixture(scope="module")
 def flights() -> Iterator[dict[tuple[str, str], Flight]]:
     """By client and flavour."""
-    px4, ardupilot = (Sitl(flavour, len(CLIENTS)) for flavour in FLAVOURS)
+    px4, ardupilot = (Sitl(flavour, len(CLIENTS), speedup=SPEEDUP) for flavour in FLAVOURS)
     there = [(index, client) for index, client in enumerate(CLIENTS) if available(client)]
     with px4, ardupilot:
         flying = {(client, "px4"): launch(client, px4, index) for index, client in there}
@@ -79,7 +80,8 @@ def test_it_is_the_client_that_was_meant(flights: dict[tuple[str, str], Flight])
 
 
 def test_armable_within_five_seconds_of_the_first_heartbeat(flight: Flight) -> None:
-    assert flight["armable"]["after"] < 5.0
+    # Whatever part of it is the vehicle's would take so much longer in real time.
+    assert flight["armable"]["after"] * SPEEDUP < 5.0
 
 
 def test_every_health_flag_is_good(by_mavsdk: Flight) -> None:
@@ -160,11 +162,13 @@ def test_takeoff_leads_to_the_height_that_was_set(by_mavsdk: Flight) -> None:
 
 
 def test_set_points_are_followed(flight: Flight) -> None:
-    for kind in ("by position", "by both"):
-        line = flight[kind]
+    told = [line for line in flight.told if line["what"].startswith("by ")]
+    assert len(told) >= 3
+    for line in told:
+        if "position" not in line:
+            assert math.dist(_numbers(line["velocity"]), _numbers(line["wanted"])[:3]) < 0.2
+            continue
         assert math.dist(_numbers(line["position"]), _numbers(line["goal"])[:3]) < 0.25
-    line = flight["by velocity"]
-    assert math.dist(_numbers(line["velocity"]), _numbers(line["wanted"])[:3]) < 0.2
 
 
 def _numbers(value: Any) -> list[float]:

@@ -17,7 +17,9 @@ from typing import Any, NamedTuple
 from telling import clock, tell
 
 PATIENCE = 30.0
-HEIGHT = 4.0
+HEIGHT = 3.0
+NEAR = 0.2
+"""m from a goal."""
 WAYPOINT, TAKEOFF, FENCE_CORNER, RALLY = 16, 22, 5001, 5100
 """MAV_CMD of items."""
 ABOVE_SEA, ABOVE_HOME = 0, 6
@@ -70,8 +72,8 @@ async def ready(drone: Drone, connected_at: float) -> None:
     await seen(drone, "health_all_ok", lambda good: good)
 
 
-async def look(drone: Drone) -> None:
-    """Telemetry of every kind that ground stations show."""
+async def look(drone: Drone) -> Any:
+    """Telemetry of every kind that ground stations show; and home."""
     names = (
         *("position", "home", "attitude_euler", "attitude_quaternion", "velocity_ned", "battery"),
         *("landed_state", "in_air", "armed", "flight_mode", "gps_info", "raw_gps", "heading"),
@@ -83,6 +85,7 @@ async def look(drone: Drone) -> None:
     version = await drone.info.get_version()
     identity = await drone.info.get_identification()
     tell("info", version=version, identity=identity, product=await drone.info.get_product())
+    return values[names.index("home")]
 
 
 async def adjust(drone: Drone, integer: tuple[str, int], fraction: tuple[str, float]) -> None:
@@ -101,9 +104,8 @@ async def adjust(drone: Drone, integer: tuple[str, int], fraction: tuple[str, fl
     tell("float", name=name, was=was, set=value, now=await param.get_param_float(name))
 
 
-async def plan(drone: Drone, *, ardupilot: bool) -> None:
+async def plan(drone: Drone, home: Any, *, ardupilot: bool) -> None:
     """Mission, fence and rally points, up and down again. ArduPilot keeps home as item 0."""
-    home = await seen(drone, "home")
     raw, item = drone.mission_raw, drone.mission_raw_types.MissionItem
     start = item(0, ABOVE_SEA, WAYPOINT, 1, 1, *(0.0,) * 4, *at(home), home.absolute_altitude_m, 0)
     items = [start] if ardupilot else []
@@ -150,14 +152,15 @@ async def take_off(drone: Drone) -> None:
     tell("taken off", asked=asked, state=state, position=position)
 
 
-async def steer(drone: Drone) -> None:
-    """Offboard by position, by velocity, by both; each until the vehicle is seen to follow."""
+async def steer(drone: Drone, home: Any) -> None:
+    """Offboard by position, velocity, both, a place on earth, each until the vehicle is seen to do so;
+    then to a place by command."""
     types, offboard = drone.offboard_types, drone.offboard
     goal = types.PositionNedYaw(4.0, 2.0, -HEIGHT - 1.0, 90.0)
     await offboard.set_position_ned(goal)
     await offboard.start()
     mode = await seen(drone, "flight_mode", lambda mode: mode.name == "OFFBOARD")
-    there = await seen(drone, "position_velocity_ned", lambda state: missed(state, goal) < 0.2)
+    there = await seen(drone, "position_velocity_ned", lambda state: missed(state, goal) < NEAR)
     attitude = await seen(drone, "attitude_euler", lambda angles: abs(angles.yaw_deg - 90.0) < 3.0)
     tell("by position", goal=goal, position=there.position, yaw_deg=attitude.yaw_deg, mode=mode)
 
@@ -165,16 +168,34 @@ async def steer(drone: Drone) -> None:
     await offboard.set_velocity_ned(wanted)
     moving = await seen(drone, "velocity_ned", lambda v: _differs(v, wanted) < 0.15)
     tell("by velocity", wanted=wanted, velocity=moving)
+    # Forward is east by now.
+    await offboard.set_velocity_body(types.VelocityBodyYawspeed(1.0, 0.0, 0.0, 0.0))
+    wanted = types.VelocityNedYaw(0.0, 1.0, 0.0, 90.0)
+    moving = await seen(drone, "velocity_ned", lambda v: _differs(v, wanted) < 0.15)
+    tell("by body velocity", wanted=wanted, velocity=moving)
 
     still = types.VelocityNedYaw(0.0, 0.0, 0.0, 0.0)
     goal = types.PositionNedYaw(0.0, 0.0, -HEIGHT, 0.0)
     await offboard.set_position_velocity_ned(goal, still)
-    there = await seen(drone, "position_velocity_ned", lambda state: missed(state, goal) < 0.2)
+    there = await seen(drone, "position_velocity_ned", lambda state: missed(state, goal) < NEAR)
     tell("by both", goal=goal, position=there.position, active=await offboard.is_active())
+
+    latitude, longitude = (part / 1e7 for part in at(home, 3.0, -2.0))
+    kind = types.PositionGlobalYaw.AltitudeType.REL_HOME
+    await offboard.set_position_global(types.PositionGlobalYaw(latitude, longitude, HEIGHT, 0.0, kind))
+    goal = types.PositionNedYaw(3.0, -2.0, -HEIGHT, 0.0)
+    there = await seen(drone, "position_velocity_ned", lambda state: missed(state, goal) < NEAR)
+    tell("by place", goal=goal, position=there.position)
 
     await offboard.stop()
     mode = await seen(drone, "flight_mode", lambda mode: mode.name != "OFFBOARD")
     tell("stopped", mode=mode, active=await offboard.is_active())
+
+    latitude, longitude = (part / 1e7 for part in at(home, 0.0, 2.0))
+    await drone.action.goto_location(latitude, longitude, home.absolute_altitude_m + HEIGHT, 0.0)
+    goal = types.PositionNedYaw(0.0, 2.0, -HEIGHT, 0.0)
+    there = await seen(drone, "position_velocity_ned", lambda state: missed(state, goal) < NEAR)
+    tell("by command", goal=goal, position=there.position)
 
 
 def missed(state: Any, goal: Any) -> float:
@@ -216,16 +237,25 @@ async def fly(drone: Drone, flavour: str, connected_at: float) -> None:
     """All of it."""
     ardupilot = flavour == "ardupilot"
     await ready(drone, connected_at)
-    await look(drone)
+    home = await look(drone)
     if ardupilot:
         await adjust(drone, ("LAND_SPEED", 150), ("WPNAV_SPEED", 400.0))
     else:
         await adjust(drone, ("COM_DL_LOSS_T", 12), ("MPC_LAND_SPEED", 1.5))
-    await plan(drone, ardupilot=ardupilot)
+    await plan(drone, home, ardupilot=ardupilot)
     await take_off(drone)
-    await steer(drone)
+    await steer(drone, home)
     await follow_plan(drone)
     await land(drone)
+
+
+async def hop(drone: Drone, connected_at: float) -> None:
+    """Up and down; who it was stands in its hardware uid."""
+    await ready(drone, connected_at)
+    identity = await drone.info.get_identification()
+    await take_off(drone)
+    await land(drone)
+    tell("hopped", uid=identity.hardware_uid)
 
 
 def run(flight: Callable[[], Awaitable[None]]) -> int:

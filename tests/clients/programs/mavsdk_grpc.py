@@ -1,5 +1,5 @@
-"""MAVSDK 3: ``mavsdk_grpc.py FLAVOUR URL GRPC_PORT``. Its ``mavsdk_server`` comes with the wheel and is
-started by ``System``."""
+"""MAVSDK 3: ``mavsdk_grpc.py FLAVOUR URL GRPC_PORT [hop]``. Its ``mavsdk_server`` comes with the wheel and is
+started by ``System``; it knows one vehicle, the first that it hears."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import sys
 from importlib.metadata import version
 
 from mavsdk import System, mission, mission_raw, offboard
-from mavsdk_flight import Drone, fly, run, told
+from mavsdk_flight import Drone, fly, hop, run, told
 from telling import clock, tell
 
 
 async def flight() -> None:
-    flavour, url, port = sys.argv[1:]
+    flavour, url, port, *short = sys.argv[1:]
     system = System(port=int(port))
     await system.connect(system_address=url)
 
@@ -32,7 +32,7 @@ async def flight() -> None:
         offboard,
         lambda plugin, name: getattr(plugin, name)(),
     )
-    await fly(drone, flavour, at)
+    await (hop(drone, at) if short else fly(drone, flavour, at))
 
 
 if __name__ == "__main__":

@@ -46,7 +46,9 @@ class Vehicle:
         link = self.link
         link.mav.command_long_send(link.target_system, link.target_component, command, 0, *values)
 
-    def setpoint(self, mask: int, position: tuple[float, ...], velocity: tuple[float, ...], yaw: float) -> None:
+    def setpoint(
+        self, mask: int, position: tuple[float, ...], velocity: tuple[float, ...], yaw: float
+    ) -> None:
         """SET_POSITION_TARGET_LOCAL_NED in the local frame."""
         link = self.link
         link.mav.set_position_target_local_ned_send(
@@ -151,9 +153,7 @@ def steer(vehicle: Vehicle) -> None:
     at = vehicle.steer(POSITION_YAW, goal, none, lambda p: math.dist(place(p), goal) < 0.2)
     tell("by position", goal=goal, position=place(at))
     wanted = (-1.0, 0.5, 0.0)
-    at = vehicle.steer(
-        VELOCITY_YAW, none, wanted, lambda p: math.dist((p.vx, p.vy, p.vz), wanted) < 0.15
-    )
+    at = vehicle.steer(VELOCITY_YAW, none, wanted, lambda p: math.dist((p.vx, p.vy, p.vz), wanted) < 0.15)
     tell("by velocity", wanted=wanted, velocity=(at.vx, at.vy, at.vz))
     goal = (0.0, 0.0, -3.0)
     at = vehicle.steer(POSITION_VELOCITY_YAW, goal, none, lambda p: math.dist(place(p), goal) < 0.2)
