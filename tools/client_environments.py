@@ -14,7 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from bootstrap import SetupError, install, make_environment, say, works
+from bootstrap import SetupError, find_pip, install, make_environment, say, works
 
 ROOT = Path(__file__).parents[1]
 REQUIREMENTS = ROOT / "tests" / "clients" / "requirements"
@@ -40,7 +40,8 @@ def main() -> int:
 
 
 def provide(requirements: Path) -> None:
-    """An environment with just what one file names, unless it is there. Raises SetupError."""
+    """An environment with just what one file names, unless it is there. Raises SetupError; then there is
+    none."""
     folder = CLIENTS / requirements.stem
     stamp, python = folder / ".made", folder / "bin" / "python"
     content = hashlib.sha256(requirements.read_bytes()).hexdigest()
@@ -48,15 +49,27 @@ def provide(requirements: Path) -> None:
         return
     say(f"setting up the client {requirements.stem}")
     CLIENTS.mkdir(exist_ok=True)
-    options = ["--no-deps", "--require-hashes", "--only-binary", ":all:", "-r", str(requirements)]
+    shutil.rmtree(folder, ignore_errors=True)
+    try:
+        fill(folder, str(python), str(requirements))
+    except SetupError:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    stamp.write_text(content)
+
+
+def fill(folder: Path, python: str, requirements: str) -> None:
+    """A new environment with what a file names. Raises SetupError."""
+    options = ["--no-deps", "--require-hashes", "--only-binary", ":all:", "-r", requirements]
     uv = shutil.which("uv")
     if uv:
-        run(uv, "venv", "--quiet", "--clear", "--python", sys.executable, str(folder))
-        run(uv, "pip", "install", "--python", str(python), *options)
-    else:
-        pip = make_environment(sys.executable, str(folder))
-        install([*pip, "install", *options], str(requirements))
-    stamp.write_text(content)
+        run(uv, "venv", "--quiet", "--python", sys.executable, str(folder))
+        run(uv, "pip", "install", "--quiet", "--python", python, *options)
+        return
+    # The pip of .venv can do it, as a rule, which saves each client one of its own.
+    made = works([sys.executable, "-m", "venv", "--without-pip", str(folder)])
+    pip = find_pip(sys.executable, python) if made else []
+    install([*(pip or make_environment(sys.executable, str(folder))), "install", *options], requirements)
 
 
 def run(*command: str) -> None:
