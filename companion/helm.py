@@ -27,10 +27,11 @@ from companion.config import CompanionConfig
 from companion.heading import Yaw
 from companion.horizon import Horizon
 from companion.node import COMPONENT
-from companion.pilot import ARMED, HEARTBEAT_LOST, NAV_LAND
+from companion.pilot import NAV_LAND
 from companion.reception import AUTOPILOT
 from companion.setpoint import setpoint
 from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
+from companion.vehicle import ARMED, HEARTBEAT_LOST
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, LocalFrame

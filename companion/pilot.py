@@ -9,33 +9,18 @@ from __future__ import annotations
 
 from enum import Enum
 
-from companion.autopilots import Profile, Step, is_guided
-from companion.autopilots.known import profile_of
+from companion.autopilots import Profile, Step
 from companion.calls import Calls
 from companion.config import CompanionConfig
-from companion.tracks import State
+from companion.takeoff import NAV_TAKEOFF, Takeoff
+from companion.vehicle import UNDEFINED, Vehicle
 from companion.world import View
-from mavlink_bridge.messages import (
-    CommandAck,
-    ExtendedSysState,
-    Heartbeat,
-    Message,
-    Source,
-    StatusText,
-    SysStatus,
-)
+from mavlink_bridge.messages import CommandAck, Message, Source
 
-DO_SET_MODE, ARM_DISARM, NAV_TAKEOFF, NAV_LAND = 176, 400, 22, 21
+__all__ = ["NAV_LAND", "NAV_TAKEOFF", "Phase", "Pilot"]
+
+NAV_LAND = 21
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
-WARNING = 4
-"""MAV_SEVERITY."""
-ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
-UNDEFINED, ON_GROUND, IN_AIR = 0, 1, 2
-"""MAV_LANDED_STATE; others are on the way up or down."""
-_STILL, _CALM = 0.3, 2_000_000
-"""m/s and µs: slower than this for so long in the air, a take-off is over."""
-HEARTBEAT_LOST = 3_000_000
-"""µs without a heartbeat after which the autopilot's mode is not known."""
 _NAN = float("nan")
 _NEEDED = tuple(
     (SET_MESSAGE_INTERVAL, (identifier, interval, 0.0, 0.0, 0.0, 0.0, 0.0))
@@ -64,26 +49,23 @@ class Pilot:
 
     def __init__(self, config: CompanionConfig, own: Source, origin_altitude: float) -> None:
         self._config = config
-        self._origin_altitude = origin_altitude
         self.phase = Phase.CONNECT
-        self.profile: Profile | None = None
+        self.vehicle = Vehicle()
         self.waiting_for = "a heartbeat of the autopilot"
-        self.said = ""
-        """The last warning of the autopilot: usually why it refuses."""
-        self._heartbeat: Heartbeat | None = None
-        self._beaten: Heartbeat | None = None
-        self._now = self._beat_at = 0
         self._settling_since: int | None = None
-        self._status: SysStatus | None = None
-        self._extended: ExtendedSysState | None = None
-        self._extended_seen: ExtendedSysState | None = None
-        self._extended_at = 0
-        self._flying_already = False
-        self._calm_since: int | None = None
         self._height: float | None = None
-        self._ground = 0.0
-        self._step = 0
         self._calls = Calls(own)
+        self._takeoff = Takeoff(self.vehicle, self._calls, origin_altitude)
+
+    @property
+    def profile(self) -> Profile | None:
+        """The autopilot's ways, None for one that is not known."""
+        return self.vehicle.profile
+
+    @property
+    def said(self) -> str:
+        """The last warning of the autopilot."""
+        return self.vehicle.said
 
     @property
     def refusals(self) -> list[str]:
@@ -93,41 +75,27 @@ class Pilot:
     @property
     def guided(self) -> bool:
         """Whether the autopilot follows our set-points now."""
-        return (
-            self.profile is not None
-            and self._heartbeat is not None
-            and self._now - self._beat_at <= HEARTBEAT_LOST
-            and bool(self._heartbeat.base_mode & ARMED)
-            and is_guided(self.profile, self._heartbeat)
-        )
+        return self.vehicle.guided
 
     @property
     def streaming(self) -> bool:
         """Whether set-points are to be sent."""
         if self.phase in (Phase.ESCORT, Phase.SETTLE):
             return self.guided
+        profile = self.profile
         return (
             self.phase is Phase.PREPARE
-            and self.profile is not None
-            and self.profile.streams_first
-            and self.profile.steps[self._step] is Step.MODE
+            and profile is not None
+            and profile.streams_first
+            and self._takeoff.step(profile) is Step.MODE
         )
 
     def hear(self, message: Message) -> None:
         """A message of the own autopilot."""
-        if isinstance(message, Heartbeat):
-            if message.autopilot != INVALID:
-                self._heartbeat = message
-                self.profile = profile_of(message)
-        elif isinstance(message, SysStatus):
-            self._status = message
-        elif isinstance(message, ExtendedSysState):
-            self._extended = message
-        elif isinstance(message, StatusText):
-            if message.severity <= WARNING:
-                self.said = message.text
-        elif isinstance(message, CommandAck):
+        if isinstance(message, CommandAck):
             self._calls.hear(message)
+        else:
+            self.vehicle.hear(message)
 
     def go(self, height: float) -> bool:
         """The operator's go: climb to ``height`` metres above the start, or take over where it flies already.
@@ -156,9 +124,7 @@ class Pilot:
 
     def step(self, now: int, view: View) -> list[Message]:
         """Commands to send now."""
-        self._tick(now)
-        if self._extended is not self._extended_seen:
-            self._extended_seen, self._extended_at = self._extended, now
+        self.vehicle.tick(now)
         if self.phase is Phase.SETTLE:
             self._settle(now, view)
         if self.phase is Phase.CONNECT:
@@ -166,23 +132,17 @@ class Pilot:
         if self.phase is Phase.PREPARE:
             return self._prepare(now, view)
         if self.phase is Phase.LAND:
-            if self._heartbeat is not None and not self._heartbeat.base_mode & ARMED:
+            if self.vehicle.heartbeat is not None and not self.vehicle.armed:
                 self.phase = Phase.DONE
                 return []
             return self._calls.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
         return []
 
-    def _tick(self, now: int) -> None:
-        """It is ``now`` (µs); a heartbeat that has come since the last step came then."""
-        self._now = now
-        if self._heartbeat is not self._beaten:
-            self._beaten, self._beat_at = self._heartbeat, now
-
     def _settle(self, now: int, view: View) -> None:
         """Land without settling when that cannot go on: blind, or too long. Somebody who took the vehicle
         over by its mode switch keeps it: nothing is ordered against them."""
         since = self._settling_since = now if self._settling_since is None else self._settling_since
-        taken_over = not self.guided and now - self._beat_at <= HEARTBEAT_LOST
+        taken_over = not self.guided and self.vehicle.alive
         blind = view.own is None or view.own.age > self._config.guard.own_stale_us
         if not taken_over and (blind or now - since > self._config.guard.settle_us):
             self.phase = Phase.LAND
@@ -190,7 +150,7 @@ class Pilot:
     def _connect(self, now: int, view: View) -> list[Message]:
         calls: list[Message] = []
         self.waiting_for = self._missing(view)
-        if self._heartbeat is not None:
+        if self.vehicle.heartbeat is not None:
             for command, params in sorted(_NEEDED, key=lambda call: self._calls.sent_at(*call)):
                 calls += self._calls.call(now, command, params)
             if view.local is None:
@@ -198,38 +158,32 @@ class Pilot:
                     now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                 )
         if not self.waiting_for and view.own is not None and view.local is not None:
-            self._ground = float(view.own.position[2])
-            self._flying_already = self._armed and self._landed_state != ON_GROUND
-            self._calm_since = None
+            self._takeoff.begin(view.own)
             self.phase = Phase.PREPARE
         return calls
 
-    @property
-    def _armed(self) -> bool:
-        return self._heartbeat is not None and bool(self._heartbeat.base_mode & ARMED)
-
-    @property
-    def _landed_state(self) -> int:
-        """As last heard, UNDEFINED if that is too long ago."""
-        if self._extended is None or self._now - self._extended_at > HEARTBEAT_LOST:
-            return UNDEFINED
-        return self._extended.landed_state
-
-    def _missing(self, view: View) -> str:
-        if self._heartbeat is None:
+    def _unseen(self, view: View) -> str:
+        """What has not been heard that every plan needs."""
+        vehicle = self.vehicle
+        if vehicle.heartbeat is None:
             return "a heartbeat of the autopilot"
-        if self.profile is None:
-            return f"an autopilot that is known (ArduPilot 3, PX4 12; this is {self._heartbeat.autopilot})"
+        if vehicle.profile is None:
+            kind = vehicle.heartbeat.autopilot
+            return f"an autopilot that is known (ArduPilot 3, PX4 12; this is {kind})"
         if view.local is None:
             return "GPS_GLOBAL_ORIGIN"
         if view.own is None or view.own.age > self._config.guard.own_stale_us:
             return "LOCAL_POSITION_NED"
-        if view.yaw is None:
-            return "ATTITUDE"
-        if self._armed and self._landed_state == UNDEFINED:
+        return "" if view.yaw is not None else "ATTITUDE"
+
+    def _missing(self, view: View) -> str:
+        vehicle = self.vehicle
+        if unseen := self._unseen(view):
+            return unseen
+        if vehicle.armed and vehicle.landed_state == UNDEFINED:
             # A vehicle that may be flying must not be told to take off.
             return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
-        if self._status is None or not self._status.health & PREARM_OK:
+        if not vehicle.healthy:
             return "the autopilot's pre-arm checks"
         if not all(self._calls.answered(*call) for call in _NEEDED):
             return "the autopilot's answers to SET_MESSAGE_INTERVAL"
@@ -238,46 +192,18 @@ class Pilot:
         return ""
 
     def _prepare(self, now: int, view: View) -> list[Message]:
-        profile, beat, height = self.profile, self._heartbeat, self._height
-        if profile is None or beat is None or height is None or view.own is None:
+        profile, height, takeoff = self.profile, self._height, self._takeoff
+        if profile is None or height is None or view.own is None:
             return []
-        if Step.ARM in profile.steps[: self._step] and not beat.base_mode & ARMED:
-            # Disarmed again, by itself or by somebody, who will not expect it to arm: a new go is needed.
-            self._step, self._height, self.phase = 0, None, Phase.CONNECT
+        if takeoff.disarmed(profile):
+            # A new go is needed.
+            self._height, self.phase = None, Phase.CONNECT
             self._calls.forget()
             return []
-        step = profile.steps[self._step]
-        if step is Step.MODE:
-            done = is_guided(profile, beat)
-            call = self._calls.call(now, DO_SET_MODE, (*profile.mode_params, 0.0, 0.0, 0.0, 0.0))
-        elif step is Step.ARM:
-            done = bool(beat.base_mode & ARMED)
-            call = self._calls.call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-        else:
-            climbed = float(view.own.position[2]) - self._ground
-            done = self._flying_already or self._is_up(now, view.own, climbed, height)
-            above_sea = self._origin_altitude + self._ground + height
-            altitude = above_sea if profile.takeoff_absolute else height
-            up = self._flying_already or self._landed_state not in (UNDEFINED, ON_GROUND)
-            call = (
-                [] if up else self._calls.call(now, NAV_TAKEOFF, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude))
-            )
-        if done:
-            self._step += 1
-            self._calls.forget()
-            if self._step == len(profile.steps):
-                self.phase = Phase.ESCORT
-            return []
-        self.waiting_for = step.value
-        return call
-
-    def _is_up(self, now: int, own: State, climbed: float, height: float) -> bool:
-        """Still at the height asked for; or still for a while in the air, for an estimate of height that
-        drifts by more than one may ask: the autopilot measures its height from its own origin."""
-        still = float(abs(own.velocity).max()) < _STILL
-        if not still or self._landed_state != IN_AIR or climbed < 0.5 * height:
-            self._calm_since = None
-        elif self._calm_since is None:
-            self._calm_since = now
-        waited = self._calm_since is not None and now - self._calm_since >= _CALM
-        return waited or (still and abs(climbed - height) < 0.3)
+        step = takeoff.step(profile)
+        sent = takeoff.advance(now, profile, view.own, height)
+        if takeoff.step(profile) is None:
+            self.phase = Phase.ESCORT
+        elif step is not None and takeoff.step(profile) is step:
+            self.waiting_for = step.value
+        return sent

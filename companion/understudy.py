@@ -12,7 +12,7 @@ from collections.abc import Callable
 from companion.config import CompanionConfig
 from companion.errors import CompanionError
 from companion.node import COMPONENT, Companion
-from companion.pilot import HEARTBEAT_LOST, Phase, Pilot
+from companion.pilot import Phase, Pilot
 from companion.world import View
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, SetpointLocal, Source
@@ -35,21 +35,11 @@ class _Onlooker(Pilot):
 
     def step(self, now: int, view: View) -> list[Message]:
         """No commands, ever."""
-        self._tick(now)
-        self.waiting_for = self._lacking(now, view)
+        self.vehicle.tick(now)
+        silent = self.vehicle.heartbeat is not None and not self.vehicle.alive
+        self.waiting_for = "a heartbeat of the autopilot" if silent else self._unseen(view)
         self.phase = Phase.CONNECT if self.waiting_for else Phase.ESCORT
         return []
-
-    def _lacking(self, now: int, view: View) -> str:
-        if self._heartbeat is None or now - self._beat_at > HEARTBEAT_LOST:
-            return "a heartbeat of the autopilot"
-        if self.profile is None:
-            return f"an autopilot that is known (ArduPilot 3, PX4 12; this is {self._heartbeat.autopilot})"
-        if view.local is None:
-            return "GPS_GLOBAL_ORIGIN"
-        if view.own is None or view.own.age > self._config.guard.own_stale_us:
-            return "LOCAL_POSITION_NED"
-        return "" if view.yaw is not None else "ATTITUDE"
 
 
 class Understudy(Companion):

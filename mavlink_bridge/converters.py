@@ -135,6 +135,7 @@ TABLE: tuple[Converter, ...] = (
     _row(m.ParamValue, 22, p.param_value, p.param_value_fields, layout="<4sHH16sB"),
     _row(m.ParamSet, 23, p.param_set, p.param_set_fields, layout="<4sBB16sB"),
     _row(m.GpsRaw, 24, q.gps_raw, q.gps_raw_fields, size_v1=30),
+    _row(m.RawImu, 27, q.raw_imu, q.raw_imu_fields, size_v1=26),
     _row(m.Attitude, 30, f.attitude, f.attitude_fields, finite=True),
     _row(
         m.AttitudeQuaternion,
@@ -176,6 +177,7 @@ TABLE: tuple[Converter, ...] = (
     _row(m.SetpointLocal, 84, f.setpoint, f.setpoint_fields),
     _row(m.PositionTarget, 85, f.position_target, f.position_target_fields),
     _row(m.SetpointGlobal, 86, f.setpoint_global, f.setpoint_global_fields),
+    _row(m.HighresImu, 105, q.highres_imu, q.highres_imu_fields, finite=True, size_v1=62),
     _row(m.FileTransfer, 110, _plain(m.FileTransfer), p.file_transfer_fields),
     _row(m.Timesync, 111, f.timesync, unchanged),
     _row(m.Altitude, 141, _plain(m.Altitude)),
@@ -183,6 +185,7 @@ TABLE: tuple[Converter, ...] = (
     _row(m.BatteryStatus, 147, q.battery_status, q.battery_status_fields, size_v1=36),
     _row(m.AutopilotVersion, 148, _plain(m.AutopilotVersion), size_v1=60),
     _row(m.FenceStatus, 162, f.fence_status, f.fence_status_fields, size_v1=8),
+    _row(m.SimState, 164, q.sim_state, q.sim_state_fields, finite=True),
     _row(m.EkfStatus, 193, f.ekf_status, f.ekf_status_fields, size_v1=22),
     _row(m.EstimatorStatus, 230, _plain(m.EstimatorStatus)),
     _row(m.HomePosition, 242, p.home, p.home_fields, size_v1=52),

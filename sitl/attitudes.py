@@ -1,11 +1,15 @@
-"""Euler angles as a quaternion, for messages."""
+"""Euler angles and quaternions (w, x, y, z; FRD body to NED), for messages."""
 
 from __future__ import annotations
 
 import math
 
+from mavlink_bridge.messages import Vector
 
-def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+Quaternion = tuple[float, float, float, float]
+
+
+def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
     """(w, x, y, z) of yaw, then pitch, then roll (rad), FRD body to NED."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
@@ -15,4 +19,26 @@ def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, flo
         sr * cp * cy - cr * sp * sy,
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
+    )
+
+
+def euler(attitude: Quaternion) -> Vector:
+    """Roll, pitch and yaw (rad)."""
+    w, x, y, z = attitude
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def to_body(attitude: Quaternion, vector: Vector) -> Vector:
+    """A vector in NED as the body has it."""
+    w, *axis = attitude
+    x, y, z = axis
+    a, b, c = vector
+    # v − 2 w (q × v) + 2 q × (q × v)
+    u, v, t = y * c - z * b, z * a - x * c, x * b - y * a
+    return (
+        a - 2.0 * w * u + 2.0 * (y * t - z * v),
+        b - 2.0 * w * v + 2.0 * (z * u - x * t),
+        c - 2.0 * w * t + 2.0 * (x * v - y * u),
     )

@@ -11,6 +11,7 @@ from sitl.autonomy_config import BatteryFailsafeConfig, FenceConfig, FollowConfi
 from sitl.backends.physics import PhysicsName
 from sitl.battery import BatteryConfig
 from sitl.profiles import ProfileName
+from sitl.response import ResponseName
 
 Rate = Annotated[float, Field(ge=0.0, le=1000.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -62,6 +63,11 @@ class AutopilotConfig(BaseModel):
     )
     sensors: ProfileName = Field("truth", description="how good its estimate is: truth, rtk or gnss")
     physics: PhysicsName = Field("own", description="what moves the vehicle: our own integrator, or JSBSim")
+    response: ResponseName = Field(
+        "exact",
+        description="exact: it is where its set-points say; firmware: it lags as the real one did, with the"
+        " gains that are the firmware's defaults",
+    )
     start_height: float = Field(
         0.0,
         ge=0.0,

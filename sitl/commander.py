@@ -49,6 +49,8 @@ class Commander:
         self._touched_at: int | None = None
         self._blind_since: int | None = None
         self._disarm_at = 0
+        self._chosen = flavour.boot_mode
+        self._lost = False
         self.doubts: Callable[[], list[str]] = list
         self.armed = False
         self.landed = True
@@ -138,6 +140,7 @@ class Commander:
 
     def enter(self, mode: Mode, now: int) -> Denial | None:
         """Change to ``mode``."""
+        self._lost = False
         if mode is self.mode:
             return None
         status = self.status(now)
@@ -147,7 +150,14 @@ class Commander:
         if denial := self._flavour.mode_denial(mode, status):
             return denial
         self._switch(mode, now)
+        if not self.armed:
+            self._chosen = mode
         return None
+
+    def steered(self, now: int) -> None:
+        """A usable set-point came: PX4 goes on with OFFBOARD if nothing but their silence had ended it."""
+        if self._lost and self.armed:
+            self._switch(Mode.GUIDED, now)
 
     # What happens
 
@@ -195,6 +205,7 @@ class Commander:
 
     def _switch(self, mode: Mode, now: int) -> None:
         self.mode = mode
+        self._lost = False
         self._journeys.following.active = mode is Mode.FOLLOW
         if self.armed and mode is Mode.MISSION:
             self._journeys.begin(mode, self._estimate())
@@ -221,6 +232,7 @@ class Commander:
         self._voice.warn("Set-points timed out")
         if self._flavour.after_loss is not self.mode:
             self._switch(self._flavour.after_loss, now)
+            self._lost = self._flavour.keeps_choice
         if self.mode is Mode.POSITION:
             self._guidance.land(_SINKING)
 
@@ -257,7 +269,9 @@ class Commander:
         self.armed = False
         self._guidance.idle()
         self._journeys.itinerary.landed()
-        if self.mode is Mode.LAND:
+        if self._flavour.keeps_choice:
+            self.mode = self._chosen
+        elif self.mode is Mode.LAND:
             self.mode = self._flavour.after_landing
         elif self.mode is Mode.RETURN:
             self.mode = self._flavour.after_return

@@ -11,8 +11,9 @@ from sitl.autopilot_config import AutopilotConfig
 from sitl.battery import Battery
 from sitl.commander import Commander
 from sitl.config import VehicleConfig
+from sitl.environment import GRAVITY
 from sitl.failsafes import Failsafes
-from sitl.flavours import ARMED, Flavour
+from sitl.flavours import ARMED, Flavour, Mode
 from sitl.guidance import Activity, Guidance
 from sitl.home import Home
 from sitl.identity import version
@@ -82,7 +83,7 @@ class Gauges:
             flavour.autopilot,
             flavour.base_mode(commander.mode) | (ARMED if commander.armed else 0),
             flavour.custom_mode(commander.mode),
-            ON_GROUND if commander.landed else _LANDED_STATES.get(self._guidance.activity, IN_AIR),
+            self._landed_state(),
             self._target,
             flavour.echoes_yaw,
             plant.sensors.gps.located,
@@ -98,7 +99,17 @@ class Gauges:
             self._mission,
             commander.ready and (commander.armed or not self._failsafes.doubts()),
             self._failsafes.fence_status,
+            self._lift,
+            lambda: plant.state,
         )
+
+    def _landed_state(self) -> int:
+        """MAV_LANDED_STATE. Who sinks because nobody steers is not landing."""
+        if self._commander.landed:
+            return ON_GROUND
+        if self._commander.mode is Mode.POSITION:
+            return IN_AIR
+        return _LANDED_STATES.get(self._guidance.activity, IN_AIR)
 
     def _target(self) -> Setpoint | None:
         guidance = self._guidance
@@ -111,6 +122,12 @@ class Gauges:
         if self._now >= config.ready_after * 1e6:
             return 1.0
         return self._now * 1e-6 / config.ready_after if config.startup == "in stages" else 0.0
+
+    def _lift(self) -> float:
+        """m/s²."""
+        if self._plant.vehicle.on_ground:
+            return GRAVITY
+        return GRAVITY * _squares(self._plant.state.rotor_speeds.tolist()) / self._hovering
 
     def _throttle(self) -> float:
         """Thrust as a part of twice what hovering takes, 0…1."""

@@ -1,7 +1,7 @@
 """What the autopilot is doing, as a reference to track: stand, take off, follow set-points, hold, land.
 
 All in the vehicle's own local NED. Every motion goes through the shaper, so that none of them begins with a
-step.
+step; and from there, if the configuration says so, through a firmware's response.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Final
 
 from mavlink_bridge.messages import Vector
 from sitl.autopilot_config import AutopilotConfig
+from sitl.response import RESPONSES, Motion, Response
 from sitl.setpoints import POSITION, VELOCITY, Pose, Setpoint
 from sitl.shaper import Heading, Limits, Shaper
 
@@ -37,14 +38,15 @@ _INTERRUPTIBLE: Final = (Activity.GO, Activity.TRACK, Activity.HOLD)
 class Guidance:
     """One reference, moved on in steps of some ms.
 
-    ``position``, ``velocity``, ``acceleration`` (SI, local NED) and ``yaw``, ``yaw_rate`` are what to track
-    now. ``timed_out`` becomes true when set-points stop for longer than they may: it brakes and holds where
-    it comes to rest.
+    ``motion`` (SI, local NED) and ``yaw``, ``yaw_rate`` are what to track now. ``timed_out`` becomes true
+    when set-points stop for longer than they may: it brakes and holds where it comes to rest.
     """
 
     def __init__(self, config: AutopilotConfig) -> None:
         self.configure(config)
         self._shaper = Shaper()
+        exact = config.response == "exact"
+        self._response = None if exact else Response(RESPONSES[config.flavour])
         self._heading = Heading(config.max_yaw_rate, config.max_yaw_acceleration)
         self._setpoint = _STAY
         self._received = 0
@@ -67,20 +69,10 @@ class Guidance:
         }
 
     @property
-    def position(self) -> Vector:
-        return self._shaper.position
-
-    @property
-    def velocity(self) -> Vector:
-        return self._shaper.velocity
-
-    @property
-    def acceleration(self) -> Vector:
-        return self._shaper.acceleration
-
-    @property
-    def motion(self) -> tuple[Vector, Vector, Vector]:
+    def motion(self) -> Motion:
         """Position, velocity, acceleration."""
+        if self._response is not None:
+            return self._response.motion
         shaper = self._shaper
         return shaper.position, shaper.velocity, shaper.acceleration
 
@@ -94,7 +86,7 @@ class Guidance:
 
     @property
     def reached(self) -> bool:
-        """Whether a takeoff is where it leads, and all but at rest."""
+        """Whether a takeoff is where it leads, and all but at rest; what lags behind it comes along."""
         gap = self._setpoint.position[2] - self._shaper.position[2]
         return abs(gap) < _REACHED[0] and math.hypot(*self._shaper.velocity) < _REACHED[1]
 
@@ -192,6 +184,8 @@ class Guidance:
             z = self._setpoint.position[2]
             self._setpoint = self._setpoint._replace(position=(position[0], position[1], z))
         shaper.position, shaper.velocity, shaper.captured = position, velocity, False
+        if self._response is not None:
+            self._response.relocate(position, velocity)
 
     def advance(self, now: int, step: int) -> None:
         """Move the reference from ``now`` to ``now + step`` (µs)."""
@@ -202,20 +196,31 @@ class Guidance:
         dt = step * 1e-6
         if activity is Activity.TRACK:
             if end > self._deadline:
-                self.hold()
-                self.timed_out = True
+                self._expire(self.wanted(self._deadline))
             wanted = self.wanted(end)
         else:
             wanted = self._setpoint
-            if (
-                activity is Activity.HOLD
-                and wanted.yaw is None
-                and self._shaper.at_rest
-                and self._heading.yaw_rate == 0.0
-            ):
+            if activity is Activity.HOLD and wanted.yaw is None and self._resting:
                 return
         self._shaper.advance(wanted, self._limits[self.activity], dt)
         self._heading.advance(wanted.yaw, wanted.yaw_rate, dt)
+        if self._response is not None:
+            shaper = self._shaper
+            self._response.advance((shaper.position, shaper.velocity, shaper.acceleration), dt)
+
+    def _expire(self, last: Setpoint) -> None:
+        """Set-points come no more: brake and hold. ArduPilot forgets what velocity it was told, but not the
+        position, which stops where it has got to; the vehicle goes back there."""
+        persists = self._response is not None and self._config.flavour == "ardupilot"
+        if persists and last.levels[0] == POSITION:
+            self._shaper.restart(last.position)
+        self.hold()
+        self.timed_out = True
+
+    @property
+    def _resting(self) -> bool:
+        """Whether nothing would move; a response goes on for ever, ever slower."""
+        return self._shaper.at_rest and self._heading.yaw_rate == 0.0 and self._response is None
 
     def _begin(self, activity: Activity, setpoint: Setpoint) -> None:
         self.activity = activity
@@ -226,4 +231,6 @@ class Guidance:
     def _leave_ground(self, here: Pose) -> None:
         if self.activity is Activity.IDLE:
             self._shaper.restart(here.position)
+            if self._response is not None:
+                self._response.restart(here.position)
             self._heading.restart(here.yaw)

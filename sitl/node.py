@@ -44,7 +44,7 @@ from sitl.parameters import px4 as px4_parameters
 from sitl.parameters.values import Values
 from sitl.plant import Plant
 from sitl.reception import Reception
-from sitl.reports import ORIGIN
+from sitl.reports import HEARTBEAT, ORIGIN
 from sitl.returning import Returning
 from sitl.saved import Saved
 from sitl.sensors import Estimate
@@ -219,6 +219,8 @@ class Autopilot:
         # What nearly every step finds empty and undue is looked at here, not asked for.
         self._reached = itinerary.reached
         self._work_due = self._services.next_due
+        # A real ArduCopter beats at once when its mode was changed. Quiet flights stay as they are.
+        self._announces = config.streams == "normal" and not bytewise
         self._boot: int | None = None
         self._now = 0
         if config.start_height:
@@ -258,7 +260,10 @@ class Autopilot:
         if datagram.link != LINK:
             return
         for message in self._codec.feed(datagram.data):
+            mode = self._commander.mode
             self._reception.handle(message, self._now, self._plant.estimate())
+            if self._announces and self._commander.mode is not mode:
+                self._telemetry.request(HEARTBEAT)
         self._work_due = self._services.next_due
 
     def _tell(self) -> list[Datagram]:

@@ -61,7 +61,7 @@ class Reception:
         match message:
             case SetpointLocal() | SetpointGlobal() | SetpointAttitude():
                 if self._is_mine(message.target_system, message.target_component):
-                    self._steering.steer(message, self._commander.status(now), estimate.pose, now)
+                    self._steer(message, now, estimate)
             case CommandLong() | CommandInt():
                 if self._is_mine(message.target_system, message.target_component):
                     self._obey(message, now)
@@ -79,6 +79,12 @@ class Reception:
                     self._change_mode(message, now)
             case _:
                 self._serve(message, now)
+
+    def _steer(
+        self, message: SetpointLocal | SetpointGlobal | SetpointAttitude, now: int, estimate: Estimate
+    ) -> None:
+        if self._steering.steer(message, self._commander.status(now), estimate.pose, now):
+            self._commander.steered(now)
 
     def _obey(self, message: CommandLong | CommandInt, now: int) -> None:
         result, reason = self._orders.obey(message, now)

@@ -29,6 +29,7 @@ from sitl.home import Home
 from sitl.origin import Origin
 from sitl.sensors import Estimate
 from sitl.setpoints import LOCAL_NED, Setpoint, mask_of
+from sitl.vehicle import VehicleState
 
 HEARTBEAT: Final = 0
 SYS_STATUS: Final = 1
@@ -73,7 +74,8 @@ class Snapshot(NamedTuple):
     ``waking`` 0…1: how far GPS and filter have come up, if that is shown; ``charge`` None without a battery;
     ``throttle`` 0…1; ``unbreached``: MAV_SYS_STATUS_GEOFENCE where it is told; ``epoch``: Unix time of the
     boot (µs), 0 if nobody knows; ``version`` is what AUTOPILOT_VERSION says; ``mission`` gives
-    MISSION_CURRENT, ``fence`` FENCE_STATUS. ``armable``: nothing speaks against arming, or it is armed."""
+    MISSION_CURRENT, ``fence`` FENCE_STATUS. ``armable``: nothing speaks against arming, or it is armed.
+    ``lift``: what the rotors, or the ground, push with (m/s²); ``truth``: the true state, site NED."""
 
     source: Source
     time: int
@@ -101,6 +103,8 @@ class Snapshot(NamedTuple):
     mission: Callable[[], MissionCurrent]
     armable: bool
     fence: Callable[[Source], FenceStatus]
+    lift: Callable[[], float]
+    truth: Callable[[], VehicleState]
 
 
 def heartbeat(s: Snapshot) -> Message:

@@ -63,20 +63,22 @@ class Steering:
         status: Status,
         here: Pose,
         now: int,
-    ) -> None:
-        """Act on one set-point addressed to this vehicle that arrived at ``now`` (µs)."""
+    ) -> bool:
+        """Act on one set-point addressed to this vehicle that arrived at ``now`` (µs); whether it is one that
+        can be flown."""
         reading = self._read(message, here)
         if not isinstance(reading, Setpoint):
             self._voice.complain(reading.reason, now)
             if isinstance(reading, Stop) and self._guidance.activity is Activity.TRACK:
                 self._guidance.hold()
-            return
+            return False
         self.stream = Stream(reading, now, self.stream.newest)
         denial = self._flavour.steering_denial(status)
         if denial is None:
             self._follow(reading, here, now)
         elif denial:
             self._voice.complain(denial, now)
+        return True
 
     def resume(self, here: Pose, now: int) -> None:
         """Follow the newest set-point of a stream that began before it was allowed to steer, or hold."""

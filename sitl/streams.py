@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from sitl import inertial_reports as n
 from sitl import reports as r
 from sitl import status_reports as q
 from sitl.autopilot_config import AutopilotConfig, TelemetryRates
@@ -48,6 +49,7 @@ _PX4: Final = TelemetryRates(
 
 ALL: Final = 0
 GROUPS: Final[dict[int, tuple[int, ...]]] = {
+    1: (n.RAW_IMU,),
     2: (r.SYS_STATUS, q.MISSION_CURRENT, q.GPS_RAW),
     6: (r.GLOBAL_POSITION, r.LOCAL_POSITION),
     10: (r.ATTITUDE,),

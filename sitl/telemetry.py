@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from mavlink_bridge.messages import Message
+from sitl import inertial_reports as n
 from sitl import reports as r
 from sitl import status_reports as q
 from sitl.autopilot_config import TelemetryRates
@@ -29,8 +30,8 @@ class Telemetry:
     """The streams of one autopilot. ``next_due`` (µs): before it there is nothing to send."""
 
     def __init__(self, rates: TelemetryRates, reports_ekf: bool) -> None:
-        """``reports_ekf``: as ArduPilot, EKF_STATUS_REPORT (193); else as PX4, ESTIMATOR_STATUS (230) and
-        ALTITUDE (141)."""
+        """``reports_ekf``: as ArduPilot, EKF_STATUS_REPORT (193), RAW_IMU (27) and SIMSTATE (164); else as
+        PX4, ESTIMATOR_STATUS (230), HIGHRES_IMU (105) and ALTITUDE (141)."""
         self._streams = {
             r.HEARTBEAT: _Stream(r.heartbeat, rates.heartbeat),
             r.SYS_STATUS: _Stream(r.sys_status, rates.sys_status),
@@ -43,6 +44,8 @@ class Telemetry:
         }
         if reports_ekf:
             self._streams[r.EKF_STATUS] = _Stream(r.ekf_status, rates.ekf_status)
+            self._streams[n.RAW_IMU] = _Stream(n.raw_imu, 0.0)
+            self._streams[n.SIM_STATE] = _Stream(n.sim_state, 0.0)
         self._streams |= {
             q.SYSTEM_TIME: _Stream(q.system_time, rates.system_time),
             q.GPS_RAW: _Stream(q.gps_raw, rates.gps_raw),
@@ -55,6 +58,7 @@ class Telemetry:
             q.FENCE_STATUS: _Stream(q.fence_status, 0.0),
         }
         if not reports_ekf:
+            self._streams[n.HIGHRES_IMU] = _Stream(n.highres_imu, 0.0)
             self._streams[q.ALTITUDE] = _Stream(q.altitude, rates.altitude)
             self._streams[q.ESTIMATOR_STATUS] = _Stream(q.estimator_status, rates.estimator_status)
         # Those that flow; most do not, and a step should not have to look at them.

@@ -1,15 +1,19 @@
-"""Cut a stretch of one message out of a tlog, every record byte for byte as it was.
+"""Cut some messages out of a tlog, every record byte for byte as it was.
 
     .venv/bin/python tools/extract_log.py INPUT OUTPUT --message GLOBAL_POSITION_INT --start 475 --duration 70
+    .venv/bin/python tools/extract_log.py INPUT OUTPUT --message HEARTBEAT --message ATTITUDE/10 --system 1 2
 
-``--start`` and ``--duration`` are s of receive time from the log's first record on; one vehicle is kept.
-The stretch that ships, and what is to be known of it, stand in the README beside it.
+``NAME/10`` keeps the first and every tenth after it. ``--start`` and ``--duration`` are s of receive time
+from the log's first record on; without them it is the whole log. What was cut, and what is to be known of
+it, stands in a README beside it. An OUTPUT that ends in .gz is compressed.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
+from collections import Counter
 from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega
@@ -19,17 +23,25 @@ from mavlink_bridge.framing import Frame, frame_at
 from mavlink_bridge.tlog import Record, TlogWriter, read_tlog
 
 
-def message_id(name: str) -> int:
-    """The number of a message of the dialect. Raises argparse.ArgumentTypeError for a name that it lacks."""
+def wish(text: str) -> tuple[int, int]:
+    """The number of a message of the dialect, and of how many one is kept. Raises
+    argparse.ArgumentTypeError."""
+    name, _, every = text.partition("/")
+    if every and not (every.isdecimal() and int(every) > 0):
+        raise argparse.ArgumentTypeError(f"{text!r}: behind the / there must be a whole number from 1 on")
     for number, message in ardupilotmega.mavlink_map.items():
         if message.msgname == name:
-            return int(number)
+            return int(number), int(every or 1)
     raise argparse.ArgumentTypeError(f"{name!r} is no message of the ardupilotmega dialect")
 
 
-def stretch(source: Path, message: int, system: int, start_s: float, duration_s: float) -> list[Record]:
-    """The records of ``message`` from ``system`` in [start, start + duration), in the order of the log."""
+def stretch(
+    source: Path, wishes: dict[int, int], systems: list[int], start_s: float, duration_s: float
+) -> list[Record]:
+    """The records in [start, start + duration) of the messages ``wishes`` (number → of how many one) from
+    ``systems``, in the order of the log."""
     kept = []
+    seen: Counter[int] = Counter()
     first: int | None = None
     for record in read_tlog(source):
         if first is None:
@@ -37,8 +49,10 @@ def stretch(source: Path, message: int, system: int, start_s: float, duration_s:
         if not start_s <= (record.time - first) / 1e6 < start_s + duration_s:
             continue
         frame = frame_at(record.frame, 0)
-        if isinstance(frame, Frame) and (frame.message_id, frame.system) == (message, system):
-            kept.append(record)
+        if isinstance(frame, Frame) and frame.message_id in wishes and frame.system in systems:
+            if seen[frame.message_id] % wishes[frame.message_id] == 0:
+                kept.append(record)
+            seen[frame.message_id] += 1
     return kept
 
 
@@ -49,13 +63,13 @@ def main() -> int:
     )
     parser.add_argument("input", type=Path)
     parser.add_argument("output", type=Path)
-    parser.add_argument("--message", type=message_id, required=True, metavar="NAME")
-    parser.add_argument("--system", type=int, default=1, help="system id of the vehicle (default 1)")
-    parser.add_argument("--start", type=float, required=True, help="s after the first record")
-    parser.add_argument("--duration", type=float, required=True, help="s")
+    parser.add_argument("--message", type=wish, action="append", required=True, metavar="NAME[/N]")
+    parser.add_argument("--system", type=int, nargs="+", default=[1], help="system ids (default 1)")
+    parser.add_argument("--start", type=float, default=0.0, help="s after the first record (default 0)")
+    parser.add_argument("--duration", type=float, default=math.inf, help="s (default: to the end)")
     given = parser.parse_args()
     try:
-        kept = stretch(given.input, given.message, given.system, given.start, given.duration)
+        kept = stretch(given.input, dict(given.message), given.system, given.start, given.duration)
         if not kept:
             raise LogError(f"{given.input}: holds no such message in that stretch")
         with TlogWriter(given.output) as log:

@@ -13,6 +13,9 @@ _UNKNOWN_U8 = 0xFF
 _CELLS = 10
 _IDENTITY = (0.0, 0.0, 0.0, 0.0)
 _AMPERE_SECONDS = 3.6  # in a mA h
+_MILLI_G = 9.80665e-3
+# Every field of HIGHRES_IMU.
+_ALL_UPDATED = 0x1FFF
 
 
 def _or_none(value: int, scale: float) -> float | None:
@@ -129,3 +132,34 @@ def battery_status_fields(x: m.BatteryStatus) -> Fields:
         x.charge_state,
         *[0] * 6,
     )
+
+
+def raw_imu(s: m.Source, f: Fields) -> m.RawImu:
+    x, y, z = (value * _MILLI_G for value in f[1:4])
+    p, q, r, north, east, down = (value / 1e3 for value in f[4:10])
+    return m.RawImu(s, f[0], (x, y, z), (p, q, r), (north, east, down))
+
+
+def raw_imu_fields(x: m.RawImu) -> Fields:
+    force = (round(value / _MILLI_G) for value in x.specific_force)
+    rest = (round(value * 1e3) for value in (*x.body_rates, *x.magnetic_field))
+    return x.time_boot, *force, *rest, 0, 0
+
+
+def highres_imu(s: m.Source, f: Fields) -> m.HighresImu:
+    return m.HighresImu(s, f[0], f[1:4], f[4:7], f[7:10], f[10], f[12], f[13])
+
+
+def highres_imu_fields(x: m.HighresImu) -> Fields:
+    motion = *x.specific_force, *x.body_rates, *x.magnetic_field
+    return x.time_boot, *motion, x.pressure, 0.0, x.pressure_altitude, x.temperature, _ALL_UPDATED, 0
+
+
+def sim_state(s: m.Source, f: Fields) -> m.SimState:
+    roll, pitch, yaw = f[:3]
+    return m.SimState(s, roll, pitch, yaw, f[3:6], f[6:9], f[9] / 1e7, f[10] / 1e7)
+
+
+def sim_state_fields(x: m.SimState) -> Fields:
+    place = degrees_e7("latitude", x.latitude, 90), degrees_e7("longitude", x.longitude, 180)
+    return x.roll, x.pitch, x.yaw, *x.specific_force, *x.body_rates, *place

@@ -68,6 +68,9 @@ from mavlink_bridge.messages.status import (
     BatteryStatus,
     EstimatorStatus,
     GpsRaw,
+    HighresImu,
+    RawImu,
+    SimState,
     VfrHud,
 )
 
@@ -124,6 +127,9 @@ Message = (
     | Altitude
     | BatteryStatus
     | EstimatorStatus
+    | RawImu
+    | HighresImu
+    | SimState
 )
 
 __all__ = [
@@ -145,6 +151,7 @@ __all__ = [
     "GpsGlobalOrigin",
     "GpsRaw",
     "Heartbeat",
+    "HighresImu",
     "HomePosition",
     "LocalPosition",
     "Message",
@@ -167,6 +174,7 @@ __all__ = [
     "ParamValue",
     "Ping",
     "PositionTarget",
+    "RawImu",
     "RequestDataStream",
     "SetGpsGlobalOrigin",
     "SetHomePosition",
@@ -174,6 +182,7 @@ __all__ = [
     "SetpointAttitude",
     "SetpointGlobal",
     "SetpointLocal",
+    "SimState",
     "Source",
     "StatusText",
     "SysStatus",

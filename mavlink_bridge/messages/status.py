@@ -94,3 +94,40 @@ class EstimatorStatus(NamedTuple):
     horizontal_accuracy: float
     vertical_accuracy: float
     flags: int
+
+
+class RawImu(NamedTuple):
+    """RAW_IMU (27): specific force (m/s², FRD), body rates (rad/s) and magnetic field (gauss)."""
+
+    source: Source
+    time_boot: int
+    specific_force: Vector
+    body_rates: Vector
+    magnetic_field: Vector
+
+
+class HighresImu(NamedTuple):
+    """HIGHRES_IMU (105), the same; static pressure (hPa), altitude by it (m), temperature (°C)."""
+
+    source: Source
+    time_boot: int
+    specific_force: Vector
+    body_rates: Vector
+    magnetic_field: Vector
+    pressure: float
+    pressure_altitude: float
+    temperature: float
+
+
+class SimState(NamedTuple):
+    """SIMSTATE (164, ardupilotmega): the truth of a simulation. Euler angles (rad), specific force (m/s²,
+    FRD), body rates (rad/s), degrees."""
+
+    source: Source
+    roll: float
+    pitch: float
+    yaw: float
+    specific_force: Vector
+    body_rates: Vector
+    latitude: float
+    longitude: float

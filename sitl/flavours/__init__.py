@@ -118,6 +118,9 @@ class Flavour(Protocol):
     """Whether REQUEST_DATA_STREAM (66) is obeyed."""
     after_takeoff: Mode
     after_landing: Mode
+    keeps_choice: bool
+    """Whether the mode that was chosen on the ground comes back when it is disarmed, and GUIDED when its
+    set-points do."""
     after_return: Mode
     after_mission: Mode
     """The mode when the last item is done."""

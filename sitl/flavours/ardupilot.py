@@ -95,6 +95,7 @@ class ArduPilot:
     groups_streams = True
     after_takeoff = Mode.GUIDED
     after_landing = Mode.LAND
+    keeps_choice = False
     after_return = Mode.RETURN
     after_mission = Mode.MISSION
     first_item = 1

@@ -77,6 +77,7 @@ class Px4:
     groups_streams = False
     after_takeoff = Mode.HOLD
     after_landing = Mode.HOLD
+    keeps_choice = True
     after_return = Mode.HOLD
     after_mission = Mode.HOLD
     first_item = 0
@@ -110,8 +111,8 @@ class Px4:
 
     def base_mode(self, mode: Mode) -> int:
         if mode in (Mode.STANDBY, Mode.POSITION):
-            return CUSTOM | STABILIZED | MANUAL | (GUIDED_FLAG if mode is Mode.POSITION else 0)
-        return CUSTOM | STABILIZED | GUIDED_FLAG | AUTO
+            return CUSTOM | STABILIZED | MANUAL
+        return CUSTOM | STABILIZED | (0 if mode is Mode.GUIDED else GUIDED_FLAG | AUTO)
 
     def split(self, custom_mode: int, /) -> tuple[int, int]:
         return custom_mode >> 16 & 0xFF, custom_mode >> 24
@@ -127,7 +128,8 @@ class Px4:
         return None
 
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
-        if mode is Mode.GUIDED and not _streaming(status):
+        # On the ground any mode can be chosen; then the stream counts when it is to be armed.
+        if mode is Mode.GUIDED and status.armed and not _streaming(status):
             return Denial(TEMPORARILY_REJECTED, "OFFBOARD needs set-points at more than 2 Hz")
         if not status.ready and (status.landed or mode is not Mode.LAND):
             return Denial(TEMPORARILY_REJECTED, "Mode change refused: no position estimate")

@@ -31,6 +31,8 @@ raw = st.binary(min_size=4, max_size=4)
 percent = scaled(st.integers(0, 100), 100)
 centi = st.none() | scaled(st.integers(0, 65534), 1e2)
 accuracy = scaled(u32, 1e3)
+milli = scaled(signed(16), 1e3)
+milli_g = signed(16).map(lambda value: value * 9.80665e-3)
 Kinds = dict[type[m.Message], st.SearchStrategy[Any]]
 
 SERVICES: Kinds = {
@@ -130,5 +132,8 @@ STATUS: Kinds = {
         signed(32),
         u8,
     ),
+    m.RawImu: st.builds(m.RawImu, source, u64, vector(milli_g), vector(milli), vector(milli)),
+    m.HighresImu: st.builds(m.HighresImu, source, u64, vector(f32), vector(f32), vector(f32), f32, f32, f32),
+    m.SimState: st.builds(m.SimState, source, f32, f32, f32, vector(f32), vector(f32), latitude, longitude),
     m.EstimatorStatus: st.builds(m.EstimatorStatus, source, u64, *[f32] * 8, u16),
 }

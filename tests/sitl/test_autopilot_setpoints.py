@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from autopilot_rig import (
     ALL,
+    ARM,
     FLAVOURS,
     LAND,
     POSITION_YAW,
@@ -20,7 +21,7 @@ from autopilot_rig import (
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mavlink_bridge.messages import PositionTarget, StatusText
+from mavlink_bridge.messages import Heartbeat, PositionTarget, StatusText
 from sitl.flavours import Mode
 
 CALM = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -272,3 +273,53 @@ def test_what_is_followed_is_echoed(flavour, yaws):
     assert len(echoes) == 20
     assert echoes[-1].position == (0.0, 0.0, -5.0)
     assert (echoes[-1].type_mask & 0x400 == 0) == bool(yaws)
+
+
+@pytest.mark.parametrize("loss", ["hold", "descend", "return"])
+def test_px4_goes_on_with_offboard_when_its_set_points_come_back(loss):
+    rig = Rig("px4", offboard_loss=loss).hover(5.0)
+    north = setpoint(VELOCITY_YAW, velocity=(1.0, 0.0, 0.0))
+    rig.steer(2.0, north)
+    rig.run(2.0)
+    assert rig.autopilot.mode is not Mode.GUIDED
+    rig.run(1.0, setpoint(POSITION_YAW, frame=7))
+    assert rig.autopilot.mode is not Mode.GUIDED
+    rig.run(4.0, north)
+    assert rig.autopilot.mode is Mode.GUIDED
+    assert rig.speed == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_mode_that_was_asked_for_is_not_left_when_set_points_come_back():
+    rig = Rig("px4", offboard_loss="hold").hover(5.0)
+    north = setpoint(VELOCITY_YAW, velocity=(1.0, 0.0, 0.0))
+    rig.steer(2.0, north)
+    rig.run(2.0)
+    assert rig.order(LAND) == [0]
+    rig.run(1.0, north)
+    assert rig.autopilot.mode is Mode.LAND
+
+
+def test_px4_comes_back_to_the_mode_that_was_chosen_on_the_ground():
+    rig = Rig("px4")
+    rig.run(1.1)
+    # Any mode can be chosen there, but OFFBOARD does not arm without set-points.
+    assert rig.guided() == [0]
+    assert rig.order(ARM, 1) == [4]
+    up = setpoint(POSITION_YAW, (0.0, 0.0, -3.0))
+    rig.run(1.0, up)
+    assert rig.order(ARM, 1) == [0]
+    rig.run(5.0, up)
+    assert rig.position[2] < -2.0
+    assert rig.order(LAND) == [0]
+    rig.run(15.0)
+    assert not rig.autopilot.armed
+    assert rig.autopilot.mode is Mode.GUIDED
+
+
+@pytest.mark.parametrize(("streams", "beats"), [("normal", 1), ("quiet", 0)])
+def test_an_arducopter_that_talks_to_people_tells_of_another_mode_at_once(streams, beats):
+    rig = Rig("ardupilot", streams=streams)
+    rig.run(1.5)
+    rig.heard.clear()
+    assert rig.guided() == [0]
+    assert [m.custom_mode for m in rig.all(Heartbeat)] == [4] * beats

@@ -34,9 +34,12 @@ from mavlink_bridge.messages import (
     GlobalPosition,
     GpsGlobalOrigin,
     Heartbeat,
+    HighresImu,
     LocalPosition,
     Message,
     Ping,
+    RawImu,
+    SimState,
     Source,
     SysStatus,
     Timesync,
@@ -305,3 +308,32 @@ def test_true_sensors_do_not_depend_on_the_seed():
     config = Rig().config
     a, b = (Autopilot(config, FIREFLY, SITE, seed=seed) for seed in (1, 2))
     assert a.step(0, []) == b.step(0, [])
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_inertial_sensors_feel_the_rotors_and_the_ground(flavour):
+    ids = {"ardupilot": (RawImu, 27), "px4": (HighresImu, 105)}
+    kind, number = ids[flavour]
+    rig = Rig(flavour)
+    rig.run(1.1)
+    rig.order(REQUEST, number)
+    rig.hover(5.0)
+    rig.order(REQUEST, number)
+    standing, hovering = rig.all(kind)
+    for imu in (standing, hovering):
+        assert imu.specific_force == pytest.approx((0.0, 0.0, -9.81), abs=0.03)
+        assert math.hypot(*imu.magnetic_field) == pytest.approx(0.4758, abs=0.002)
+    # Looking east, north is to the left.
+    turned = Rig(flavour, yaw=math.pi / 2)
+    turned.run(1.1)
+    turned.order(REQUEST, number)
+    north, east, down = standing.magnetic_field
+    assert turned.all(kind)[0].magnetic_field == pytest.approx((east, -north, down), abs=0.002)
+
+
+def test_simstate_is_the_truth():
+    rig = Rig("ardupilot", sensors="gnss").hover(5.0)
+    rig.order(REQUEST, 164)
+    (said,) = rig.all(SimState)
+    east, north, _ = SITE.to_enu(said.latitude, said.longitude, SITE.altitude)
+    assert (north, east) == pytest.approx(tuple(rig.position[:2]), abs=0.02)

@@ -198,6 +198,9 @@ def services() -> tuple[Message, ...]:
         m.VfrHud(AUTOPILOT, 1.0, 1.0, ALTITUDE, 0.1, 2.0, 0.4),
         m.Altitude(AUTOPILOT, 7, 1.0, ALTITUDE, 1.0, 1.0, NAN, NAN),
         m.BatteryStatus(AUTOPILOT, 0, 1, 1, (12.4,), 11.0, 700.0, 0.9, 600, 1),
+        m.RawImu(AUTOPILOT, 7, (0.0, 0.0, -9.80665), (0.0, 0.1, 0.2), (0.2, 0.0, 0.4)),
+        m.HighresImu(AUTOPILOT, 7, (0.0, 0.0, -9.8), (0.0, 0.1, 0.2), (0.2, 0.0, 0.4), 960.0, 450.0, 25.0),
+        m.SimState(AUTOPILOT, 0.0, 0.1, 0.2, (0.0, 0.0, -9.8), (0.0, 0.1, 0.2), *place[:2]),
         m.EstimatorStatus(AUTOPILOT, 7, 0.1, 0.1, 0.1, 0.1, NAN, NAN, 0.3, 0.3, 831),
         m.MissionCount(AUTOPILOT, 2, *ground, 0, 5),
     )

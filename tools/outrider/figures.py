@@ -141,7 +141,7 @@ def _plan_time(axes: Axes, flight: Outcome) -> None:
         for q in (50, 99):
             level = float(np.percentile(values, q))
             axes.axvline(level, color="0.2", lw=0.9, ls=":", label=f"p{q} {level:.2f} ms")
-        axes.legend(fontsize=8)
+        axes.legend(fontsize=8, loc="upper right")
     axes.set(title="CPU time of a plan", xlabel="ms", ylabel="plans")
     axes.grid(alpha=0.3)
 

@@ -91,7 +91,7 @@ def _times(rows: Sequence[Row], results: Sequence[Result]) -> Figure:
     axes.set_xticks(places, [f"{row.scenario}\n{row.method}" for row in rows], fontsize=7, rotation=45)
     axes.set(ylabel="s to converge (hatched: stuck)", ylim=(0.0, top))
     axes.grid(axis="y", alpha=0.3)
-    axes.legend()
+    axes.legend(loc="upper left")
     return figure
 
 

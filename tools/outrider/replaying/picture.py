@@ -36,7 +36,7 @@ def draw(name: str, found: Rehearsed, path: Path) -> None:
             above.plot(east, north, color=colour, lw=0.9, label=words)
     above.set(title="from above", xlabel="east, m", ylabel="north, m")
     above.set_aspect("equal", adjustable="datalim")
-    above.legend(fontsize=8)
+    above.legend(fontsize=8, loc="upper right")
     first = None
     for row, (label, axis) in enumerate((("north, m", 0), ("east, m", 1), ("height, m", 2))):
         axes: Axes = figure.add_subplot(grid[row, 1], sharex=first)

@@ -1,0 +1,79 @@
+"""From the ground to where the escort begins: mode, arm, take-off, in the order of the autopilot."""
+
+from __future__ import annotations
+
+from companion.autopilots import Profile, Step
+from companion.calls import Calls
+from companion.tracks import State
+from companion.vehicle import IN_AIR, ON_GROUND, UNDEFINED, Vehicle
+from mavlink_bridge.messages import Message
+
+DO_SET_MODE, ARM_DISARM, NAV_TAKEOFF = 176, 400, 22
+_STILL, _CALM = 0.3, 2_000_000
+"""m/s and µs: slower than this for so long in the air, a take-off is over."""
+_NAN = float("nan")
+
+
+class Takeoff:
+    """The steps of one way up. ``done`` when the last is; ``step`` is the present one."""
+
+    def __init__(self, vehicle: Vehicle, calls: Calls, origin_altitude: float) -> None:
+        """``origin_altitude``: of the fleet frame's zero, m above mean sea level."""
+        self._vehicle = vehicle
+        self._calls = calls
+        self._origin_altitude = origin_altitude
+        self._ground = 0.0
+        self._flying_already = False
+        self._calm_since: int | None = None
+        self._step = 0
+
+    def begin(self, own: State) -> None:
+        """From here, on the ground or where it flies already."""
+        self._ground = float(own.position[2])
+        self._flying_already = self._vehicle.armed and self._vehicle.landed_state != ON_GROUND
+        self._calm_since = None
+        self._step = 0
+
+    def step(self, profile: Profile) -> Step | None:
+        """What is being done; None when all is."""
+        return profile.steps[self._step] if self._step < len(profile.steps) else None
+
+    def disarmed(self, profile: Profile) -> bool:
+        """Whether it is disarmed again, by itself or by somebody, who will not expect it to arm."""
+        return Step.ARM in profile.steps[: self._step] and not self._vehicle.armed
+
+    def advance(self, now: int, profile: Profile, own: State, height: float) -> list[Message]:
+        """Commands to send now on the way to ``height`` (m above the ground)."""
+        vehicle = self._vehicle
+        step = profile.steps[self._step]
+        if step is Step.MODE:
+            done = vehicle.in_guided_mode
+            call = self._calls.call(now, DO_SET_MODE, (*profile.mode_params, 0.0, 0.0, 0.0, 0.0))
+        elif step is Step.ARM:
+            done = vehicle.armed
+            call = self._calls.call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        else:
+            climbed = float(own.position[2]) - self._ground
+            done = self._flying_already or self._is_up(now, own, climbed, height)
+            above_sea = self._origin_altitude + self._ground + height
+            altitude = above_sea if profile.takeoff_absolute else height
+            up = self._flying_already or vehicle.landed_state not in (UNDEFINED, ON_GROUND)
+            call = (
+                [] if up else self._calls.call(now, NAV_TAKEOFF, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude))
+            )
+        if done:
+            self._step += 1
+            self._calls.forget()
+            return []
+        return call
+
+    def _is_up(self, now: int, own: State, climbed: float, height: float) -> bool:
+        """Still at the height asked for; or still for a while in the air, for an estimate of height that
+        drifts by more than one may ask: the autopilot measures its height from its own origin."""
+        still = float(abs(own.velocity).max()) < _STILL
+        if not still or self._vehicle.landed_state != IN_AIR or climbed < 0.5 * height:
+            self._calm_since = None
+        elif self._calm_since is None:
+            self._calm_since = now
+        waited = self._calm_since is not None and now - self._calm_since >= _CALM
+        return waited or (still and abs(climbed - height) < 0.3)

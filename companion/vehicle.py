@@ -1,0 +1,84 @@
+"""What the own autopilot has said of itself: mode, armed, on the ground, checks, warnings."""
+
+from __future__ import annotations
+
+from companion.autopilots import Profile, is_guided
+from companion.autopilots.known import profile_of
+from mavlink_bridge.messages import ExtendedSysState, Heartbeat, Message, StatusText, SysStatus
+
+WARNING = 4
+"""MAV_SEVERITY."""
+ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
+UNDEFINED, ON_GROUND, IN_AIR = 0, 1, 2
+"""MAV_LANDED_STATE; others are on the way up or down."""
+HEARTBEAT_LOST = 3_000_000
+"""µs without a heartbeat after which the autopilot's mode is not known."""
+
+
+class Vehicle:
+    """One autopilot, as heard. Messages are dated by ``tick``: one that has come since the last came then."""
+
+    def __init__(self) -> None:
+        self.heartbeat: Heartbeat | None = None
+        self.profile: Profile | None = None
+        self.said = ""
+        """The last warning: usually why it refuses."""
+        self.status: SysStatus | None = None
+        self._extended: ExtendedSysState | None = None
+        self._beaten: Heartbeat | None = None
+        self._extended_seen: ExtendedSysState | None = None
+        self._now = self._beat_at = self._extended_at = 0
+
+    def hear(self, message: Message) -> None:
+        """One of its messages."""
+        if isinstance(message, Heartbeat):
+            if message.autopilot != INVALID:
+                self.heartbeat = message
+                self.profile = profile_of(message)
+        elif isinstance(message, SysStatus):
+            self.status = message
+        elif isinstance(message, ExtendedSysState):
+            self._extended = message
+        elif isinstance(message, StatusText) and message.severity <= WARNING:
+            self.said = message.text
+
+    def tick(self, now: int) -> None:
+        """It is ``now`` (µs)."""
+        self._now = now
+        if self.heartbeat is not self._beaten:
+            self._beaten, self._beat_at = self.heartbeat, now
+        if self._extended is not self._extended_seen:
+            self._extended_seen, self._extended_at = self._extended, now
+
+    @property
+    def alive(self) -> bool:
+        """Whether its heart beats: whether what it said of its mode still counts."""
+        return self.heartbeat is not None and self._now - self._beat_at <= HEARTBEAT_LOST
+
+    @property
+    def armed(self) -> bool:
+        """As last heard."""
+        return self.heartbeat is not None and bool(self.heartbeat.base_mode & ARMED)
+
+    @property
+    def guided(self) -> bool:
+        """Whether it follows our set-points now."""
+        return self.alive and self.armed and self.in_guided_mode
+
+    @property
+    def in_guided_mode(self) -> bool:
+        """Whether its mode, as last heard, is the one in which set-points steer."""
+        beat, profile = self.heartbeat, self.profile
+        return beat is not None and profile is not None and is_guided(profile, beat)
+
+    @property
+    def healthy(self) -> bool:
+        """Whether its checks before arming have passed."""
+        return self.status is not None and bool(self.status.health & PREARM_OK)
+
+    @property
+    def landed_state(self) -> int:
+        """MAV_LANDED_STATE as last heard, UNDEFINED if that is too long ago."""
+        if self._extended is None or self._now - self._extended_at > HEARTBEAT_LOST:
+            return UNDEFINED
+        return self._extended.landed_state

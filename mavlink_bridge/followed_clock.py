@@ -1,0 +1,148 @@
+"""The clock of another machine, as its messages show it: an autopilot's, which may run ten times as fast as
+the wall's.
+
+A message shows what its sender's clock said when it left; it arrives later by a delay that changes. In the
+plane of arrival and stamp all messages lie on or below the line of those that took no time. That line is laid
+along the upper edge of what the last seconds brought, piece by piece (Moon, Skelly and Towsley, "Estimation
+and removal of clock skew from network delay measurements", 1999), and the clock runs along it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise
+from threading import Lock
+from typing import Final, NamedTuple
+
+from mavlink_bridge.clock import Clock
+
+_PIECE: Final = 250_000
+"""µs of the wall; of each piece the stamp that took the shortest way counts."""
+_MEMORY: Final = 24
+"""Pieces: six seconds."""
+_ENOUGH: Final = 4
+"""Pieces that a rate is learnt from."""
+_STEP: Final = 500_000
+"""µs of the wall: a stamp off the line by more tells of a clock that was set, stopped or began anew."""
+_WITNESSES: Final = 5
+SLOWEST, FASTEST = 0.02, 100.0
+"""Rates beyond are none of a simulator's."""
+
+
+class _Seen(NamedTuple):
+    """A stamp (µs) that arrived at ``wall`` (µs)."""
+
+    wall: int
+    stamp: int
+
+
+class FollowedClock:
+    """A ``Clock`` that shows what the stamps do, from ``begin`` (µs) on; it never goes back.
+
+    Before the first stamp it runs as ``clock`` does. Where stamps jump, by more than half a second of the
+    wall, it goes on as before and follows them from there: ``steps`` counts that. ``rate``: of it against
+    ``clock``. May be fed by one thread and read by others.
+    """
+
+    def __init__(self, clock: Clock, begin: int = 0) -> None:
+        self._clock = clock
+        self._lock = Lock()
+        self._wall, self._shown = clock.now(), float(begin)
+        self._latest = begin
+        self._base: float | None = None
+        self._pieces: deque[_Seen] = deque(maxlen=_MEMORY)
+        self._best: _Seen | None = None
+        self._begun = 0
+        self._strayed = 0
+        self._known = False
+        self.rate = 1.0
+        self.steps = 0
+
+    def now(self) -> int:
+        """What it shows, µs."""
+        with self._lock:
+            return self._read(self._clock.now())
+
+    def wait_until(self, instant: int) -> None:
+        """Sleep until it shows ``instant`` (µs)."""
+        while (left := instant - self.now()) > 0:
+            # The line may be laid anew meanwhile: look again from time to time.
+            pause = min(left / self.rate, _PIECE)
+            self._clock.wait_until(self._clock.now() + max(1, round(pause)))
+
+    def observe(self, wall: int, stamp: int) -> None:
+        """A message with ``stamp`` (µs of the sender's clock) arrived at ``wall`` (µs of ``clock``)."""
+        with self._lock:
+            if self._base is None:
+                self._lay(wall, stamp)
+                return
+            ahead = stamp + self._base - self._line(wall)
+            if self._known and abs(ahead) > _STEP * max(1.0, self.rate):
+                self._strayed += 1
+                if self._strayed >= _WITNESSES:
+                    self.steps += 1
+                    self._lay(wall, stamp)
+                return
+            self._strayed = 0
+            self._gather(_Seen(wall, stamp))
+
+    # Own, under the lock
+
+    def _line(self, wall: int) -> float:
+        return self._shown + self.rate * (wall - self._wall)
+
+    def _read(self, wall: int) -> int:
+        self._latest = max(self._latest, int(self._line(wall)))
+        return self._latest
+
+    def _lay(self, wall: int, stamp: int) -> None:
+        """Go on from what it shows, with the stamps from ``stamp`` on."""
+        shown = float(self._read(wall))
+        self._wall, self._shown = wall, shown
+        self._base = shown - stamp
+        self._strayed = 0
+        self._known = False
+        self._pieces.clear()
+        self._best, self._begun = _Seen(wall, stamp), wall
+
+    def _gather(self, seen: _Seen) -> None:
+        best = self._best
+        if best is None:
+            self._best, self._begun = seen, seen.wall
+            return
+        if seen.stamp - best.stamp > self.rate * (seen.wall - best.wall):
+            self._best = best = seen
+        if seen.wall - self._begun >= _PIECE:
+            self._pieces.append(best)
+            self._best = None
+            self._fit(seen.wall)
+
+    def _fit(self, wall: int) -> None:
+        """The line anew, from ``wall`` on."""
+        pieces, base = self._pieces, self._base
+        if base is None or len(pieces) < _ENOUGH:
+            return
+        rate = min(FASTEST, max(SLOWEST, _slope_above(pieces)))
+        height = max(piece.stamp - rate * (piece.wall - wall) for piece in pieces)
+        if not self._known:
+            # Nobody has relied on the rate yet: go on without a jump.
+            base = self._base = self._read(wall) - height
+            self._known = True
+        self._wall, self._shown, self.rate = wall, height + base, rate
+
+
+def _slope_above(pieces: Sequence[_Seen]) -> float:
+    """Slope of the line above all ``pieces`` that is nearest to them: the edge of their upper hull in the
+    middle of their time."""
+    hull: list[_Seen] = []
+    for point in pieces:
+        while len(hull) > 1 and _slope(hull[-2], hull[-1]) <= _slope(hull[-1], point):
+            hull.pop()
+        hull.append(point)
+    middle = (pieces[0].wall + pieces[-1].wall) / 2
+    return next(_slope(a, b) for a, b in pairwise(hull) if b.wall >= middle)
+
+
+def _slope(a: _Seen, b: _Seen) -> float:
+    return (b.stamp - a.stamp) / (b.wall - a.wall)

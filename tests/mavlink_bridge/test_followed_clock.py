@@ -1,0 +1,117 @@
+"""Laws of a clock that follows another: it shows what that shows, whatever its rate, and never goes back."""
+
+from __future__ import annotations
+
+import random
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mavlink_bridge.clock import SimulatedClock
+from mavlink_bridge.followed_clock import FollowedClock
+
+SECOND = 1_000_000
+
+
+class Sender:
+    """Sends its time at 50 Hz of its own; each takes ``delay`` µs of the wall and up to ``jitter`` more, and
+    is read when someone looks, every ``look`` µs."""
+
+    def __init__(self, rate, *, boot=7 * SECOND, delay=2_000, jitter=10_000, look=20_000, seed=0):
+        self.rate, self.boot = rate, boot
+        self._delay, self._jitter, self._look = delay, jitter, look
+        self._random = random.Random(seed)
+        self._sent = -1
+
+    def time(self, wall):
+        return self.boot + int(self.rate * wall)
+
+    def follow(self, wall_clock, followed, seconds, observer=None):
+        """Let ``seconds`` of the wall pass; what ``observer(wall)`` sees."""
+        if self._sent < 0:
+            self._sent = round(wall_clock.now() * self.rate / 20_000)
+        end = wall_clock.now() + round(seconds * SECOND)
+        waiting = []
+        while wall_clock.now() < end:
+            wall = wall_clock.now()
+            while self._sent * 20_000 / self.rate <= wall:
+                left = self._sent * 20_000 / self.rate
+                arrives = left + self._delay + self._random.random() * self._jitter
+                waiting.append((arrives, self.time(left)))
+                self._sent += 1
+            for arrives, stamp in [pair for pair in waiting if pair[0] <= wall]:
+                followed.observe(wall, stamp // 1000 * 1000)
+                waiting.remove((arrives, stamp))
+            if observer is not None:
+                observer(wall)
+            wall_clock.wait_until(wall + self._look)
+
+
+@given(
+    rate=st.sampled_from((0.5, 0.99, 1.0, 1.0002, 1.011, 5.0, 10.0)),
+    seed=st.integers(0, 50),
+    jitter=st.integers(0, 30_000),
+)
+@settings(max_examples=40, deadline=None)
+def test_it_shows_what_the_sender_shows_at_any_rate(rate, seed, jitter):
+    wall = SimulatedClock(123 * SECOND)
+    sender = Sender(rate, jitter=jitter, seed=seed)
+    clock = FollowedClock(wall, begin=1000)
+    sender.follow(wall, clock, 8.0)
+    begin = sender.time(wall.now()) - clock.now()
+    off = []
+    sender.follow(wall, clock, 20.0, lambda t: off.append(sender.time(t) - clock.now() - begin))
+    # What is looked at every 20 ms is known no better, as the sender counts time.
+    assert max(abs(value) for value in off) <= rate * (2 * 20_000 + jitter)
+    assert clock.rate == pytest.approx(rate, rel=0.01)
+    assert clock.steps == 0
+
+
+@pytest.mark.parametrize("rate", [1.0, 10.0])
+def test_it_never_goes_back_and_goes_on_when_the_sender_began_anew(rate):
+    wall = SimulatedClock(SECOND)
+    clock = FollowedClock(wall)
+    shown = []
+    sender = Sender(rate)
+    sender.follow(wall, clock, 5.0, lambda _t: shown.append(clock.now()))
+    again = Sender(rate, boot=-round(rate * wall.now()))
+    again.follow(wall, clock, 5.0, lambda _t: shown.append(clock.now()))
+    assert clock.steps == 1
+    steps = [b - a for a, b in pairwise(shown)]
+    assert min(steps) >= 0
+    # It did not stand still either, for longer than it takes to believe it.
+    assert max(steps) <= rate * 60_000
+    assert sum(steps) == pytest.approx(rate * 10 * SECOND, rel=0.2)
+
+
+def test_one_stamp_that_is_damaged_changes_nothing():
+    wall = SimulatedClock(SECOND)
+    clock = FollowedClock(wall)
+    sender = Sender(1.0)
+    sender.follow(wall, clock, 4.0)
+    before = clock.now()
+    for stamp in (0, 1 << 40, 3, 1 << 31):
+        clock.observe(wall.now(), stamp)
+    assert clock.now() == before
+    assert clock.steps == 0
+
+
+def test_without_a_sender_it_runs_as_the_wall_does():
+    wall = SimulatedClock(SECOND)
+    clock = FollowedClock(wall, begin=40)
+    clock.wait_until(5 * SECOND)
+    assert clock.now() == 5 * SECOND
+    assert wall.now() == pytest.approx(6 * SECOND - 40, abs=2)
+
+
+@pytest.mark.parametrize("rate", [1.0, 10.0])
+def test_it_waits_as_long_as_the_sender_takes(rate):
+    wall = SimulatedClock(SECOND)
+    clock = FollowedClock(wall)
+    Sender(rate).follow(wall, clock, 6.0)
+    began, shown = wall.now(), clock.now()
+    clock.wait_until(shown + SECOND)
+    assert wall.now() - began == pytest.approx(SECOND / rate, rel=0.02)
+    assert clock.now() >= shown + SECOND
