@@ -62,32 +62,32 @@ class WallClock:
 
 
 class PacedClock:
-    """Simulated time: from 0 on, ``speed`` times as fast as ``clock``. It is never more than ``stride`` (µs)
-    past the instant last waited for: what whoever runs by it cannot keep up with is given up, and counted in
-    ``lost`` (µs), so that nobody ever has to make up for more than a stride at once.
+    """Simulated time: from 0 on, ``speed`` times as fast as ``clock``. Between two waits it goes no further
+    than ``stride`` (µs): what whoever runs by it cannot keep up with is given up, and counted in ``lost``
+    (µs), so that nobody ever has to make up for more than a stride at once.
     """
 
     def __init__(self, clock: Clock, speed: float, stride: int) -> None:
         self._clock, self._speed, self._stride = clock, speed, stride
         self._start = clock.now()
-        self._reached = 0
+        self._most = stride
         self.lost = 0
 
     def now(self) -> int:
         """Simulated time, µs."""
         shown = int((self._clock.now() - self._start) * self._speed) - self.lost
-        beyond = shown - self._reached - self._stride
-        if beyond > 0:
-            self.lost += beyond
-            shown -= beyond
+        if shown > self._most:
+            self.lost += shown - self._most
+            return self._most
         return shown
 
     def wait_until(self, instant: int) -> None:
         """Until it is ``instant`` (µs, simulated)."""
+        self._most = max(self._most, instant + self._stride)
         while self.now() < instant:
-            # Within the loop, as what is lost meanwhile makes it later; a µs more, for the rounding.
+            # Again and again, as what is lost meanwhile makes it later; a µs more, for the rounding.
             self._clock.wait_until(self._start + int((instant + self.lost) / self._speed) + 1)
-        self._reached = max(self._reached, instant)
+        self._most = self.now() + self._stride
 
 
 class SkewedClock:

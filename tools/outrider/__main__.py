@@ -109,6 +109,7 @@ def sitl(
         str, typer.Option(help="quick, or realistic: GPS and estimator take their time.")
     ] = "quick",
     origin: Annotated[Optional[str], typer.Option(help="LATITUDE,LONGITUDE[,ALTITUDE].")] = None,  # noqa: UP045
+    wind: Annotated[Optional[str], typer.Option(help="m/s towards east, or EAST,NORTH[,UP].")] = None,  # noqa: UP045
     spacing: Annotated[float, typer.Option(min=0.0, max=1000.0, help="m between vehicles.")] = 3.0,
     seed: Annotated[int, typer.Option(min=0, help="Of sensors' noise.")] = 1,
     state: Annotated[
@@ -122,13 +123,15 @@ def sitl(
     ] = False,
 ) -> None:
     """Emulate vehicles that MAVSDK, MAVProxy, pymavlink and ground stations can connect to, until Ctrl-C."""
-    from outrider.hangar.command import Options, run
-    from outrider.hangar.request import request
+    from outrider.hangar.command import Terms, run
+    from outrider.hangar.request import Options, checked
 
-    asked = request(
-        count, first_id, flavour, vehicle, sensors, physics, startup, origin, spacing, speedup, seed
+    asked = checked(
+        Options(
+            count, first_id, flavour, vehicle, sensors, physics, startup, origin, wind, spacing, speedup, seed
+        )
     )
-    raise typer.Exit(run(asked, Options(port_base, tuple(to or ()), host, state, seconds, as_json)))
+    raise typer.Exit(run(asked, Terms(port_base, tuple(to or ()), host, state, seconds, as_json)))
 
 
 @app.command()

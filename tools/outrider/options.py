@@ -58,7 +58,7 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
     if options.physics is not None:
         changes["physics"] = options.physics
     if options.wind is not None:
-        changes["weather"] = {**scenario.weather.model_dump(), "wind": _wind(options.wind)}
+        changes["weather"] = {**scenario.weather.model_dump(), "wind": wind_of(options.wind)}
     if options.replan_hz is not None:
         replan = _replan_us(options.replan_hz, scenario)
         companion["rates"] = {**scenario.companion.rates.model_dump(), "replan_us": replan}
@@ -133,8 +133,8 @@ def _shortest(period: int) -> str:
     return next(text for text in texts if float(text) and round(1e6 / float(text)) == period)
 
 
-def _wind(text: str) -> list[float]:
-    """``V`` m/s towards east, or ``EAST,NORTH`` or ``EAST,NORTH,UP``."""
+def wind_of(text: str) -> list[float]:
+    """East, north, up, from ``V`` m/s towards east, or ``EAST,NORTH`` or ``EAST,NORTH,UP``. InputError."""
     try:
         parts = [float(word) for word in text.split(",")]
     except ValueError:

@@ -28,7 +28,7 @@ _LOOK: Final = 0.1
 """s between two looks at the board."""
 
 
-class Options(NamedTuple):
+class Terms(NamedTuple):
     """How it runs. ``seconds`` of wall time until it ends by itself."""
 
     port_base: int | None
@@ -39,19 +39,19 @@ class Options(NamedTuple):
     as_json: bool
 
 
-def run(asked: Request, options: Options) -> int:
+def run(asked: Request, terms: Terms) -> int:
     """Until Ctrl-C, SIGTERM, or the time is over; the exit status. InputError for what cannot be opened,
     OutriderError if a process ends by itself."""
     began = time.monotonic()
-    prepare(options.state, asked.flavour, asked.systems)
-    places = _addresses(asked, options)
-    crew = Crew(asked, wire(places, WallClock()), options.state)
+    prepare(terms.state, asked.flavour, asked.systems)
+    places = _addresses(asked, terms)
+    crew = Crew(asked, wire(places, WallClock()), terms.state)
     with _stopping() as stopped:
         try:
             crew.start()
             _wait(crew, stopped, asked.count)
-            until = math.inf if options.seconds is None else time.monotonic() + options.seconds
-            if options.as_json and not stopped:
+            until = math.inf if terms.seconds is None else time.monotonic() + terms.seconds
+            if terms.as_json and not stopped:
                 _say(ready(asked, places))
             with watching(asked, places, crew.board) as look:
                 while not stopped and time.monotonic() < until:
@@ -60,15 +60,15 @@ def run(asked: Request, options: Options) -> int:
                     look()
         finally:
             crew.stop()
-    if options.as_json:
+    if terms.as_json:
         _say(summary(asked, crew.board, time.monotonic() - began))
     return 0
 
 
-def _addresses(asked: Request, options: Options) -> list[Address]:
+def _addresses(asked: Request, terms: Terms) -> list[Address]:
     try:
-        more = tuple(extra(text, asked.count) for text in options.to)
-        places = addresses(asked.flavour, asked.count, options.port_base, options.host, more)
+        more = tuple(extra(text, asked.count) for text in terms.to)
+        places = addresses(asked.flavour, asked.count, terms.port_base, terms.host, more)
     except EndpointError as error:
         raise InputError(f"--to {error}") from None
     open_to_all = [str(one) for one in places[0].endpoints if exposed(one)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import time
 from math import ceil
 from multiprocessing.process import BaseProcess
@@ -15,7 +14,8 @@ from outrider.errors import OutriderError
 from outrider.hangar.board import Board
 from outrider.hangar.request import Request
 from outrider.hangar.worker import PERIOD, Worker
-from sitl.node import Autopilot
+from outrider.sweeps.execution import cores
+from sitl.saved import Saved
 
 FULL: Final = 10
 """So many vehicles at real-time speed are one process's work before there is another."""
@@ -23,10 +23,10 @@ _FAREWELL: Final = 5.0
 """s that a process has to end by itself."""
 
 
-def squads(asked: Request, cores: int) -> list[list[int]]:
-    """The indices of all vehicles, for each process those that it has."""
+def squads(asked: Request, most: int) -> list[list[int]]:
+    """The indices of all vehicles, for each of up to ``most`` processes those that it has."""
     busy = ceil(asked.count * max(asked.speed, 1.0) / FULL)
-    number = min(asked.count, max(cores, 1), busy)
+    number = min(asked.count, most, busy)
     return [list(range(squad, asked.count, number)) for squad in range(number)]
 
 
@@ -35,7 +35,7 @@ class Crew:
 
     def __init__(self, asked: Request, links: list[list[Link]], state: Path | None) -> None:
         self._asked, self._links = asked, links
-        self.squads = squads(asked, len(os.sched_getaffinity(0)))
+        self.squads = squads(asked, cores())
         self.board = Board(asked.count, len(self.squads))
         self._workers = [
             Worker(number, indices, asked, {str(index): links[index] for index in indices}, self.board, state)
@@ -45,7 +45,7 @@ class Crew:
 
     def start(self) -> None:
         """Compile, and fork."""
-        first = Autopilot(self._asked.config(0, 0), self._asked.vehicle, self._asked.frame, self._asked.seed)
+        first = self._asked.autopilot(0, 0, Saved())
         for now in (0, PERIOD):
             first.step(now, [])
         fork = multiprocessing.get_context("fork")

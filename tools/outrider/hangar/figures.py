@@ -51,6 +51,13 @@ def summary(asked: Request, board: Board, wall: float) -> dict[str, Value]:
     }
 
 
-def factor(paces: Sequence[Pace]) -> float:
-    """Simulated over wall time, of the slowest process."""
-    return min((pace.simulated / pace.wall for pace in paces if pace.wall), default=0.0)
+def factor(paces: Sequence[Pace], since: Sequence[Pace] = ()) -> float:
+    """Simulated over wall time, of the slowest process; of what came after ``since``, if anything did."""
+    before = since or [Pace()] * len(paces)
+    spans = [
+        (pace.simulated - then.simulated, pace.wall - then.wall)
+        for pace, then in zip(paces, before, strict=True)
+    ]
+    if since and not all(wall > 0.0 for _, wall in spans):
+        return factor(paces)
+    return min((simulated / wall for simulated, wall in spans if wall > 0.0), default=0.0)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from math import ceil, isfinite, sqrt
 from typing import Final, Literal, cast, get_args
 
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Vector
 from outrider.errors import InputError
+from outrider.options import wind_of
 from outrider.resources import find
 from outrider.scenario_places import Origin
 from outrider.yaml_file import load
@@ -16,7 +18,10 @@ from sitl.autopilot_config import AutopilotConfig
 from sitl.backends.physics import PhysicsName
 from sitl.battery import BatteryConfig
 from sitl.config import VehicleConfig
+from sitl.node import Autopilot
 from sitl.profiles import ProfileName
+from sitl.saved import Saved
+from sitl.weather import WeatherConfig
 
 FlavourName = Literal["ardupilot", "px4"]
 StartupName = Literal["quick", "realistic"]
@@ -25,6 +30,27 @@ MOST_ID: Final = 254
 """255 is what ground stations take."""
 _READY_AFTER: Final = {"ardupilot": 30.0, "px4": 20.0}
 # s from boot; ArduCopter's GPS and EKF take about 40, PX4's less.
+
+
+_PLACE: Final = "LATITUDE,LONGITUDE[,ALTITUDE], ±89 and ±180 degrees, −500 to 9000 m above the sea"
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line says, as it says it."""
+
+    count: int = 1
+    first_id: int = 1
+    flavour: str = "ardupilot"
+    vehicle: str = "firefly"
+    sensors: str = "truth"
+    physics: str = "own"
+    startup: str = "quick"
+    origin: str | None = None
+    wind: str | None = None
+    spacing: float = 3.0
+    speedup: float = 1.0
+    seed: int = 1
 
 
 @dataclass(frozen=True)
@@ -40,6 +66,7 @@ class Request:
     physics: PhysicsName
     startup: StartupName
     origin: Origin
+    weather: WeatherConfig
     spacing: float
     speed: float
     seed: int
@@ -59,8 +86,13 @@ class Request:
         width = ceil(sqrt(self.count))
         return self.spacing * (index % width), self.spacing * (index // width), 0.0
 
-    def config(self, index: int, epoch: int) -> AutopilotConfig:
-        """The settings of a vehicle that boots at ``epoch`` (Unix µs)."""
+    def autopilot(self, index: int, epoch: int, saved: Saved) -> Autopilot:
+        """A vehicle that boots at ``epoch`` (Unix µs) with what it ``saved`` before."""
+        return Autopilot(
+            self._config(index, epoch), self.vehicle, self.frame, self.seed, weather=self.weather, saved=saved
+        )
+
+    def _config(self, index: int, epoch: int) -> AutopilotConfig:
         latitude, longitude, altitude = self.frame.to_geodetic(self.place(index))
         changes: dict[str, object] = {}
         if self.startup == "realistic":
@@ -80,61 +112,63 @@ class Request:
         )
 
 
-def request(
-    count: int,
-    first_id: int,
-    flavour: str,
-    vehicle: str,
-    sensors: str,
-    physics: str,
-    startup: str,
-    origin: str | None,
-    spacing: float,
-    speed: float,
-    seed: int,
-) -> Request:
+def checked(options: Options) -> Request:
     """The options as a request. InputError with a line for each that is wrong."""
-    wrong: list[str] = []
-
-    def word(option: str, given: str, allowed: tuple[str, ...]) -> str:
-        if given not in allowed:
-            wrong.append(f"--{option} {given}: allowed are {', '.join(allowed)}")
-        return given
-
-    word("flavour", flavour, get_args(FlavourName))
-    word("sensors", sensors, get_args(ProfileName))
-    word("physics", physics, get_args(PhysicsName))
-    word("startup", startup, get_args(StartupName))
-    last = first_id + count - 1
+    words: dict[str, tuple[str, ...]] = {
+        "flavour": get_args(FlavourName),
+        "sensors": get_args(ProfileName),
+        "physics": get_args(PhysicsName),
+        "startup": get_args(StartupName),
+    }
+    wrong = [
+        f"--{name} {given}: allowed are {', '.join(allowed)}"
+        for name, allowed in words.items()
+        if (given := getattr(options, name)) not in allowed
+    ]
+    wrong += [
+        f"--{name} {given}: allowed is a finite number"
+        for name in ("spacing", "speedup")
+        if not isfinite(given := getattr(options, name))
+    ]
+    last = options.first_id + options.count - 1
     if last > MOST_ID:
-        wrong.append(f"--count {count} from --first-id {first_id}: system ids go up to {MOST_ID}, not {last}")
-    place = Origin() if origin is None else _origin(origin, wrong)
-    if wrong:
+        wrong.append(
+            f"--count {options.count} from --first-id {options.first_id}: system ids would go up to {last}; "
+            f"allowed is {MOST_ID}, as 255 is a ground station's"
+        )
+    origin = Origin() if options.origin is None else _origin(options.origin)
+    if origin is None:
+        wrong.append(f"--origin {options.origin}: allowed is {_PLACE}")
+    if wrong or origin is None:
         raise InputError(*wrong)
+    weather = WeatherConfig()
+    if options.wind is not None:
+        weather = WeatherConfig.model_validate({"wind": wind_of(options.wind)})
+    if options.physics == "jsbsim":
+        # A package that is missing is named before anything is opened.
+        import_module("jsbsim")
     return Request(
-        count,
-        first_id,
-        cast("FlavourName", flavour),
-        load(find("vehicles", vehicle), VehicleConfig),
-        cast("ProfileName", sensors),
-        cast("PhysicsName", physics),
-        cast("StartupName", startup),
-        place,
-        spacing,
-        speed,
-        seed,
+        options.count,
+        options.first_id,
+        cast("FlavourName", options.flavour),
+        load(find("vehicles", options.vehicle), VehicleConfig),
+        cast("ProfileName", options.sensors),
+        cast("PhysicsName", options.physics),
+        cast("StartupName", options.startup),
+        origin,
+        weather,
+        options.spacing,
+        options.speedup,
+        options.seed,
     )
 
 
-def _origin(text: str, wrong: list[str]) -> Origin:
-    """LAT,LON[,ALT]."""
-    form = "LATITUDE,LONGITUDE[,ALTITUDE], degrees within ±89 and ±180, and m above the sea from −500 to 9000"
+def _origin(text: str) -> Origin | None:
+    """What ``_PLACE`` says; None if it is not that."""
     try:
         numbers = [float(part) for part in text.split(",")]
-        if len(numbers) not in (2, 3) or not all(map(isfinite, numbers)):
-            raise ValueError
-        fields = dict(zip(("latitude", "longitude", "altitude"), numbers, strict=False))
-        return Origin.model_validate(fields)
+        if len(numbers) not in (2, 3):
+            return None
+        return Origin.model_validate(dict(zip(("latitude", "longitude", "altitude"), numbers, strict=False)))
     except ValueError:
-        wrong.append(f"--origin {text}: allowed is {form}")
-        return Origin()
+        return None

@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from outrider.hangar.addresses import Address
-from outrider.hangar.board import Board, Gauges
+from outrider.hangar.board import Board, Gauges, Pace
 from outrider.hangar.chronicle import Chronicle
 from outrider.hangar.figures import factor
 from outrider.hangar.modes import mode_name
@@ -25,6 +25,8 @@ _REFRESH: Final = 0.5
 """s between two pictures."""
 _WINDOW: Final = 4
 """Pictures over which messages per second are counted."""
+_LATELY: Final = 11
+"""Pictures over which the real-time factor is taken: it is news once a second."""
 _EVENTS: Final = 6
 _FRAME: Final = 6
 # Lines of the terminal that are neither vehicles nor events.
@@ -32,9 +34,9 @@ _WIDE: Final = 96
 # Columns from which on there is room for hosts.
 _COLUMNS: Final[dict[str, Literal["left", "right"]]] = {
     "id": "right",
-    "connect to": "left",
+    "port": "left",
     "mode": "left",
-    "armed": "left",
+    "arm": "left",
     "east": "right",
     "north": "right",
     "up": "right",
@@ -55,6 +57,7 @@ class Screen:
         self._chronicle = Chronicle(asked, board)
         self._events: deque[str] = deque(maxlen=_EVENTS)
         self._counts: deque[tuple[float, list[tuple[int, int]]]] = deque(maxlen=_WINDOW)
+        self._paces: deque[list[Pace]] = deque(maxlen=_LATELY)
         self._drawn = 0.0
         # Without a thread of its own, which would take turns from the vehicles' processes.
         self.live = Live(console=console, auto_refresh=False)
@@ -71,22 +74,25 @@ class Screen:
         every = [self._board.gauges(index) for index in range(self._asked.count)]
         self._counts.append((now, [(gauges.received, gauges.sent) for gauges in every]))
         shown = max(1, min(self._asked.count, self._console.size.height - _FRAME - _EVENTS))
-        table = Table(title=self._title(), title_justify="left", box=box.SIMPLE, padding=(0, 1, 0, 0))
+        table = Table(
+            title=self._title(), title_justify="left", box=box.SIMPLE, padding=(0, 1, 0, 0), show_edge=False
+        )
         for name, justify in _COLUMNS.items():
             table.add_column(name, justify=justify, no_wrap=True)
         for index in range(shown):
             table.add_row(*self._row(index, every[index]))
-        if shown < self._asked.count:
-            table.caption = f"and {self._asked.count - shown} more"
+        more = f"and {self._asked.count - shown} more · " if shown < self._asked.count else ""
+        table.caption = f"{more}Ctrl-C ends"
         return Group(table, *(Text(line) for line in self._events))
 
     def _title(self) -> str:
         asked = self._asked
-        paces = self._board.paces()
-        late = max(pace.late_p99 for pace in paces) / asked.speed
+        self._paces.append(self._board.paces())
+        first, last = self._paces[0], self._paces[-1]
+        late = max(pace.late_p99 for pace in last) / asked.speed
         return (
-            f"{asked.count} × {asked.vehicle.name}, {asked.flavour} · {max(p.simulated for p in paces):.0f} s"
-            f" · {factor(paces):.2f} × real time · late by {late:.1f} ms (p99) · Ctrl-C ends"
+            f"{asked.count} × {asked.vehicle.name}, {asked.flavour} · {last[0].simulated:.0f} s"
+            f" · {factor(last, first):.2f} × real time · {late:.1f} ms late (p99)"
         )
 
     def _row(self, index: int, gauges: Gauges) -> tuple[str, ...]:

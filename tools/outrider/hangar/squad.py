@@ -7,6 +7,7 @@ from typing import Final
 
 from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.node import Datagram
+from outrider.errors import OutriderError
 from outrider.hangar.board import Board, Gauges
 from outrider.hangar.traffic import Traffic
 from sitl.node import LINK, Autopilot
@@ -38,8 +39,9 @@ class Squad:
     def __init__(self, vehicles: Mapping[int, Autopilot], first_id: int, board: Board, speed: float) -> None:
         """``vehicles`` by their index among all, which is their row on the ``board``;
         ``first_id``: the system id of index 0; ``speed`` of time."""
+        spread = round(SPREAD * min(speed, 1.0))
         self.seats = [
-            Seat(index, node, first_id + index, SPREAD * number // len(vehicles))
+            Seat(index, node, first_id + index, spread * number // len(vehicles))
             for number, (index, node) in enumerate(vehicles.items())
         ]
         self._board = board
@@ -57,7 +59,11 @@ class Squad:
             arrived = mail.get(seat.link, [])
             for datagram in arrived:
                 seat.traffic.receive(datagram.data)
-            for datagram in seat.node.step(now, arrived):
+            try:
+                said = seat.node.step(now, arrived)
+            except Exception as error:
+                raise OutriderError(f"vehicle {seat.system}: {type(error).__name__}: {error}") from error
+            for datagram in said:
                 seat.traffic.send(datagram.data)
                 leaving.append(Datagram(seat.link, datagram.data))
         return leaving

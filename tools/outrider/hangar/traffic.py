@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from mavlink_bridge.framing import claimed_length
+from mavlink_bridge.framing import STARTS, claimed_length
 
 _STATUSTEXT: Final = 253
 _HEADER: Final = 10
@@ -23,11 +23,16 @@ class Traffic:
         self.sayings: list[str] = []
 
     def receive(self, data: bytes) -> None:
-        """``data`` came in, which may be anything."""
+        """``data`` came in, which may be anything: what looks like a frame is counted."""
         at = 0
-        while at < len(data) and (length := claimed_length(data, at)) is not None:
-            at += length
-            self.received += 1
+        while at < len(data):
+            length = claimed_length(data, at)
+            if length is None:
+                start = STARTS.search(data, at + 1)
+                at = len(data) if start is None else start.start()
+            else:
+                at += length
+                self.received += 1
 
     def send(self, data: bytes) -> None:
         """``data`` goes out, version 2 frames."""

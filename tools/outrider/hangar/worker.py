@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -13,19 +14,20 @@ from typing import Final
 from mavlink_bridge.clock import PacedClock, WallClock
 from mavlink_bridge.garbage import IdleCollector
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.links.streams import StreamLink
-from mavlink_bridge.links.udp import UdpListener
 from mavlink_bridge.priority import sharpen_timers
 from mavlink_bridge.realtime import RealTime
 from mavlink_bridge.runtime import Scheduled
 from outrider.hangar.board import Board, Pace
 from outrider.hangar.cabinet import Cabinet
+from outrider.hangar.clients import Clients
 from outrider.hangar.request import Request
 from outrider.hangar.squad import Squad
-from sitl.node import Autopilot
 
 PERIOD: Final = 10_000
-"""µs (simulated) between two steps."""
+"""µs (simulated) between two steps, up to 10 times real time; then more."""
+_FASTEST, _LONGEST = 10.0, 5.0
+_GRID: Final = 2500
+# µs; usual steps of physics.
 STRIDE: Final = 250_000
 """µs (simulated) that are made up for at once when the machine was busy; what is more is lost."""
 _SHOWN: Final = 1.0
@@ -57,6 +59,8 @@ class Worker:
         try:
             self._run()
         except Exception as error:
+            if os.environ.get("OUTRIDER_TRACEBACK"):
+                traceback.print_exc()
             self._board.fail(self._number, f"{type(error).__name__}: {error}")
             sys.exit(3)
         sys.exit(0)
@@ -68,29 +72,25 @@ class Worker:
         asked, wall = self._asked, WallClock()
         cabinet = Cabinet(self._state, asked.flavour)
         vehicles = {
-            index: Autopilot(
-                asked.config(index, wall.now()),
-                asked.vehicle,
-                asked.frame,
-                asked.seed,
-                saved=cabinet.saved(asked.systems[index]),
-            )
+            index: asked.autopilot(index, wall.now(), cabinet.saved(asked.systems[index]))
             for index in self._indices
         }
+        clients = Clients(self.links, wall)
         squad = Squad(vehicles, asked.first_id, self._board, asked.speed)
         with IdleCollector() as garbage:
             clock = PacedClock(wall, asked.speed, STRIDE)
             loop = RealTime(
-                Scheduled(squad, PERIOD),
+                Scheduled(squad, period(asked.speed)),
                 self.links,
                 clock,
+                tolerance=round(PERIOD * max(asked.speed, 1.0)),
                 on_idle=lambda left: garbage.idle(int(left / asked.speed)),
             )
             began, looked = time.monotonic(), 0.0
 
             def look(now: int) -> None:
                 nonlocal looked
-                squad.show(now, self._clients)
+                squad.show(now, clients)
                 elapsed = time.monotonic() - began
                 if elapsed - looked >= _SHOWN:
                     looked = elapsed
@@ -103,8 +103,11 @@ class Worker:
                 cabinet.keep(squad)
                 self._board.show_pace(self._number, _pace(loop, clock.now(), time.monotonic() - began))
 
-    def _clients(self, link: str) -> int:
-        return sum(one.peers for one in self.links[link] if isinstance(one, StreamLink | UdpListener))
+
+def period(speed: float) -> int:
+    """µs (simulated) between two steps when time is ``speed`` times as fast: on the wall 1 ms or more, as
+    long as that leaves telemetry at 20 Hz in peace."""
+    return round(PERIOD * min(max(speed / _FASTEST, 1.0), _LONGEST)) // _GRID * _GRID
 
 
 def _pace(loop: RealTime, now: int, wall: float) -> Pace:
