@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 
 def run(path: Path, **more: str) -> subprocess.CompletedProcess[str]:
-    """The script in a folder of its own, with one client that has no wheel and one that needs none; offline."""
+    """The script in a folder of its own, with a client that has no wheel and one that needs none; offline."""
     (path / "tools").mkdir()
     for name in ("bootstrap.py", "client_environments.py"):
         shutil.copy(TOOLS / name, path / "tools")
