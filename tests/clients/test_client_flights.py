@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
@@ -37,18 +38,20 @@ def launch(client: str, sitl: Sitl, index: int) -> Client:
 @pytest.fixture(scope="module")
 def flights() -> Iterator[dict[tuple[str, str], Flight]]:
     """By client and flavour."""
-    px4, ardupilot = (Sitl(flavour, len(CLIENTS), speedup=SPEEDUP) for flavour in FLAVOURS)
     there = [(index, client) for index, client in enumerate(CLIENTS) if available(client)]
-    with px4, ardupilot:
-        flying = {(client, "px4"): launch(client, px4, index) for index, client in there}
-        ardupilot.start()
-        flying |= {(client, "ardupilot"): launch(client, ardupilot, index) for index, client in there}
-        px4.start()
-        try:
-            yield {which: client.flight() for which, client in flying.items()}
-        finally:
-            for client in flying.values():
-                client.end()
+    flying = {}
+    with ExitStack() as stack:
+        for flavour in FLAVOURS:
+            sitl = stack.enter_context(Sitl(flavour, len(CLIENTS), speedup=SPEEDUP))
+            # TCP calls somebody, UDP listens.
+            if flavour == "ardupilot":
+                sitl.start()
+            for index, client in there:
+                flying[client, flavour] = launch(client, sitl, index)
+                stack.callback(flying[client, flavour].end)
+            if flavour == "px4":
+                sitl.start()
+        yield {which: client.flight() for which, client in flying.items()}
 
 
 @pytest.fixture(params=[f"{client}-{flavour}" for flavour in FLAVOURS for client in CLIENTS])

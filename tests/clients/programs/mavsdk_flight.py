@@ -7,7 +7,6 @@ Everything is waited for with an end; what does not come ends the program with w
 from __future__ import annotations
 
 import asyncio
-import gc
 import math
 import traceback
 from collections.abc import AsyncGenerator, Awaitable, Callable
@@ -260,14 +259,11 @@ async def hop(drone: Drone, connected_at: float) -> None:
 
 def run(flight: Callable[[], Awaitable[None]]) -> int:
     """The program's exit status; a failure is told as well."""
-    status = 0
     try:
         asyncio.run(flight())
-        tell("done")
     except Exception as error:
         traceback.print_exc()
         tell("failed", error=type(error).__name__, text=str(error))
-        status = 1
-    # MAVSDK 3 stops its server when the last reference to it goes, and the program waits for that.
-    gc.collect()
-    return status
+        return 1
+    tell("done")
+    return 0

@@ -3,23 +3,34 @@ started by ``System``; it knows one vehicle, the first that it hears."""
 
 from __future__ import annotations
 
+import asyncio
 import sys
 from importlib.metadata import version
 
 from mavsdk import System, mission, mission_raw, offboard
-from mavsdk_flight import Drone, fly, hop, run, told
+from mavsdk_flight import PATIENCE, Drone, fly, hop, run, told
 from telling import clock, tell
 
 
 async def flight() -> None:
     flavour, url, port, *short = sys.argv[1:]
     system = System(port=int(port))
-    await system.connect(system_address=url)
+    try:
+        # Without a vehicle the server answers nobody.
+        await asyncio.wait_for(system.connect(system_address=url), PATIENCE)
+        await told(system.core.connection_state(), lambda state: state.is_connected, "connection")
+        at = clock()
+        tell("discovered", client=version("mavsdk"))
+        drone = drone_of(system)
+        await (hop(drone, at) if short else fly(drone, flavour, at))
+    finally:
+        # It does so only when it is collected, which after an error is never: the program would not end.
+        system._stop_mavsdk_server()
 
-    await told(system.core.connection_state(), lambda state: state.is_connected, "connection")
-    at = clock()
-    tell("discovered", client=version("mavsdk"))
-    drone = Drone(
+
+def drone_of(system: System) -> Drone:
+    """Its plugins."""
+    return Drone(
         system.action,
         system.info,
         system.mission,
@@ -32,7 +43,6 @@ async def flight() -> None:
         offboard,
         lambda plugin, name: getattr(plugin, name)(),
     )
-    await (hop(drone, at) if short else fly(drone, flavour, at))
 
 
 if __name__ == "__main__":

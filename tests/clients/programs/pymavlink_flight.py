@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import statistics
 import sys
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 from pymavlink import mavutil
@@ -97,7 +99,10 @@ def connect(vehicle: Vehicle) -> None:
     while min(map(len, times.values())) < 20:
         message = vehicle.wait(list(kinds))
         times[message.get_type()].append(message.time_boot_ms)
-    periods = {name: (stamps[-1] - stamps[0]) / (len(stamps) - 1) for name, stamps in times.items()}
+    periods = {
+        name: statistics.median(later - earlier for earlier, later in pairwise(stamps))
+        for name, stamps in times.items()
+    }
     tell("rates", asked_ms=PERIOD_MS, periods_ms=periods)
     for name in ("BATTERY_STATUS", "EXTENDED_SYS_STATE", "GPS_RAW_INT", "VFR_HUD", "SYSTEM_TIME"):
         vehicle.wait(name)
