@@ -127,23 +127,20 @@ class MavProxySwarm:
         self.heights: dict[int, float] = {}
         with MavProxy(interpreter, endpoint, folder) as proxy:
             self.proxy = proxy
-            self._at = int(proxy.expect(r"online system (\d+)").group(1))
+            first = int(proxy.expect(r"online system (\d+)").group(1))
             proxy.expect(r"Received \d+ parameters")
-            self._known = {self._at}
-            for system in systems:
-                self._turn_to(system)
+            order = [first, *(system for system in systems if system != first)]
+            for system in order:
+                if system != first:
+                    self._turn_to(system, "^DISARMED$")
+                    proxy.expect(r"Received \d+ parameters")
                 self.heights[system] = -rise(proxy)[2]
-            for system in reversed(systems):
-                self._turn_to(system)
+            for system in reversed(order):
+                if system != order[-1]:
+                    self._turn_to(system, "^ARMED$")
                 sink(proxy)
 
-    def _turn_to(self, system: int) -> None:
-        if system == self._at:
-            return
+    def _turn_to(self, system: int, state: str) -> None:
+        """Until a heartbeat has come of this one, by which MAVProxy knows its ``state``."""
         self.proxy.ask(f"vehicle {system}", rf"Set vehicle {system}\b")
-        # By a heartbeat of the new one, whose state is not that of the old one.
-        self.proxy.expect("^(?:DIS)?ARMED$")
-        if system not in self._known:
-            self.proxy.expect(r"Received \d+ parameters")
-        self._known.add(system)
-        self._at = system
+        self.proxy.expect(state)
