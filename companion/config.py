@@ -208,6 +208,20 @@ class GuardConfig(Settings):
     landing_speed: Positive = Field(0.3, description="m/s; slower than this a vehicle may land")
     landing_clearance: Positive = Field(1.0, description="m, horizontally to the nearest neighbour, to land")
     settle_us: int = Field(30_000_000, ge=0, le=600_000_000, description="longest way from escort to landing")
+    own_lost_us: int = Field(
+        5_000_000, gt=0, le=60_000_000, description="without own state for so long, it is told to land"
+    )
+    unsolved_us: int = Field(
+        5_000_000, gt=0, le=60_000_000, description="without a plan for so long, it is told to land"
+    )
+    neighbour_lost_us: int = Field(
+        3_000_000, gt=0, le=600_000_000, description="said then, and kept away from"
+    )
+    late_us: Micros = Field(100_000, description="a step later than that is a missed deadline")
+    battery_low: float = Field(0.2, ge=0.0, le=1.0, description="share left: it comes back and lands")
+    battery_critical: float = Field(0.1, ge=0.0, le=1.0, description="share left: it lands")
+    fence_radius: float | None = Field(None, gt=0.0, description="m from the fleet origin: it comes back")
+    fence_height: float | None = Field(None, gt=0.0, description="m above the fleet origin: it comes back")
     tube: Positive = Field(1.0, description="m of tracking error at which the plan is anchored anew")
 
 

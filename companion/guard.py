@@ -32,15 +32,19 @@ class Guard:
         self.held = 0
         self.failures = 0
         self.anchored_anew = 0
+        self.failing: int | None = None
+        """Since when (µs) the solver finds no plan; None while it does."""
 
     def start(self, now: int, motion: Motion) -> None:
         """Fly from this state on: a hover there until the first plan."""
+        self.failing = None
         self.horizon = brake(now, motion, self._config)
         self._fresh_at = now
         self.state = Holding.FRESH
 
     def accept(self, now: int, horizon: Horizon) -> None:
         """A good plan."""
+        self.failing = None
         self.horizon = horizon
         self._fresh_at = now
         self.state = Holding.FRESH
@@ -49,6 +53,8 @@ class Guard:
         """No good plan: keep the old one while it is young enough, then brake from where it has got to."""
         self.held += 1
         self.failures += solver
+        if solver and self.failing is None:
+            self.failing = now
         if self.horizon is None or self.state is Holding.BRAKING:
             return
         self.state = Holding.HELD

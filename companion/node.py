@@ -24,6 +24,7 @@ from companion.reception import LINKS, accepts
 from companion.setpoint import setpoint
 from companion.settling import Settling
 from companion.sharing import Sharing
+from companion.watch import Reaction, Situation, Watch
 from companion.world import View, World
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, LocalFrame
@@ -42,6 +43,8 @@ _HIGHEST = 1e5
 """m; a NaN is not below it either."""
 _BACK, _STILL = 0.5, 0.5
 """m and m/s: so near to where it started, and so slow, it is back."""
+_LOOK = 100_000
+"""µs between two looks at what may be wrong."""
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
 
@@ -94,6 +97,8 @@ class Companion:
         self._frame: LocalFrame | None = None
         self._goal: Array | None = None
         self._held: Array | None = None
+        self.watch = Watch(config)
+        self._next_look = self._looked_late = 0
         self._settling = Settling(config)
         self._certified = (
             CertifiedFlight(config, self._source, fleet) if config.avoidance == "certified" else None
@@ -126,7 +131,7 @@ class Companion:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Handle what arrived and do what is due at ``now`` (µs)."""
         if self._boot is None:
-            self._boot = self._next_plan = self._next_setpoint = now
+            self._boot = self._next_plan = self._next_setpoint = self._next_look = now
         if self._signing is not None:
             self._signing.present(now)
         answers = self._receive(now, inbox)
@@ -134,7 +139,8 @@ class Companion:
             return self._encode(ground=answers)
         view = self.world.at(now)
         commands = self.pilot.step(now, view)
-        if self.pilot.phase not in (Phase.HOLD, Phase.RETURN):
+        self._look(now, view)
+        if self.pilot.phase not in (Phase.HOLD, Phase.RETURN) and view.target is not None:
             self._held = None
         self._fly(now, view)
         setpoints = self._setpoints(now, view)
@@ -333,7 +339,8 @@ class Companion:
             goal = measured.position if self._goal is None else self._goal
             return standing(goal, None if target is None else target.position)
         if target is None:
-            return None
+            # Nobody is to be stood around: it stays where it is, clear of the others.
+            return standing(self._place_to_hold(measured), None)
         steps = config.horizon.steps + 1
         ahead = steps * config.horizon.dt_us * 1e-6 if self._certified is None else self._certified.seconds
         (end,), (velocity,) = target.ahead(np.array([ahead]))
@@ -344,8 +351,32 @@ class Companion:
             velocity = velocity + config.turn_rate * np.array([-offset[1], offset[0], 0.0])
         return Aim(end + offset, velocity, target.position, end, surface)
 
+    def _look(self, now: int, view: View) -> None:
+        """See what is wrong, ten times a second, and react to what begins."""
+        late, self._looked_late = max(self._looked_late, now - self._next_setpoint), 0
+        if now < self._next_look:
+            self._looked_late = late
+            return
+        self._next_look = now + _LOOK
+        situation = Situation(
+            now,
+            view,
+            self.pilot.phase,
+            self.pilot.vehicle,
+            self.guard.state,
+            self.world.neighbours.ages(now),
+            self.guard.failing,
+            late if self.pilot.streaming else 0,
+            self.world.clock_steps,
+        )
+        for concern, begins in self.watch.look(situation):
+            if begins and concern.reaction is Reaction.RETURN:
+                self.pilot.come_back()
+            if begins and concern.reaction is Reaction.LAND:
+                self.pilot.alight()
+
     def _place_to_hold(self, measured: Motion) -> Array:
-        """Where it was when it was told to stay, or to come back."""
+        """Where it was when it was told to stay or to come back, or when the target was lost."""
         if self._held is None:
             self._held = measured.position.copy()
         return self._held

@@ -155,6 +155,12 @@ class Pilot:
             self.phase = Phase.LAND
         return True
 
+    def alight(self) -> None:
+        """Something is so wrong that it has to land, by settling if that can be; whoever has taken the
+        vehicle over keeps it."""
+        if self.phase in STEERED:
+            self.phase = Phase.SETTLE
+
     def returned(self) -> None:
         """It is where it started: settle and land."""
         if self.phase is Phase.RETURN:

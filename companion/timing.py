@@ -85,12 +85,13 @@ class SenderClock:
 
     ``delay``: the least age of a message at its arrival. ``latest``: by how much others may overtake one that
     is still dated, two seconds at least. ``skew``: the companion's time minus the track's own, as known at
-    the last message. ``heard``: messages that the line stands on.
+    the last message. ``heard``: messages that the line stands on; ``laid``: how often there was a new one.
     """
 
     def __init__(self, delay: int, latest: int) -> None:
         self.skew = 0
         self.heard = 0
+        self.laid = 0
         self._delay = delay
         self._tolerance = max(latest, _STEP)
         # Track time minus stamp; None before the first stamp, and while they are of no use.
@@ -152,6 +153,7 @@ class SenderClock:
         """Lay the line through ``lag``. The track's time goes on: its skew stays what it was."""
         received, stamp = last
         self._begun = True
+        self.laid += 1
         self._base = lag - self._delay - self.skew
         self._stamp = self._newest = stamp
         self._repeats, self._repeated = 0, received

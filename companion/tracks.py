@@ -63,6 +63,11 @@ class Track:
         refused = 0 if belief is None else belief.refused
         return self._absurd + self._undated + self._rewind.too_late + refused
 
+    @property
+    def clock_steps(self) -> int:
+        """How often the sender's clock was found to be another."""
+        return max(0, self._clock.laid - 1)
+
     def measure(self, received: int, position: Array, velocity: Array, stamp: int = 0) -> bool:
         """Take a measurement that arrived at ``received`` (µs) and left with ``stamp`` (µs of the sender's
         clock, 0 for none); whether it was accepted.

@@ -11,6 +11,8 @@ WARNING = 4
 ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
 UNDEFINED, ON_GROUND, IN_AIR = 0, 1, 2
 """MAV_LANDED_STATE; others are on the way up or down."""
+CRITICAL = 5
+"""MAV_STATE; it and what follows tell of a failsafe."""
 HEARTBEAT_LOST = 3_000_000
 """µs without a heartbeat after which the autopilot's mode is not known."""
 

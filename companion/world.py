@@ -85,6 +85,11 @@ class World:
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
         return View(self._own.at(now), yaw, target, self._local)
 
+    @property
+    def clock_steps(self) -> int:
+        """How often the autopilot's clock was found to be another."""
+        return self._own.clock_steps
+
     def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
         """Neighbours and what else moves, the target where it is one, and what stands near the own
         ``prediction`` (N + 1, 3), aligned with ``now + n·dt``."""

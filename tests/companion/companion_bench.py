@@ -60,6 +60,7 @@ class PerfectAutopilot:
         self.position, self.velocity, self.yaw = self.home.copy(), np.zeros(3), 0.0
         self.armed, self.mode, self.landing = False, 0, False
         self.mute = False
+        self.battery = 0.9
         self.heard: list[Message] = []
         self._local = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
         self._climb: float | None = None
@@ -83,7 +84,7 @@ class PerfectAutopilot:
         if now % 100_000 == 0:
             mode = ARMED * self.armed
             answers.append(Heartbeat(AUTOPILOT, 2, self.profile.autopilot, mode, self.mode, 4))
-            answers.append(SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, 12.0, 0.9))
+            answers.append(SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, 12.0, self.battery))
         if now % 20_000 == 0 and not self.mute:
             answers += [self.local(boot), self.attitude(boot)]
         return b"".join(map(self._codec.encode, answers))

@@ -302,15 +302,17 @@ def test_a_lost_target_is_followed_for_its_time_then_the_vehicle_hovers():
     bench.target = None
     stale = bench.config.guard.target_stale_us * 1e-6
     bench.fly(stale - 0.2)
-    assert bench.companion.guard.state is Holding.FRESH
+    assert "target" not in bench.companion.watch.concerns
     bench.fly(3.0)
-    assert bench.companion.guard.state is Holding.BRAKING
+    # It still plans, so that it keeps clear of the others where it stays.
+    assert bench.companion.guard.state is Holding.FRESH
+    assert "target" in bench.companion.watch.concerns
     found = setpoints(bench.fly(1.0))
     assert len(found) == 50
-    np.testing.assert_allclose(found[-1].velocity, 0.0, atol=1e-6)
+    np.testing.assert_allclose(found[-1].velocity, 0.0, atol=0.02)
     bench.target = seen_at(TARGET, [0.0, 0.0, 0.0])
     bench.fly(1.0)
-    assert bench.companion.guard.state is Holding.FRESH
+    assert "target" not in bench.companion.watch.concerns
 
 
 def test_without_any_target_an_escort_hovers():

@@ -1,0 +1,183 @@
+"""What is wrong, for how long, and what follows: one table for all that a flight may have to react to.
+
+Each concern has a limit, an age or a share, in ``GuardConfig``; a reaction, which is never undone by the
+concern's end but by an order; and a sentence for the ground, said when it begins and when it ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from typing import NamedTuple
+
+from companion.config import CompanionConfig
+from companion.guard import Holding
+from companion.pilot import Phase
+from companion.vehicle import CRITICAL, Vehicle
+from companion.world import View
+
+EMERGENCY, ALERT, WARNING, NOTICE, INFO = 0, 1, 4, 5, 6
+"""MAV_SEVERITY."""
+
+
+class Reaction(Enum):
+    """What the companion does; the later in this list the graver."""
+
+    TELL = "tell"
+    RETURN = "come back and land"
+    LAND = "come to a hover clear of the others and land"
+
+
+class Concern(NamedTuple):
+    """One thing that is wrong now."""
+
+    name: str
+    text: str
+    reaction: Reaction = Reaction.TELL
+    severity: int = WARNING
+
+
+class Situation(NamedTuple):
+    """What concerns are judged by. ``late``: µs by which this step comes after the last one's due time;
+    ``neighbours``: age (µs) by system id; ``holding``: what is flown; ``failing``: since when (µs) no plan
+    could be solved, None while they can; ``steps``: how often the autopilot's clock has been set."""
+
+    now: int
+    view: View
+    phase: Phase
+    vehicle: Vehicle
+    holding: Holding
+    neighbours: Mapping[int, int]
+    failing: int | None
+    late: int
+    clock_steps: int
+
+
+class Change(NamedTuple):
+    """A concern that began or ended."""
+
+    concern: Concern
+    begins: bool
+
+
+class Watch:
+    """Judges each situation. ``concerns`` are those of now, by name."""
+
+    def __init__(self, config: CompanionConfig) -> None:
+        self._config = config
+        self.concerns: dict[str, Concern] = {}
+        self._neighbours: dict[int, bool] = {}
+        self._late_until = 0
+        self._clock_steps = 0
+        self._target_seen = False
+        self._clock_until = 0
+
+    def look(self, s: Situation) -> list[Change]:
+        """What has changed since the last look."""
+        found = {concern.name: concern for concern in self._judge(s)}
+        changes = [Change(concern, True) for name, concern in found.items() if name not in self.concerns]
+        changes += [Change(concern, False) for name, concern in self.concerns.items() if name not in found]
+        self.concerns = found
+        return changes
+
+    @property
+    def reaction(self) -> Reaction:
+        """The gravest of what the present concerns ask for."""
+        order = list(Reaction)
+        return max((c.reaction for c in self.concerns.values()), key=order.index, default=Reaction.TELL)
+
+    # Each: a concern, or nothing
+
+    def _judge(self, s: Situation) -> list[Concern]:
+        found = [
+            self._own(s),
+            self._target(s),
+            self._solver(s),
+            self._battery(s),
+            self._autopilot(s),
+            self._fence(s),
+            self._lateness(s),
+            self._clock(s),
+            *self._others(s),
+        ]
+        return [concern for concern in found if concern is not None]
+
+    def _own(self, s: Situation) -> Concern | None:
+        guard, own = self._config.guard, s.view.own
+        if s.phase in _ON_THE_GROUND or own is None or own.age <= guard.own_stale_us:
+            return None
+        lost = own.age > guard.own_lost_us
+        text = "Own position is lost: landing" if lost else "Own position is old: braking"
+        return Concern(f"own state {lost}", text, Reaction.LAND if lost else Reaction.TELL)
+
+    def _target(self, s: Situation) -> Concern | None:
+        if s.view.target is not None:
+            self._target_seen = True
+            return None
+        if not self._target_seen or self._config.task != "escort" or s.phase in _ON_THE_GROUND:
+            return None
+        return Concern("target", "Target lost: holding")
+
+    def _solver(self, s: Situation) -> Concern | None:
+        guard = self._config.guard
+        if s.failing is None or s.now - s.failing <= guard.hold_us or s.phase in _ON_THE_GROUND:
+            return None
+        lost = s.now - s.failing > guard.unsolved_us
+        text = "No plan can be found: landing" if lost else "No plan can be found: braking"
+        return Concern(f"solver {lost}", text, Reaction.LAND if lost else Reaction.TELL)
+
+    def _battery(self, s: Situation) -> Concern | None:
+        guard = self._config.guard
+        left = None if s.vehicle.status is None else s.vehicle.status.battery_remaining
+        if left is None or left >= guard.battery_low or s.phase in _ON_THE_GROUND:
+            return None
+        if left < guard.battery_critical:
+            return Concern("battery critical", f"Battery {100 * left:.0f} %: landing", Reaction.LAND, ALERT)
+        return Concern("battery low", f"Battery {100 * left:.0f} %: coming back", Reaction.RETURN)
+
+    def _autopilot(self, s: Situation) -> Concern | None:
+        beat = s.vehicle.heartbeat
+        if beat is None or s.phase in _ON_THE_GROUND:
+            return None
+        if not s.vehicle.alive:
+            return Concern("heartbeat", "Autopilot is not heard: no set-points")
+        if s.phase is Phase.YIELDED:
+            return Concern("custody", "Vehicle taken over: no set-points until a go", severity=NOTICE)
+        if beat.system_status >= CRITICAL:
+            return Concern("failsafe", "Autopilot reports a failsafe")
+        return None
+
+    def _fence(self, s: Situation) -> Concern | None:
+        guard, own = self._config.guard, s.view.own
+        if own is None or s.phase in _ON_THE_GROUND:
+            return None
+        x, y, z = own.position.tolist()
+        far = guard.fence_radius is not None and x * x + y * y > guard.fence_radius**2
+        high = guard.fence_height is not None and z > guard.fence_height
+        if not (far or high):
+            return None
+        which = "too far from the origin" if far else "too high"
+        return Concern("fence", f"Fence: {which}, coming back", Reaction.RETURN, ALERT)
+
+    def _lateness(self, s: Situation) -> Concern | None:
+        if s.late > self._config.guard.late_us:
+            self._late_until = s.now + _REMEMBERED
+        if s.now >= self._late_until:
+            return None
+        return Concern("lateness", "Deadlines are missed")
+
+    def _clock(self, s: Situation) -> Concern | None:
+        if s.clock_steps != self._clock_steps:
+            self._clock_steps = s.clock_steps
+            self._clock_until = s.now + _REMEMBERED
+        return Concern("clock", "The autopilot's clock has jumped") if s.now < self._clock_until else None
+
+    def _others(self, s: Situation) -> list[Concern]:
+        limit = self._config.guard.neighbour_lost_us
+        lost = sorted(system for system, age in s.neighbours.items() if age > limit)
+        return [Concern(f"neighbour {system}", f"Neighbour {system} is not heard") for system in lost]
+
+
+_ON_THE_GROUND = (Phase.CONNECT, Phase.DONE)
+_REMEMBERED = 5_000_000
+"""µs for which what happens at one moment stays a concern."""
