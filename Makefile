@@ -3,7 +3,8 @@ PYTHON ?= python3
 ARGS ?=
 JOBS ?= 2
 BIN = .venv/bin
-SCRIPTS = tools/bootstrap.py tools/extract_log.py
+SCRIPTS = tools/bootstrap.py tools/client_environments.py tools/extract_log.py
+CLIENTS = tests/clients/requirements
 
 .PHONY: fly test soak lint bench schemas requirements clean
 .DEFAULT_GOAL := fly
@@ -11,7 +12,7 @@ SCRIPTS = tools/bootstrap.py tools/extract_log.py
 fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--method tangential …"
 	@$(BIN)/outrider swarm escort $(ARGS)
 
-test: .venv/.made  ## everything; one test with ARGS="-k name"
+test: .venv/.made .venv/clients/.made  ## everything; one test with ARGS="-k name"
 	@$(BIN)/pytest -n $(JOBS) --dist loadfile $(ARGS) </dev/null
 
 soak: .venv/.made  ## what is too long for CI, about half an hour; part of it with ARGS="-k yaml"
@@ -34,6 +35,9 @@ requirements:  ## write uv.lock and requirements.txt anew after a change of depe
 	@uv lock
 	@uv export --locked --extra sitl --extra export --group dev --no-emit-project --no-header --no-annotate --quiet \
 		--format requirements-txt --output-file requirements.txt
+	@for client in $(basename $(wildcard $(CLIENTS)/*.in)); do \
+		uv pip compile --universal --no-deps --generate-hashes --python-version 3.11 --no-header --no-annotate --quiet \
+		$$client.in --output-file $$client.txt >/dev/null || exit; done
 
 clean:  ## everything that was made, the environment too
 	@rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
@@ -41,3 +45,6 @@ clean:  ## everything that was made, the environment too
 
 .venv/.made: pyproject.toml uv.lock requirements.txt tools/bootstrap.py
 	@$(PYTHON) tools/bootstrap.py
+
+.venv/clients/.made: .venv/.made tools/client_environments.py $(wildcard $(CLIENTS)/*.txt)
+	@$(BIN)/python tools/client_environments.py

@@ -67,38 +67,44 @@ def with_pip(python: str) -> None:
     """venv (or virtualenv) and pip; each package is checked against its hash."""
     say("setting up .venv with pip, about a minute the first time")
     is_good = f"import sys; sys.exit(sys.version_info < {NEEDED})"
-    pip = find_pip(python) if works([PYTHON, "-c", is_good]) else []
+    pip = find_pip(python, PYTHON) if works([PYTHON, "-c", is_good]) else []
+    if not pip:
+        pip = make_environment(python, VENV)
+    install([*pip, "install", "--require-hashes", "-r", REQUIREMENTS], REQUIREMENTS)
+    install([*pip, "install", "--no-deps", "--no-build-isolation", "-e", ROOT], REQUIREMENTS)
+
+
+def make_environment(python: str, folder: str) -> "list[str]":
+    """A new environment in place of what was there, and a pip that installs into it."""
     for way in (
         [python, "-m", "venv"],
         [python, "-m", "venv", "--without-pip"],
         [python, "-m", "virtualenv"],
         ["virtualenv", "-p", python],
     ):
+        shutil.rmtree(folder, ignore_errors=True)
+        pip = find_pip(python, os.path.join(folder, "bin", "python")) if works([*way, folder]) else []
         if pip:
-            break
-        shutil.rmtree(VENV, ignore_errors=True)
-        if works([*way, VENV]):
-            pip = find_pip(python)
-    if not pip:
-        shutil.rmtree(VENV, ignore_errors=True)
-        raise SetupError(
-            "this Python has neither ensurepip nor pip, so .venv cannot be made; "
-            "on Debian and Ubuntu: sudo apt install python3-venv"
-        )
-    install([*pip, "install", "--require-hashes", "-r", REQUIREMENTS])
-    install([*pip, "install", "--no-deps", "--no-build-isolation", "-e", ROOT])
+            return pip
+    shutil.rmtree(folder, ignore_errors=True)
+    raise SetupError(
+        f"this Python has neither ensurepip nor pip, so {os.path.basename(folder)} cannot be made; "
+        "on Debian and Ubuntu: sudo apt install python3-venv"
+    )
 
 
-def find_pip(python: str) -> "list[str]":
-    """A pip that installs into .venv: its own, or one of the machine that can be told to; empty if none."""
-    own = [PYTHON, "-m", "pip"]
-    steered = [[*pip, "--python", PYTHON] for pip in ([python, "-m", "pip"], ["pip3"], ["pip"])]
+def find_pip(python: str, target: str) -> "list[str]":
+    """A pip that installs for the Python ``target``: its own, or one of the machine that can be told to; else
+    empty."""
+    own = [target, "-m", "pip"]
+    steered = [[*pip, "--python", target] for pip in ([python, "-m", "pip"], ["pip3"], ["pip"])]
     return next((pip for pip in (own, *steered) if works([*pip, "--version"])), [])
 
 
-def install(command: "list[str]") -> None:
-    """Run pip; of all that it says show how far it is, and the end if it fails."""
-    with open(REQUIREMENTS) as file:
+def install(command: "list[str]", requirements: str) -> None:
+    """Run pip; of all that it says show how far it is in the file ``requirements``, and the end if it
+    fails."""
+    with open(requirements) as file:
         expected = sum("==" in line for line in file)
     quiet = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
     pip = subprocess.Popen(

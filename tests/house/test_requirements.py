@@ -7,12 +7,14 @@ import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LOCK = tomllib.loads((ROOT / "uv.lock").read_text(encoding="utf-8"))
+CLIENTS = sorted((ROOT / "tests" / "clients" / "requirements").glob("*.txt"))
 EXTRAS, GROUPS = ("sitl", "export"), ("dev",)
 
 
@@ -49,9 +51,9 @@ def locked() -> set[Pin]:
     return pins
 
 
-def exported() -> set[Pin]:
-    """What requirements.txt holds."""
-    text = (ROOT / "requirements.txt").read_text(encoding="utf-8")
+def exported(file: Path = ROOT / "requirements.txt") -> set[Pin]:
+    """What a file of requirements holds."""
+    text = file.read_text(encoding="utf-8")
     pins = set()
     for block in re.split(r"\n(?=\S)", text.replace("\\\n", " ").strip()):
         requirement = Requirement(block.split("--hash", 1)[0])
@@ -67,12 +69,20 @@ def test_requirements_are_the_lock() -> None:
     assert not behind, f"run `make requirements`: only exported {sorted((p.name, p.version) for p in behind)}"
 
 
-def test_every_requirement_has_a_hash() -> None:
-    assert all(pin.hashes for pin in exported())
+@pytest.mark.parametrize("file", [ROOT / "requirements.txt", *CLIENTS], ids=lambda file: file.stem)
+def test_every_requirement_has_a_hash_and_no_host(file: Path) -> None:
+    assert all(pin.hashes for pin in exported(file))
+    assert "://" not in file.read_text(encoding="utf-8")
 
 
-def test_requirements_name_no_host() -> None:
-    assert "://" not in (ROOT / "requirements.txt").read_text(encoding="utf-8")
+@pytest.mark.parametrize("file", CLIENTS, ids=lambda file: file.stem)
+def test_clients_are_pinned_as_they_are_asked_for(file: Path) -> None:
+    asked = [Requirement(line) for line in file.with_suffix(".in").read_text(encoding="utf-8").splitlines()]
+    pins = exported(file)
+    assert {canonicalize_name(requirement.name) for requirement in asked} == {pin.name for pin in pins}
+    for requirement in asked:
+        versions = [pin.version for pin in pins if pin.name == canonicalize_name(requirement.name)]
+        assert all(requirement.specifier.contains(version) for version in versions), file
 
 
 def test_the_lock_knows_what_the_project_asks_for() -> None:
