@@ -220,6 +220,7 @@ def test_a_port_in_use_is_named_with_what_to_do(run: Run) -> None:
         (("--to", "nonsense"), "--to 'nonsense': no endpoint begins with"),
         (("--to", "tcpin:127.0.0.1:1", "--count", "2"), "only one vehicle can have that"),
         (("--vehicle", "firefli"), "did you mean 'firefly'?"),
+        (("--signing-key", "nowhere.key"), "nowhere.key: "),
         (("--origin", "north"), "--origin north: allowed is LATITUDE,LONGITUDE"),
         (("--wind", "strong"), "--wind strong: allowed is a speed in m/s"),
     ],

@@ -18,8 +18,11 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from mavlink_bridge.codec import Codec
+from mavlink_bridge.framing import Framer
+from mavlink_bridge.key import create_key
 from mavlink_bridge.messages import CommandLong, Heartbeat, Message, ParamSet, Source, StatusText, Timesync
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import EPOCH, Signing
 from outrider.errors import InputError, OutriderError
 from outrider.hangar.addresses import addresses
 from outrider.hangar.board import SAYINGS, Board, Gauges, Pace
@@ -135,6 +138,27 @@ def test_a_vehicle_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(field.squad.seats[1].node, "step", fail)
     with pytest.raises(OutriderError, match=r"^vehicle 41: ZeroDivisionError: of what$"):
         field.run(1.0)
+
+
+def test_with_a_key_only_who_has_it_is_obeyed(tmp_path: Path) -> None:
+    path = tmp_path / "fleet.key"
+    key = create_key(path)
+    field = Field(asked(count=2, signing_key=path), range(2), tmp_path / "kept")
+    (tmp_path / "kept").mkdir()
+    field.run(2.0, {0: [arming(1)], 1: [arming(2)]})
+    signing = Signing(key)
+    signing.present(EPOCH + 60_000_000)
+    order = Codec(signing=signing).encode(arming(2))
+    for _, data in field.squad.step(field.now, [Datagram("0", order), Datagram("1", order)]):
+        assert all(frame.signed for frame in Framer().feed(data))
+    field.now += PERIOD
+    field.run(0.5)
+    assert [field.board.gauges(index).armed for index in range(2)] == [False, True]
+    # Its newest stamp changes all the time, and is written when all ends.
+    field.cabinet.keep(field.squad)
+    assert not any((tmp_path / "kept").iterdir())
+    field.cabinet.keep(field.squad, ending=True)
+    assert len([*(tmp_path / "kept").iterdir()]) == 2
 
 
 # Kept over a restart

@@ -119,6 +119,10 @@ def sitl(
         Optional[Path],  # noqa: UP045
         typer.Option(help="Directory where parameters and missions are kept."),
     ] = None,
+    signing_key: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Only what is signed with it counts; see outrider key."),
+    ] = None,
     seconds: Annotated[Optional[float], typer.Option(min=0.0, help="End by itself after that.")] = None,  # noqa: UP045
     as_json: Annotated[
         bool,
@@ -143,6 +147,7 @@ def sitl(
         spacing=spacing,
         speedup=speedup,
         seed=seed,
+        signing_key=signing_key,
     )
     raise typer.Exit(run(checked(options), Terms(port_base, tuple(to or ()), host, state, seconds, as_json)))
 

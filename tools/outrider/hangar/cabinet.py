@@ -34,13 +34,17 @@ class Cabinet:
         self._kept[system] = kept
         return kept
 
-    def keep(self, squad: Squad) -> None:
-        """Write what has changed since the last time, so that a file is always whole."""
+    def keep(self, squad: Squad, *, ending: bool = False) -> None:
+        """Write what has changed since the last time, so that a file is always whole. The newest stamp of a
+        signature, which changes all the time, alone is no reason but when ``ending``."""
         if self._directory is None:
             return
         for seat in squad.seats:
             found, before = seat.node.saved, self._kept[seat.system]
-            if found != before and not (_empty(found) and _empty(before)):
+            compared = found
+            if not ending:
+                compared = found.model_copy(update={"signed_until": before.signed_until})
+            if compared != before and not (_empty(compared) and _empty(before)):
                 self._kept[seat.system] = found
                 path = self._path(seat.system)
                 if path is not None:
@@ -53,7 +57,7 @@ class Cabinet:
 
 
 def _empty(saved: Saved) -> bool:
-    return not saved.parameters and not any(saved.plans)
+    return not saved.parameters and not any(saved.plans) and not saved.signed_until
 
 
 def prepare(directory: Path | None, flavour: str, systems: range) -> None:

@@ -73,10 +73,10 @@ def _addresses(asked: Request, terms: Terms) -> list[Address]:
     except EndpointError as error:
         raise InputError(f"--to {error}") from None
     open_to_all = [str(one) for one in places[0].endpoints if exposed(one)]
-    if open_to_all:
+    if open_to_all and asked.key is None:
         sys.stderr.write(
             f"outrider sitl: {', '.join(open_to_all)}: beyond this machine; unsigned MAVLink obeys everyone "
-            "who can send there\n"
+            "who can send there: --signing-key FILE is against that\n"
         )
     return places
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import import_module
 from math import ceil, isfinite, sqrt
+from pathlib import Path
 from typing import Final, Literal, cast, get_args
 
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import Vector
+from mavlink_bridge.signing import Signing
 from outrider.errors import InputError
+from outrider.key_files import key_of
 from outrider.options import wind_of
 from outrider.resources import find
 from outrider.scenario_places import Origin
@@ -53,12 +57,13 @@ class Options:
     spacing: float = 3.0
     speedup: float = 1.0
     seed: int = 1
+    signing_key: Path | None = None
 
 
 @dataclass(frozen=True)
 class Request:
     """``speed``: simulated seconds per second of wall time. ``spacing`` (m) between vehicles, on a grid whose
-    first corner is the ``origin``."""
+    first corner is the ``origin``. ``key``: only what is signed with it counts."""
 
     count: int
     first_id: int
@@ -73,6 +78,7 @@ class Request:
     spacing: float
     speed: float
     seed: int
+    key: Key | None = None
 
     @property
     def systems(self) -> range:
@@ -92,7 +98,13 @@ class Request:
     def autopilot(self, index: int, epoch: int, saved: Saved) -> Autopilot:
         """A vehicle that boots at ``epoch`` (Unix µs) with what it ``saved`` before."""
         return Autopilot(
-            self._config(index, epoch), self.vehicle, self.frame, self.seed, weather=self.weather, saved=saved
+            self._config(index, epoch),
+            self.vehicle,
+            self.frame,
+            self.seed,
+            weather=self.weather,
+            saved=saved,
+            signing=None if self.key is None else Signing(self.key),
         )
 
     def _config(self, index: int, epoch: int) -> AutopilotConfig:
@@ -166,6 +178,7 @@ def checked(options: Options) -> Request:
         options.spacing,
         options.speedup,
         options.seed,
+        None if options.signing_key is None else key_of(options.signing_key),
     )
 
 

@@ -100,7 +100,7 @@ class Worker:
             try:
                 loop.run(self._over, look)
             finally:
-                cabinet.keep(squad)
+                cabinet.keep(squad, ending=True)
                 self._board.show_pace(self._number, _pace(loop, clock.now(), time.monotonic() - began))
 
 
