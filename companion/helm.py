@@ -50,6 +50,7 @@ from mavlink_bridge.plan_wire import WirePlan
 from mavlink_bridge.plan_wire import unpack as unpack_plan
 from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
 from mavlink_bridge.roster_wire import unpack as unpack_roster
+from mavlink_bridge.signing import Signing
 
 HELM = 191
 """MAV_COMP_ID_ONBOARD_COMPUTER."""
@@ -65,9 +66,12 @@ _HEARTBEAT, _SETPOINT, _ORIGIN, _COMMAND, _TUNNEL = 0, 84, 49, 76, 385
 
 
 class Helm:
-    """A ``Node`` beside the companion of ``system``, on the same clock. Links: ``autopilot``, ``swarm``."""
+    """A ``Node`` beside the companion of ``system``, on the same clock. Links: ``autopilot``, ``swarm``.
+    ``signing``: its own, with the companion's key."""
 
-    def __init__(self, config: CompanionConfig, system: int, fleet: FleetFrame) -> None:
+    def __init__(
+        self, config: CompanionConfig, system: int, fleet: FleetFrame, signing: Signing | None = None
+    ) -> None:
         self.name = f"helm-{system}"
         self._config, self._fleet = config, fleet
         self._own = Source(system, HELM)
@@ -79,14 +83,17 @@ class Helm:
                         (component == AUTOPILOT and identifier in (_HEARTBEAT, _ORIGIN))
                         or (component == COMPONENT and identifier in (_SETPOINT, _COMMAND))
                     )
-                )
+                ),
+                signing,
             ),
             "swarm": Codec(
                 lambda identifier, sender, component: (
                     sender == system and component == COMPONENT and identifier == _TUNNEL
-                )
+                ),
+                signing,
             ),
         }
+        self._signing = signing
         self._plans: dict[int, WirePlan] = {}
         self._flown: tuple[WirePlan, Horizon] | None = None
         self._heard: tuple[int, SetpointLocal] | None = None
@@ -100,8 +107,10 @@ class Helm:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Listen; and where the companion is silent, send what its plan says at ``now`` (µs)."""
         self._boot = now if self._boot is None else self._boot
+        if self._signing is not None:
+            self._signing.present(now)
         for link, data in inbox:
-            for message in self._codecs[link].feed(data):
+            for message in self._codecs[link].feed(data, whole=True):
                 self._hear(now, message)
         beat = self._heartbeat(now)
         profile = self._profile(now)

@@ -29,16 +29,19 @@ from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source, Timesync, Tunnel
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
 
 COMPONENT = 195
 """MAV_COMP_ID_PATHPLANNER."""
-DO_REPOSITION = 192
+NAV_LOITER_UNLIM, NAV_RETURN, DO_REPOSITION = 17, 20, 192
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 _LONGEST_NS = (1 << 32) - 1
 _GLOBAL = (0, 5)
 """MAV_FRAME_GLOBAL and its INT twin."""
 _HIGHEST = 1e5
 """m; a NaN is not below it either."""
+_BACK, _STILL = 0.5, 0.5
+"""m and m/s: so near to where it started, and so slow, it is back."""
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
 
@@ -59,7 +62,8 @@ class Tally(NamedTuple):
 class Companion:
     """One vehicle's companion, a ``Node``. Links: ``autopilot``, ``swarm``, ``target``, ``ground``.
 
-    ``stopwatch`` (ns) only measures how long planning takes; nothing depends on it.
+    ``stopwatch`` (ns) only measures how long planning takes; nothing depends on it. ``signing``: its own, for
+    all links, whose number in ``LINKS`` is the link id; without, whatever it hears counts.
     """
 
     def __init__(
@@ -69,6 +73,7 @@ class Companion:
         target_system: int,
         fleet: FleetFrame,
         stopwatch: Callable[[], int],
+        signing: Signing | None = None,
     ) -> None:
         self.config = config
         self.name = f"companion-{system}"
@@ -80,10 +85,15 @@ class Companion:
         self.guard = Guard(config)
         self.pilot = Pilot(config, self._source, fleet.altitude)
         self._sharing = Sharing(config, self._source, fleet)
-        self._codecs = {link: Codec(accepts(link, system, target_system)) for link in LINKS}
+        self._signing = signing
+        self._codecs = {
+            link: Codec(accepts(link, system, target_system), signing, number)
+            for number, link in enumerate(LINKS)
+        }
         self.plan: Plan | None = None
         self._frame: LocalFrame | None = None
         self._goal: Array | None = None
+        self._held: Array | None = None
         self._settling = Settling(config)
         self._certified = (
             CertifiedFlight(config, self._source, fleet) if config.avoidance == "certified" else None
@@ -117,11 +127,15 @@ class Companion:
         """Handle what arrived and do what is due at ``now`` (µs)."""
         if self._boot is None:
             self._boot = self._next_plan = self._next_setpoint = now
+        if self._signing is not None:
+            self._signing.present(now)
         answers = self._receive(now, inbox)
         if not self._has_to_act(now):
             return self._encode(ground=answers)
         view = self.world.at(now)
         commands = self.pilot.step(now, view)
+        if self.pilot.phase not in (Phase.HOLD, Phase.RETURN):
+            self._held = None
         self._fly(now, view)
         setpoints = self._setpoints(now, view)
         certified = self._certified
@@ -143,7 +157,7 @@ class Companion:
     def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
         answers: list[Message] = []
         for link, data in inbox:
-            for message in self._codecs[link].feed(data):
+            for message in self._codecs[link].feed(data, whole=True):
                 if link == "ground":
                     answers += self._obey(message)
                     continue
@@ -156,7 +170,8 @@ class Companion:
         return answers
 
     def _obey(self, message: Message) -> list[Message]:
-        """Operator's commands: NAV_TAKEOFF is the go, DO_REPOSITION the goal, NAV_LAND the end."""
+        """Operator's commands: NAV_TAKEOFF is the go, DO_REPOSITION the goal, NAV_LOITER_UNLIM to stay,
+        NAV_RETURN_TO_LAUNCH to come back, NAV_LAND the end."""
         if not isinstance(message, CommandInt | CommandLong):
             return []
         if (message.target_system, message.target_component) != self._source:
@@ -167,6 +182,10 @@ class Companion:
             taken = self.pilot.go(message.params[6])
         elif isinstance(message, CommandLong) and message.command == NAV_LAND:
             taken = self.pilot.land()
+        elif isinstance(message, CommandLong) and message.command == NAV_LOITER_UNLIM:
+            taken = self.pilot.hold()
+        elif isinstance(message, CommandLong) and message.command == NAV_RETURN:
+            taken = self.pilot.come_back()
         else:
             return [self._ack(message, UNSUPPORTED)]
         return [self._ack(message, ACCEPTED if taken else DENIED)]
@@ -301,6 +320,10 @@ class Companion:
         """Where to: the own goal, or the surface around the target where it will be at the end of the
         horizon."""
         config, target = self.config, view.target
+        if self.pilot.phase is Phase.HOLD:
+            return standing(self._place_to_hold(measured), None if target is None else target.position)
+        if self.pilot.phase is Phase.RETURN:
+            return standing(self._way_back(measured), None if target is None else target.position)
         if self.pilot.phase is Phase.SETTLE:
             rest = self._settling.rest(measured, self._obstacles)
             if self._settling.clear:
@@ -321,6 +344,25 @@ class Companion:
             velocity = velocity + config.turn_rate * np.array([-offset[1], offset[0], 0.0])
         return Aim(end + offset, velocity, target.position, end, surface)
 
+    def _place_to_hold(self, measured: Motion) -> Array:
+        """Where it was when it was told to stay, or to come back."""
+        if self._held is None:
+            self._held = measured.position.copy()
+        return self._held
+
+    def _way_back(self, measured: Motion) -> Array:
+        """Above where it started, as high as it flies now and allowed; told to the pilot when it is there."""
+        limits, start = self.config.limits, self.pilot.start
+        if start is None:
+            return measured.position
+        height = float(self._place_to_hold(measured)[2])
+        height = min(max(height, limits.box_min[2]), limits.box_max[2])
+        above = np.array([start[0], start[1], height])
+        off = above - measured.position
+        if float(off[:2] @ off[:2]) < _BACK**2 and float(measured.velocity @ measured.velocity) < _STILL**2:
+            self.pilot.returned()
+        return above
+
     def _setpoints(self, now: int, view: View) -> list[Message]:
         if now < self._next_setpoint:
             return []
@@ -332,6 +374,7 @@ class Companion:
         time = now + self.config.setpoint_lead_us
         since_boot = now - (now if self._boot is None else self._boot)
         yaw = self._heading.at(time)
+        self.pilot.streamed(now)
         return [setpoint(time, since_boot, horizon, yaw, view.local, self._source, profile.setpoint_mask)]
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:

@@ -2,7 +2,8 @@
 until acknowledged.
 
 Nothing starts without an operator's go (a NAV_TAKEOFF addressed to the companion), and while the autopilot is
-not in the mode in which our set-points steer, none are sent.
+not in the mode in which our set-points steer, none are sent. Who takes the vehicle over by its mode keeps it
+until they give it back so, or a new go is given.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from enum import Enum
 from companion.autopilots import Profile, Step
 from companion.calls import Calls
 from companion.config import CompanionConfig
-from companion.takeoff import NAV_TAKEOFF, Takeoff
+from companion.custody import Custody, Owner
+from companion.horizon import Array
+from companion.takeoff import DO_SET_MODE, NAV_TAKEOFF, Takeoff
 from companion.vehicle import UNDEFINED, Vehicle
 from companion.world import View
 from mavlink_bridge.messages import CommandAck, Message, Source
@@ -36,9 +39,16 @@ class Phase(Enum):
     CONNECT = "connect"
     PREPARE = "prepare"
     ESCORT = "escort"
+    HOLD = "hold"
+    RETURN = "return"
     SETTLE = "settle"
     LAND = "land"
     DONE = "done"
+    YIELDED = "yielded"
+
+
+STEERED = (Phase.ESCORT, Phase.HOLD, Phase.RETURN, Phase.SETTLE)
+"""The phases in which set-points steer, as long as the autopilot lets them."""
 
 
 class Pilot:
@@ -55,6 +65,8 @@ class Pilot:
         self._settling_since: int | None = None
         self._height: float | None = None
         self._calls = Calls(own)
+        self._custody = Custody(self.vehicle)
+        self._owner = Owner.OURS
         self._takeoff = Takeoff(self.vehicle, self._calls, origin_altitude)
 
     @property
@@ -80,8 +92,8 @@ class Pilot:
     @property
     def streaming(self) -> bool:
         """Whether set-points are to be sent."""
-        if self.phase in (Phase.ESCORT, Phase.SETTLE):
-            return self.guided
+        if self.phase in STEERED:
+            return self.guided or self._owner is Owner.LOST
         profile = self.profile
         return (
             self.phase is Phase.PREPARE
@@ -98,12 +110,38 @@ class Pilot:
             self.vehicle.hear(message)
 
     def go(self, height: float) -> bool:
-        """The operator's go: climb to ``height`` metres above the start, or take over where it flies already.
-        Whether it is taken."""
-        if self.phase not in (Phase.CONNECT, Phase.PREPARE) or not 0.5 <= height <= 120.0:
-            return self.phase is Phase.ESCORT
+        """The operator's go: climb to ``height`` metres above the start, or take over where it flies already;
+        on the way back, or while it holds, go on with the escort. Whether it is taken."""
+        if self.phase in (Phase.HOLD, Phase.RETURN, Phase.ESCORT):
+            self.phase = Phase.ESCORT
+            return True
+        if self.phase not in (Phase.CONNECT, Phase.PREPARE, Phase.YIELDED) or not 0.5 <= height <= 120.0:
+            return False
+        if self.phase is Phase.YIELDED:
+            self._start_anew()
         self._height = height
         return True
+
+    def hold(self) -> bool:
+        """The operator's order to stay where it is. Whether it is taken."""
+        if self.phase in (Phase.ESCORT, Phase.RETURN):
+            self.phase = Phase.HOLD
+        return self.phase is Phase.HOLD
+
+    def come_back(self) -> bool:
+        """The operator's order to fly to where it started, and to land there. Whether it is taken."""
+        if self.phase in (Phase.ESCORT, Phase.HOLD):
+            self.phase = Phase.RETURN
+        return self.phase in (Phase.RETURN, Phase.SETTLE, Phase.LAND)
+
+    def streamed(self, now: int) -> None:
+        """A set-point leaves at ``now`` (µs)."""
+        self._custody.streamed(now)
+
+    @property
+    def start(self) -> Array | None:
+        """Where it was at the last go, (3,) m, fleet-local ENU; on the ground, or where it was taken over."""
+        return self._takeoff.start
 
     def land(self) -> bool:
         """The operator's order to land. A vehicle under way first comes to a hover clear of the others,
@@ -111,11 +149,16 @@ class Pilot:
         if self.phase is Phase.CONNECT:
             # Nothing is in the air yet, and an earlier go is taken back.
             self._height = None
-        if self.phase is Phase.ESCORT:
+        if self.phase in STEERED:
             self.phase = Phase.SETTLE
         elif self.phase is Phase.PREPARE:
             self.phase = Phase.LAND
         return True
+
+    def returned(self) -> None:
+        """It is where it started: settle and land."""
+        if self.phase is Phase.RETURN:
+            self.phase = Phase.SETTLE
 
     def settled(self) -> None:
         """The vehicle hovers clear of the others: land now."""
@@ -125,8 +168,14 @@ class Pilot:
     def step(self, now: int, view: View) -> list[Message]:
         """Commands to send now."""
         self.vehicle.tick(now)
+        if self.phase in STEERED:
+            self._keep(now)
         if self.phase is Phase.SETTLE:
             self._settle(now, view)
+        if self._owner is Owner.LOST:
+            return self._ask_back(now)
+        if self.phase is Phase.YIELDED:
+            self._look_for_a_return()
         if self.phase is Phase.CONNECT:
             return self._connect(now, view)
         if self.phase is Phase.PREPARE:
@@ -138,13 +187,40 @@ class Pilot:
             return self._calls.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
         return []
 
+    def _keep(self, now: int) -> None:
+        """See whose the vehicle is. Somebody who took it over keeps it: nothing is ordered against them."""
+        before, self._owner = self._owner, self._custody.owner(now)
+        if self._owner is Owner.TAKEN:
+            self._owner = Owner.OURS
+            self._yielded_from, self.phase = self.phase, Phase.YIELDED
+            self._calls.forget()
+        elif self._owner is Owner.LOST and before is not Owner.LOST:
+            self._calls.forget()
+
+    def _ask_back(self, now: int) -> list[Message]:
+        """For the mode that nobody but the time-out has ended."""
+        if self.profile is None:
+            return []
+        return self._calls.call(now, DO_SET_MODE, (*self.profile.mode_params, 0.0, 0.0, 0.0, 0.0))
+
+    def _look_for_a_return(self) -> None:
+        """Who took the vehicle over may give it back by its mode switch; who disarms it ends the flight."""
+        if self.guided:
+            self.phase = self._yielded_from
+            self._custody.begin()
+        elif self.vehicle.alive and not self.vehicle.armed:
+            self._start_anew()
+            self._height = None
+
+    def _start_anew(self) -> None:
+        self.phase, self._owner, self._settling_since = Phase.CONNECT, Owner.OURS, None
+        self._calls.forget()
+
     def _settle(self, now: int, view: View) -> None:
-        """Land without settling when that cannot go on: blind, or too long. Somebody who took the vehicle
-        over by its mode switch keeps it: nothing is ordered against them."""
+        """Land without settling when that cannot go on: blind, or too long."""
         since = self._settling_since = now if self._settling_since is None else self._settling_since
-        taken_over = not self.guided and self.vehicle.alive
         blind = view.own is None or view.own.age > self._config.guard.own_stale_us
-        if not taken_over and (blind or now - since > self._config.guard.settle_us):
+        if blind or now - since > self._config.guard.settle_us:
             self.phase = Phase.LAND
 
     def _connect(self, now: int, view: View) -> list[Message]:
@@ -204,6 +280,7 @@ class Pilot:
         sent = takeoff.advance(now, profile, view.own, height)
         if takeoff.step(profile) is None:
             self.phase = Phase.ESCORT
+            self._custody.begin()
         elif step is not None and takeoff.step(profile) is step:
             self.waiting_for = step.value
         return sent

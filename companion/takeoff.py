@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from companion.autopilots import Profile, Step
 from companion.calls import Calls
+from companion.horizon import Array
 from companion.tracks import State
 from companion.vehicle import IN_AIR, ON_GROUND, UNDEFINED, Vehicle
 from mavlink_bridge.messages import Message
@@ -15,13 +16,14 @@ _NAN = float("nan")
 
 
 class Takeoff:
-    """The steps of one way up. ``done`` when the last is; ``step`` is the present one."""
+    """The steps of one way up. ``start``: where the last of them began, (3,) m, fleet-local ENU."""
 
     def __init__(self, vehicle: Vehicle, calls: Calls, origin_altitude: float) -> None:
         """``origin_altitude``: of the fleet frame's zero, m above mean sea level."""
         self._vehicle = vehicle
         self._calls = calls
         self._origin_altitude = origin_altitude
+        self.start: Array | None = None
         self._ground = 0.0
         self._flying_already = False
         self._calm_since: int | None = None
@@ -29,6 +31,7 @@ class Takeoff:
 
     def begin(self, own: State) -> None:
         """From here, on the ground or where it flies already."""
+        self.start = own.position.copy()
         self._ground = float(own.position[2])
         self._flying_already = self._vehicle.armed and self._vehicle.landed_state != ON_GROUND
         self._calm_since = None

@@ -2,8 +2,8 @@
 
 ::
 
-    bytes → framing (start, length, checksum) → codec (filter by header, converters: units) → messages
-    messages → codec (converters: units, range) → framing (header, sequence, checksum) → bytes
+    bytes → framing (start, length, checksum) → codec (header filter, signing, converters: units) → messages
+    messages → codec (converters: units, range) → framing (header, sequence, checksum) → signing → bytes
 
     geodetic, local NED ⇄ frames ⇄ fleet-local ENU          committed plan ⇄ plan_wire ⇄ 128 bytes of TUNNEL
 

@@ -8,8 +8,9 @@ from typing import NamedTuple
 from mavlink_bridge.converters import BY_ID, BY_TYPE, Converter
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.fields.flight import TEXT_LENGTH, text_chunks
-from mavlink_bridge.framing import Framer, frame_v1, frame_v2
+from mavlink_bridge.framing import SIGNED_FLAG, Framer, frame_v1, frame_v2
 from mavlink_bridge.messages import Message, Source, StatusText
+from mavlink_bridge.signing import Signing
 
 Accept = Callable[[int, int, int], bool]
 
@@ -21,7 +22,7 @@ class Counters(NamedTuple):
     not in the table;
     ``bad``: false starts, broken checksums, values that make no sense; ``unknown``: message ids that the
     dialect lacks;
-    ``skipped_bytes``: bytes that belong to no frame.
+    ``skipped_bytes``: bytes that belong to no frame; ``refused``: wanted, but not signed as they have to be.
     """
 
     good: int
@@ -29,18 +30,23 @@ class Counters(NamedTuple):
     unknown: int
     filtered: int
     skipped_bytes: int
+    refused: int
 
 
 class Codec:
     """One direction each of one link. ``accept(message_id, system, component)`` is asked after the checksum
-    and before the payload is decoded; None accepts everything. Signatures are carried over, not checked."""
+    and before the payload is decoded; None accepts everything. Then ``signing`` is asked, and it signs what
+    goes out as of link id ``link``; without it signatures mean nothing."""
 
-    def __init__(self, accept: Accept | None = None) -> None:
+    def __init__(self, accept: Accept | None = None, signing: Signing | None = None, link: int = 0) -> None:
         self._accept = accept
+        self._signing = signing
+        self._link = link
         self._framer = Framer()
         self._good = 0
         self._bad = 0
         self._filtered = 0
+        self._refused = 0
         self._sequences: dict[Source, int] = {}
 
     @property
@@ -48,7 +54,12 @@ class Codec:
         """The counts of everything fed so far."""
         framer = self._framer
         return Counters(
-            self._good, self._bad + framer.bad, framer.unknown, self._filtered, framer.skipped_bytes
+            self._good,
+            self._bad + framer.bad,
+            framer.unknown,
+            self._filtered,
+            framer.skipped_bytes,
+            self._refused,
         )
 
     @property
@@ -56,20 +67,26 @@ class Codec:
         """Bytes of a frame that is not complete yet (at most 280)."""
         return self._framer.pending_bytes
 
-    def feed(self, data: bytes) -> list[Message]:
-        """The messages that ``data`` completes, in order; a partial frame waits. Never raises.
+    def feed(self, data: bytes, *, whole: bool = False) -> list[Message]:
+        """The messages that ``data`` completes, in order. Never raises.
+
+        A partial frame waits for its rest; not so where ``whole`` says that no rest will come, as in
+        datagrams of several senders: there it would hold up what the next one says.
 
         A NaN or infinity drops a state message (counted as bad) and is kept in what is commanded or echoed,
         where it may mean *ignored*: CommandInt, CommandLong, SetpointLocal, PositionTarget.
         """
-        accept = self._accept
+        accept, signing = self._accept, self._signing
         found: list[Message] = []
-        for frame in self._framer.feed(data):
+        for frame in self._framer.feed(data, whole=whole):
             row = BY_ID.get(frame.message_id)
             if row is None or (
                 accept is not None and not accept(frame.message_id, frame.system, frame.component)
             ):
                 self._filtered += 1
+                continue
+            if signing is not None and signing.check(frame) is not None:
+                self._refused += 1
                 continue
             message = row.parse(Source(frame.system, frame.component), frame.payload)
             if message is None:
@@ -87,11 +104,11 @@ class Codec:
         row = BY_TYPE[type(message)]
         if isinstance(message, StatusText) and len(message.text) > TEXT_LENGTH:
             return self._encode_long(row, message)
-        payload = row.pack(message)
-        return frame_v2(row.id, row.crc_extra, message.source, self._next(message.source), payload)
+        return self._frame(row, message.source, row.pack(message))
 
     def encode_v1(self, message: Message) -> bytes:
-        """As ``encode``, in MAVLink 1: without extension fields; a StatusText is cut at 50 characters.
+        """As ``encode``, in MAVLink 1, which knows no signatures: without extension fields; a StatusText is
+        cut at 50 characters.
 
         Raises EncodeError also for message ids above 255.
         """
@@ -108,10 +125,14 @@ class Codec:
             row.struct.pack(message.severity, piece, text_id, number)
             for number, piece in enumerate(text_chunks(message.text))
         ]
-        return b"".join(
-            frame_v2(row.id, row.crc_extra, message.source, self._next(message.source), piece)
-            for piece in pieces
-        )
+        return b"".join(self._frame(row, message.source, piece) for piece in pieces)
+
+    def _frame(self, row: Converter, source: Source, payload: bytes) -> bytes:
+        signing, number = self._signing, self._next(source)
+        if signing is None or signing.key is None:
+            return frame_v2(row.id, row.crc_extra, source, number, payload)
+        frame = frame_v2(row.id, row.crc_extra, source, number, payload, SIGNED_FLAG)
+        return signing.sign(frame, self._link)
 
     def _next(self, source: Source) -> int:
         if not (0 <= source[0] <= 255 and 0 <= source[1] <= 255):

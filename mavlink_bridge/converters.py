@@ -193,6 +193,7 @@ TABLE: tuple[Converter, ...] = (
     _row(m.MessageInterval, 244, _plain(m.MessageInterval)),
     _row(m.ExtendedSysState, 245, f.extended_sys_state, unchanged),
     _row(m.StatusText, 253, f.status_text, f.status_text_fields, size_v1=51),
+    _row(m.SetupSigning, 256, p.setup_signing, p.setup_signing_fields),
     _row(m.Tunnel, 385, f.tunnel, f.tunnel_fields),
 )
 BY_ID: dict[int, Converter] = {row.id: row for row in TABLE}

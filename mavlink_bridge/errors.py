@@ -30,3 +30,7 @@ class EndpointError(BridgeError):
 
 class LinkError(BridgeError):
     """An endpoint cannot be opened: a host without address, a port in use, a device that is not there."""
+
+
+class KeyFileError(BridgeError):
+    """A key file that is not there, holds no key, or is open to others: what, where, and what is allowed."""

@@ -18,7 +18,7 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as dialect
 
 START_V1, START_V2 = 0xFE, 0xFD
-_DATAGRAM = 2048
+_DATAGRAM = 512
 LONGEST_FRAME = 280  # version 2: 10 header, 255 payload, 2 checksum, 13 signature
 SIGNATURE_LENGTH = 13
 SIGNED_FLAG = 0x01
@@ -103,7 +103,7 @@ def frame_at(data: bytes, start: int) -> Frame | Flaw:
     )
 
 
-@lru_cache(maxsize=2048)
+@lru_cache(maxsize=1024)
 def _leading(data: bytes) -> tuple[tuple[Frame, ...], int]:
     frames: list[Frame] = []
     at, size = 0, len(data)
@@ -139,12 +139,18 @@ def claimed_length(data: bytes, start: int) -> int | None:
 
 
 def frame_v2(
-    message_id: int, crc_extra: bytes, source: tuple[int, int], sequence: int, payload: bytes
+    message_id: int,
+    crc_extra: bytes,
+    source: tuple[int, int],
+    sequence: int,
+    payload: bytes,
+    flags: int = 0,
 ) -> bytes:
-    """An unsigned version 2 frame; trailing zeros of ``payload`` are cut off, down to one byte."""
+    """A version 2 frame; trailing zeros of ``payload`` are cut off, down to one byte. ``flags``: SIGNED_FLAG
+    if a signature will be put behind it."""
     payload = payload.rstrip(b"\0") or b"\0"
     body = _HEADER_V2.pack(
-        START_V2, len(payload), 0, 0, sequence, *source, message_id & 0xFFFF, message_id >> 16
+        START_V2, len(payload), flags, 0, sequence, *source, message_id & 0xFFFF, message_id >> 16
     )
     body += payload
     return body + mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")
@@ -158,12 +164,23 @@ def frame_v1(
     return body + mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")
 
 
+def without_signature(data: bytes) -> bytes:
+    """A frame as it was before it was signed, with a checksum that holds if its own does; or as it is."""
+    if data[0] != START_V2 or data[2] != SIGNED_FLAG:
+        return data
+    end = len(data) - SIGNATURE_LENGTH - 2
+    body = data[:2] + b"\0" + data[3:end]
+    # The checksum is linear: what CRC_EXTRA adds to both is not in their difference.
+    change = mcrf4xx(data[1:end] + b"\0") ^ mcrf4xx(body[1:] + b"\0")
+    return body + ((data[end] | data[end + 1] << 8) ^ change).to_bytes(2, "little")
+
+
 class Framer:
     """Cuts a byte stream into frames, however it is chopped up; keeps fewer than 281 bytes between two calls.
 
     After a false start the search goes on one byte later. A frame of an unknown message cannot be verified,
     so it is skipped by its length only if another frame starts right behind it (for that one byte it waits);
-    otherwise it was a false start.
+    otherwise it was a false start. Where ``whole`` says that no frame goes on in the next call nothing waits.
     ``frames`` + ``unknown`` count frames, ``bad`` false starts; ``skipped_bytes`` are those of no frame.
     """
 
@@ -179,7 +196,7 @@ class Framer:
         """Bytes kept for the next call."""
         return len(self._rest)
 
-    def feed(self, data: bytes) -> Sequence[Frame]:
+    def feed(self, data: bytes, *, whole: bool = False) -> Sequence[Frame]:
         """The frames with a good checksum that ``data`` completes."""
         if self._rest:
             data = self._rest + data
@@ -188,24 +205,24 @@ class Framer:
             self._rest = b""
             self.frames += len(frames)
             return frames
-        return self._search(data, at, list(frames))
+        return self._search(data, at, list(frames), whole=whole)
 
-    def _search(self, data: bytes, at: int, found: list[Frame]) -> list[Frame]:
+    def _search(self, data: bytes, at: int, found: list[Frame], *, whole: bool) -> list[Frame]:
         """``found`` and the frames of ``data`` from ``at`` on, where something is wrong."""
         size = len(data)
         while at < size:
             frame = frame_at(data, at)
-            if frame is Flaw.PARTIAL:
+            if frame is Flaw.PARTIAL and not whole:
                 break
-            if frame is not Flaw.FALSE_START:
+            if not isinstance(frame, Flaw):
                 after = at + len(frame.data)
                 if frame.known:
                     found.append(frame)
                     at = after
                     continue
-                if after == size:
+                if after == size and not whole:
                     break
-                if data[after] in (START_V1, START_V2):
+                if after == size or data[after] in (START_V1, START_V2):
                     self.unknown += 1
                     at = after
                     continue

@@ -2,62 +2,63 @@
 
 from __future__ import annotations
 
-import selectors
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from threading import Event, Lock, Thread
 from typing import Final
 
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.tcp import TcpCaller, TcpListener
 from mavlink_bridge.node import Datagram
 
 CAPACITY: Final = 4096
-"""Datagrams that wait at most."""
+"""Datagrams that wait at most, of each link."""
+ROOM: Final = 1 << 20
+"""Bytes that wait at most, of each link."""
+HANDFUL: Final = 16384
+"""Bytes of each link that one step is given: what it can see through in some milliseconds, were it garbage of
+the worst kind, and ten times what a busy swarm says meanwhile."""
+FINGERS: Final = 256
+"""Datagrams of a handful."""
 _ROUND: Final = 0.02
 # s; in so long no link fills the buffer that the system keeps for it, not even a fast serial port.
-_ROUNDS: Final = 25
-# Every so many of the thread's rounds all links are read, so that those that have lost a peer look for it.
 
 
 class Inbox:
-    """``links``: pairs of the node's name for a link, and the link. Those that have something are read when
-    the inbox is emptied; and now and then by a thread, because the system's own buffers are small and a step
-    may be long. The thread does not wake for every datagram: its turns would be taken from the steps of all
-    on a small computer.
+    """``links``: pairs of the node's name for a link, and the link. They are read when the inbox is emptied;
+    and now and then by a thread, because the system's own buffers are small and a step may be long. The
+    thread does not wake for every datagram: its turns would be taken from the steps of all on a small
+    computer.
 
-    If more than ``capacity`` datagrams wait, the oldest are dropped and counted in ``overruns``.
+    A flood on one link costs those who speak on others nothing: each has a queue of its own. If more than
+    ``capacity`` datagrams wait in one, or ``ROOM`` bytes, the oldest are dropped and counted in ``overruns``;
+    over TCP the sender is made to wait instead.
     """
 
     def __init__(self, links: Sequence[tuple[str, Link]], capacity: int = CAPACITY) -> None:
-        self.overruns = 0
-        self._links = tuple(links)
-        # One question to the system instead of one for each link.
-        self._selector = selectors.DefaultSelector()
-        self._asked = [pair for pair in links if pair[1].fileno() is None]
-        for name, link in links:
-            fileno = link.fileno()
-            if fileno is not None:
-                self._selector.register(fileno, selectors.EVENT_READ, (name, link))
-        self._waiting: deque[Datagram] = deque(maxlen=capacity)
+        self._queues = tuple(_Queue(name, link, capacity) for name, link in links)
         # Whoever has it reads links: two at once would mix up the order of arrival.
         self._reading = Lock()
         self._closing = Event()
         self._thread = None
-        if len(self._asked) < len(self._links):
+        if any(link.fileno() is not None for _, link in links):
             self._thread = Thread(target=self._look_after, name="inbox", daemon=True)
             self._thread.start()
 
-    def empty(self) -> list[Datagram]:
-        """Take out all that has arrived, by link in the order of arrival. Raises BridgeError if the thread
-        has ended, which it never should."""
+    @property
+    def overruns(self) -> int:
+        """Datagrams that were dropped because too many waited."""
+        return sum(queue.overruns for queue in self._queues)
+
+    def take(self) -> list[Datagram]:
+        """Take out what has arrived, by link in the order of arrival, a handful of each; the rest waits.
+        Raises BridgeError if the thread has ended, which it never should."""
         if self._thread is not None and not self._thread.is_alive():
             raise BridgeError("the receiving thread has ended")
         with self._reading:
-            self._read([*(key.data for key, _ in self._selector.select(0)), *self._asked])
-            found = list(self._waiting)
-            self._waiting.clear()
-        return found
+            self._read()
+            return [datagram for queue in self._queues for datagram in queue.handful()]
 
     def close(self) -> None:
         """End the thread and wait for it; the links stay open. Again is harmless."""
@@ -65,20 +66,48 @@ class Inbox:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
-        self._selector.close()
 
-    def _read(self, links: Iterable[tuple[str, Link]]) -> None:
-        for name, link in links:
-            datagrams = [Datagram(name, data) for data in link.receive()]
-            if datagrams:
-                room = (self._waiting.maxlen or 0) - len(self._waiting)
-                self.overruns += max(len(datagrams) - room, 0)
-                self._waiting.extend(datagrams)
+    def _read(self) -> None:
+        for queue in self._queues:
+            queue.read()
 
     def _look_after(self) -> None:
-        rounds = 0
         while not self._closing.wait(_ROUND):
-            rounds += 1
             with self._reading:
-                every = rounds % _ROUNDS == 0
-                self._read(self._links if every else [key.data for key, _ in self._selector.select(0)])
+                self._read()
+
+
+class _Queue:
+    """What waits of one link, oldest first."""
+
+    def __init__(self, name: str, link: Link, capacity: int) -> None:
+        self.overruns = 0
+        self._name, self._link, self._capacity = name, link, capacity
+        self._throttles = isinstance(link, TcpCaller | TcpListener)
+        self._waiting: deque[Datagram] = deque()
+        self._bytes = 0
+
+    def read(self) -> None:
+        """Ask the link, unless its senders have said more than enough already and can be made to wait."""
+        if self._throttles and self._bytes >= HANDFUL:
+            return
+        for data in self._link.receive():
+            self._waiting.append(Datagram(self._name, data))
+            self._bytes += len(data)
+        while len(self._waiting) > self._capacity or self._bytes > ROOM:
+            self._pop()
+            self.overruns += 1
+
+    def handful(self) -> list[Datagram]:
+        """The oldest, and all that fit beside it."""
+        found: list[Datagram] = []
+        room = HANDFUL
+        while self._waiting and len(found) < FINGERS and (len(self._waiting[0].data) <= room or not found):
+            found.append(self._pop())
+            room -= len(found[-1].data)
+        return found
+
+    def _pop(self) -> Datagram:
+        datagram = self._waiting.popleft()
+        self._bytes -= len(datagram.data)
+        return datagram

@@ -134,7 +134,7 @@ class RealTime:
         return False
 
     def _step(self, now: int, inbox: Inbox) -> None:
-        arrived = inbox.empty()
+        arrived = inbox.take()
         self._overruns = inbox.overruns
         # Taps come last, so that writing a log makes no set-point late; but what a node fails at is logged.
         try:

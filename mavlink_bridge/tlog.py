@@ -18,7 +18,17 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.framing import LONGEST_FRAME, STARTS, Flaw, claimed_length, frame_at, leading_frames
+from mavlink_bridge.framing import (
+    LONGEST_FRAME,
+    STARTS,
+    Flaw,
+    Frame,
+    claimed_length,
+    frame_at,
+    leading_frames,
+    without_signature,
+)
+from mavlink_bridge.signing import SETUP_SIGNING
 from mavlink_bridge.tlog_stretch import Record, Stretch, leading_records
 
 __all__ = ["LINKS", "PLAUSIBLE_JUMP", "Record", "TlogReader", "TlogReport", "TlogWriter", "read_tlog"]
@@ -49,11 +59,14 @@ class TlogReport(NamedTuple):
 class TlogWriter:
     """Writes a tlog, compressed if ``path`` ends in ``.gz``; a context manager. Same records, same bytes.
 
+    Logs are passed on, so that no secret gets into them: signatures are taken off (with many of them a weak
+    key can be found), and SETUP_SIGNING, which holds a key, is left out and counted in ``withheld``.
     Raises LogError if the file cannot be made.
     """
 
     def __init__(self, path: Path | str) -> None:
         self.records = 0
+        self.withheld = 0
         self.skipped_bytes = 0
         self._gzip: gzip.GzipFile | None = None
         try:
@@ -88,17 +101,22 @@ class TlogWriter:
         stamp = _STAMP.pack(time_us & ~3 | link)
         target = self._file if self._gzip is None else self._gzip
         frames, at = leading_frames(data)
-        target.write(b"".join([stamp + frame.data for frame in frames]))
-        self.records += len(frames)
+        target.write(b"".join([self._record(stamp, frame) for frame in frames]))
         while at < len(data):
             frame = frame_at(data, at)
             if isinstance(frame, Flaw) or not (frame.known or _goes_on(data, at + len(frame.data))):
                 at += 1
                 self.skipped_bytes += 1
                 continue
-            target.write(stamp + frame.data)
-            self.records += 1
+            target.write(self._record(stamp, frame))
             at += len(frame.data)
+
+    def _record(self, stamp: bytes, frame: Frame) -> bytes:
+        if frame.message_id == SETUP_SIGNING:
+            self.withheld += 1
+            return b""
+        self.records += 1
+        return stamp + (without_signature(frame.data) if frame.signed else frame.data)
 
 
 def _goes_on(data: bytes, at: int) -> bool:

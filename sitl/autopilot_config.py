@@ -118,6 +118,10 @@ class AutopilotConfig(BaseModel):
     failures: Literal["refused", "obeyed"] = Field(
         "refused", description="MAV_CMD_INJECT_FAILURE; PX4's SYS_FAILURE_EN"
     )
+    signing_setup: Literal["refused", "obeyed"] = Field(
+        "refused",
+        description="SETUP_SIGNING, which brings a key in clear: only where no link leaves this machine",
+    )
     thrusting: Seconds = Field(
         1.0,
         description="a set-point's acceleration is extrapolated this long, its velocity until the time-out",

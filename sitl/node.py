@@ -14,8 +14,10 @@ import numpy.typing as npt
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_TYPE
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, Source, Vector
+from mavlink_bridge.messages import Message, SetupSigning, Source, Vector
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.parcels import parcels
+from mavlink_bridge.signing import Signing
 from sitl.airframe import hover_speeds
 from sitl.autopilot_config import AutopilotConfig
 from sitl.battery import Battery
@@ -52,6 +54,7 @@ from sitl.services import Services
 from sitl.steering import Steering
 from sitl.streams import usual_rates
 from sitl.telemetry import Telemetry
+from sitl.trust import Trust
 from sitl.vehicle import Reference, VehicleState
 from sitl.voice import Voice
 from sitl.weather import WeatherConfig
@@ -64,6 +67,8 @@ _COMPONENT: Final = 1
 # SET_MODE, PING, GLOBAL_POSITION_INT, COMMAND_INT, COMMAND_LONG, SET_ATTITUDE_TARGET,
 # SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT, TIMESYNC, FOLLOW_TARGET; and the services'.
 _HEARD: Final = frozenset((4, 11, 33, 75, 76, 82, 84, 86, 111, 144))
+# Messages, in answer to one datagram at most; what is more in it counts no more.
+_ANSWERS: Final = 32
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
 _FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
 
@@ -85,10 +90,12 @@ class Autopilot:
         seed: int,
         weather: WeatherConfig | None = None,
         saved: Saved | None = None,
+        signing: Signing | None = None,
     ) -> None:
         """On the ground at the configured place, which becomes the origin of its local frame, or as high
         above it as the configuration says. ``seed`` (≥ 0) with the system id for all noise. ``weather`` is
-        the air around it; without, the air stands still. ``saved``: what it kept of an earlier time."""
+        the air around it; without, the air stands still. ``saved``: what it kept of an earlier time.
+        ``signing``: its own, with the key of all who may command it; without, whoever can may."""
         saved = saved or Saved()
         rotors = len(vehicle.rotors)
         self._values = Values(_TABLES[config.flavour](rotors), config, saved.parameters)
@@ -214,8 +221,15 @@ class Autopilot:
             following,
             self._services.handlers,
         )
+        if signing is None and config.signing_setup == "obeyed":
+            signing = Signing()
+        if signing is not None:
+            signing.resume(saved.signed_until)
+        self._signing = signing
+        self._trust = Trust(self._source, signing, config.signing_setup, lambda: self._commander.armed, voice)
+        self._services.handlers[SetupSigning] = self._trust.set_up
         heard = _HEARD | {BY_TYPE[kind].id for kind in self._services.handlers}
-        self._codec = Codec(accept=lambda message_id, _system, _component: message_id in heard)
+        self._codec = Codec(lambda message_id, _system, _component: message_id in heard, signing)
         # What nearly every step finds empty and undue is looked at here, not asked for.
         self._reached = itinerary.reached
         self._work_due = self._services.next_due
@@ -232,7 +246,8 @@ class Autopilot:
         return f"sitl-{self.config.system_id}"
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Move to ``now``, then act on what arrived, then tell what is due: at most one datagram.
+        """Move to ``now``, then act on what arrived, then tell what is due: one datagram, or none, but for a
+        flood of questions.
 
         What arrives at ``now`` steers from ``now`` on. The first call is the boot.
         """
@@ -240,6 +255,8 @@ class Autopilot:
             self._boot = now
             self._telemetry.start(0)
         self._now = now - self._boot
+        if self._signing is not None:
+            self._signing.present(self.config.epoch + self._now)
         self._plant.move(self._now, armed=self._commander.armed)
         self._watch()
         for datagram in inbox:
@@ -259,11 +276,16 @@ class Autopilot:
     def _listen(self, datagram: Datagram) -> None:
         if datagram.link != LINK:
             return
-        for message in self._codec.feed(datagram.data):
+        enough = len(self._outbox) + _ANSWERS
+        for message in self._codec.feed(datagram.data, whole=True):
+            if len(self._outbox) >= enough:
+                # Answers go to all: what one asks beyond measure would be in the way of all others.
+                break
             mode = self._commander.mode
             self._reception.handle(message, self._now, self._plant.estimate())
             if self._announces and self._commander.mode is not mode:
                 self._telemetry.request(HEARTBEAT)
+        self._trust.watch(self._now)
         self._work_due = self._services.next_due
 
     def _tell(self) -> list[Datagram]:
@@ -274,12 +296,14 @@ class Autopilot:
             self._work_due = self._services.next_due
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
-            messages = messages + self._telemetry.collect(self._now, self._gauges.read(self._now))
+            told = self._telemetry.collect(self._now, self._gauges.read(self._now))
+            # Where there are many answers, what comes first has the better chance to find room on its way.
+            messages = told + messages if len(messages) > _ANSWERS else messages + told
         if not messages:
             return []
-        data = b"".join(map(self._codec.encode, messages))
+        data = parcels([self._codec.encode(message) for message in messages])
         self._outbox.clear()
-        return [Datagram(LINK, data)]
+        return [Datagram(LINK, parcel) for parcel in data]
 
     def _configure(self) -> None:
         """Take over the parameters that are settings, but for the system id, which counts from the next boot
@@ -292,7 +316,8 @@ class Autopilot:
     @property
     def saved(self) -> Saved:
         """What there is to keep for the next boot."""
-        return Saved(parameters=self._values.changed, plans=self._plans.all)
+        until = 0 if self._signing is None else self._signing.newest
+        return Saved(parameters=self._values.changed, plans=self._plans.all, signed_until=until)
 
     # Events and faults, from the next step on
 

@@ -90,13 +90,13 @@ class Reception:
         result, reason = self._orders.obey(message, now)
         self._outbox.append(CommandAck(self._source, message.command, result, 0, 0, *message.source))
         if reason:
-            self._voice.warn(reason)
+            self._voice.complain(reason, now)
 
     def _change_mode(self, message: SetMode, now: int) -> None:
         result, reason = self._orders.set_mode(message.custom_mode, message.base_mode, now)
         self._outbox.append(CommandAck(self._source, _SET_MODE, result, 0, 0, *message.source))
         if reason:
-            self._voice.warn(reason)
+            self._voice.complain(reason, now)
 
     def _serve(self, message: Message, now: int) -> None:
         handle = self._services.get(type(message))

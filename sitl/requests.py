@@ -21,6 +21,8 @@ REQUEST: Final = 512
 CAPABILITIES: Final = 520
 
 _LAST_ID: Final = 0xFFFF
+# µs, half an hour: more does not fit into MESSAGE_INTERVAL.
+_LONGEST: Final = 0x7FFFFFFF
 
 
 class Requests:
@@ -61,7 +63,8 @@ class Requests:
             return Denial(DENIED, "Interval refused: not a number")
         if 0.0 < interval < self._flavour.shortest_interval:
             return Denial(FAILED, f"Interval refused: {interval:.0f} us is too short")
-        if not self._telemetry.set_interval(int(message_id), round(interval), order.now):
+        wanted = min(round(interval), _LONGEST)
+        if not self._telemetry.set_interval(int(message_id), wanted, order.now):
             return Denial(DENIED, f"Interval refused: no message {message_id:.0f}")
         return None
 

@@ -3,13 +3,15 @@ it."""
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from mavlink_bridge.signing import LATEST
 from sitl.missions.items import Item
 
 
 class Saved(BaseModel):
-    """``parameters`` that are not as at first, by name; ``plans``: mission, fence and rally points.
+    """``parameters`` that are not as at first, by name; ``plans``: mission, fence and rally points;
+    ``signed_until``: the newest stamp of a signed message (10 µs since 2015).
 
     As JSON: ``model_dump_json`` and ``model_validate_json``, which refuses what is damaged.
     """
@@ -18,3 +20,4 @@ class Saved(BaseModel):
 
     parameters: dict[str, FiniteFloat] = {}
     plans: tuple[tuple[Item, ...], ...] = ()
+    signed_until: int = Field(0, ge=0, le=LATEST)

@@ -95,7 +95,9 @@ class Telemetry:
         """Send one at the next opportunity, whatever its stream does. False when there is no such message."""
         if message_id not in self._streams:
             return False
-        self._requested.append(message_id)
+        # One answers all who ask before it goes out.
+        if message_id not in self._requested:
+            self._requested.append(message_id)
         self.next_due = 0
         return True
 

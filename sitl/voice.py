@@ -11,7 +11,8 @@ _WARNING: Final = 4
 _INFO: Final = 6
 
 _SECOND: Final = 1_000_000
-_REASONS: Final = 64
+# Complaints of a second: who makes up thousands of mistakes need not be told of each.
+_MOST: Final = 32
 
 
 class Voice:
@@ -31,10 +32,14 @@ class Voice:
         self._outbox.append(StatusText(self._source, _WARNING, text))
 
     def complain(self, text: str, now: int) -> None:
-        """Warn, but of the same thing at most once a second (``now`` in µs)."""
-        if now - self._complaints.get(text, -_SECOND) < _SECOND:
+        """Warn, but of the same thing at most once a second (``now`` in µs), and 32 times a second in all."""
+        complaints = self._complaints
+        if now - complaints.get(text, -_SECOND) < _SECOND:
             return
-        if len(self._complaints) >= _REASONS:
-            self._complaints = {said: then for said, then in self._complaints.items() if now - then < _SECOND}
-        self._complaints[text] = now
+        if len(complaints) >= _MOST:
+            for said in [said for said, then in complaints.items() if now - then >= _SECOND]:
+                del complaints[said]
+            if len(complaints) >= _MOST:
+                return
+        complaints[text] = now
         self.warn(text)

@@ -23,7 +23,8 @@ class Profile(NamedTuple):
 
     ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer. ``streams_first``: set-points must
     flow before the mode is granted. ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level,
-    not above home.
+    not above home. ``loss_modes``: what custom_mode may be when set-points were
+    missing for too long, and nobody chose it.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Profile(NamedTuple):
     setpoint_mask: int
     streams_first: bool
     takeoff_absolute: bool
+    loss_modes: frozenset[int] = frozenset()
 
 
 def is_guided(profile: Profile, heartbeat: Heartbeat) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.fields.units import Fields, degrees_e7, on_globe
+from mavlink_bridge.key import Key
 
 NAME_LENGTH = 16
 FILE_LENGTH = 251
@@ -94,3 +95,11 @@ def set_home(s: m.Source, f: Fields) -> m.SetHomePosition | None:
     if not on_globe(f[0], f[1]):
         return None
     return m.SetHomePosition(s, f[0] / 1e7, f[1] / 1e7, f[2] / 1e3, f[3:6], f[6:10], f[10:13], f[13], f[14])
+
+
+def setup_signing(s: m.Source, f: Fields) -> m.SetupSigning:
+    return m.SetupSigning(s, f[0], f[1], f[2], Key(f[3]))
+
+
+def setup_signing_fields(x: m.SetupSigning) -> Fields:
+    return x.since, x.target_system, x.target_component, bytes(x.key)

@@ -7,7 +7,7 @@ from typing import Final
 
 from mavlink_bridge.framing import Framer
 
-_CHUNK: Final = 65536
+_CHUNK: Final = 8192
 
 
 class Assembler:
@@ -39,6 +39,7 @@ class Stream:
         self._backlog = backlog
         self._assembler = Assembler()
         self._waiting = b""
+        self._stuck_at: int | None = None
         self.alive = True
         """False once the other side is gone; then only ``close`` makes sense."""
 
@@ -52,7 +53,7 @@ class Stream:
         return self._fileno
 
     def read(self) -> bytes | None:
-        """What has arrived, in whole frames as far as it is frames, about 64 KiB at most; None if there is
+        """What has arrived, in whole frames as far as it is frames, about 8 KiB at most; None if there is
         nothing."""
         try:
             data = os.read(self._fileno, _CHUNK)
@@ -64,6 +65,14 @@ class Stream:
             self.alive = False
             return None
         return self._assembler.feed(data)
+
+    def stuck(self, now: int) -> int:
+        """For how long (µs) something has been waiting of which the other side took nothing, at ``now``."""
+        if not self._waiting:
+            return 0
+        if self._stuck_at is None:
+            self._stuck_at = now
+        return now - self._stuck_at
 
     def write(self, data: bytes) -> bool:
         """False if ``data`` was refused; then none of it has been or will be written."""
@@ -79,6 +88,7 @@ class Stream:
         try:
             while self._waiting:
                 self._waiting = self._waiting[os.write(self._fileno, self._waiting) :]
+                self._stuck_at = None
         except BlockingIOError:
             pass
         except OSError:

@@ -12,12 +12,16 @@ from mavlink_bridge.links.stream import Stream
 
 RETRY: Final = 1_000_000
 """µs between two attempts to get a lost connection back."""
-_READS: Final = 16
+HUNG: Final = 30_000_000
+"""µs after which a peer that takes nothing of what waits for it is given up: it would hold its place for
+ever."""
+_ENOUGH: Final = 16384
+# Bytes of all streams that are taken in at once: there may be many, full of what takes long to look at.
 
 
 class StreamLink:
-    """A link over any number of streams. A stream that breaks is dropped, and if none is left, ``_reopen`` is
-    called once a second.
+    """A link over any number of streams. A stream that breaks or hangs is dropped, and if none is left,
+    ``_reopen`` is called once a second.
 
     The two threads that may use a link share its streams, hence the lock; nothing within it waits.
     """
@@ -29,7 +33,7 @@ class StreamLink:
         self._clock = clock
         self._backlog = backlog
         self._streams: list[Stream] = []
-        self._received = self._sent = self._dropped = 0
+        self._received = self._sent = self._dropped = self._turn = 0
         self._next_attempt = clock.now()
         self._open = True
         self._fileno = _number(self._selector)
@@ -55,12 +59,12 @@ class StreamLink:
             if not self._open:
                 return found
             self._recover()
-            for key, _ in self._selector.select(0):
-                stream = key.fileobj
-                if isinstance(stream, Stream):
-                    self._serve(stream, found)
-                else:
+            size = 0
+            for stream in self._ready():
+                if not isinstance(stream, Stream):
                     self._attend(stream)
+                elif size < _ENOUGH:
+                    size += self._serve(stream, found)
             self._received += len(found)
             return found
 
@@ -117,19 +121,25 @@ class StreamLink:
             self._next_attempt = now + RETRY
             self._reopen(now)
 
-    def _serve(self, stream: Stream, found: list[bytes]) -> None:
-        for _ in range(_READS):
-            data = stream.read()
-            if data is None:
-                break
-            if data:
-                found.append(data)
+    def _ready(self) -> list[Any]:
+        """What there is to do, each time beginning with another one."""
+        ready = [key.fileobj for key, _ in self._selector.select(0)]
+        self._turn = turn = (self._turn + 1) % max(len(ready), 1)
+        return ready[turn:] + ready[:turn]
+
+    def _serve(self, stream: Stream, found: list[bytes]) -> int:
+        """Read a little, so that who says most is not all that is heard, and the rest the next time. How much
+        it was."""
+        data = stream.read()
+        if data:
+            found.append(data)
         stream.flush()
         self._settle(stream)
+        return len(data or b"")
 
     def _settle(self, stream: Stream) -> None:
-        """Watch for room only while something waits for it; drop what is broken."""
-        if not stream.alive:
+        """Watch for room only while something waits for it; drop what is broken or hangs."""
+        if not stream.alive or (stream.waits and stream.stuck(self._clock.now()) > HUNG):
             self._selector.unregister(stream)
             self._streams.remove(stream)
             stream.close()

@@ -20,10 +20,26 @@ PATIENCE: Final = 5_000_000
 """µs for which one call is left ringing: a lost packet is repeated after one second and after three."""
 
 
+_UNHEARD: Final = 30
+# s without a sign of life from the other machine: what it has not acknowledged, and probes when all is quiet.
+_WATCH: Final = {
+    "TCP_USER_TIMEOUT": 1000 * _UNHEARD,
+    "TCP_KEEPIDLE": 15,
+    "TCP_KEEPINTVL": 5,
+    "TCP_KEEPCNT": 3,
+}
+
+
 def _quick(connection: socket.socket) -> None:
-    """Small packets at once, and a notice within some time that the other machine is gone."""
+    """Small packets at once, little that waits in the system beside the own backlog, and a notice within
+    half a minute, where the system can give it, that the other machine is gone."""
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BACKLOG)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in _WATCH.items():
+        option = getattr(socket, name, None)
+        if option is not None:
+            connection.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
 class TcpCaller(StreamLink):
@@ -31,8 +47,9 @@ class TcpCaller(StreamLink):
     side may be started later."""
 
     def __init__(self, endpoint: TcpOut, clock: Clock) -> None:
-        super().__init__(clock, BACKLOG)
+        # First, so that a host without address leaves nothing open.
         self._family, self._address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
+        super().__init__(clock, BACKLOG)
         self._calling: socket.socket | None = None
         self._called_at = 0
         self.receive()
@@ -80,8 +97,8 @@ class TcpListener(StreamLink):
     """``tcpin``: what is sent goes to everyone who has called."""
 
     def __init__(self, endpoint: TcpIn, clock: Clock) -> None:
-        super().__init__(clock, BACKLOG)
         family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
+        super().__init__(clock, BACKLOG)
         self._door = door = socket.socket(family, socket.SOCK_STREAM)
         try:
             # Or a restart would have to wait a minute for the port.
@@ -109,8 +126,9 @@ class TcpListener(StreamLink):
             if self.peers >= MOST_CALLERS:
                 caller.close()
                 return
-            _quick(caller)
-            self._adopt(caller.detach())
+            with caller:
+                _quick(caller)
+                self._adopt(caller.detach())
 
     def _release(self) -> None:
         self._door.close()

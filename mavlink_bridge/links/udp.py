@@ -18,6 +18,8 @@ Address = tuple[Any, ...]
 REMEMBERED: Final = 10_000_000
 """µs for which a peer of a listening link is answered after it was last heard; the last one for ever."""
 MOST_PEERS: Final = 32
+STEADY: Final = 3_000_000
+"""µs in which a peer has to say something, or one more may take its place when there are too many."""
 _LONGEST: Final = 65536
 # The default holds some 250 packets: less than a swarm sends while one plan is being solved on a busy host.
 _BUFFER: Final = 1 << 20
@@ -94,11 +96,13 @@ class _Udp:
 
 
 class UdpListener(_Udp):
-    """``udpin``: binds, and sends everything to all peers heard in the last 10 s, or else to the last one;
-    and always to the endpoint's own peer, if it has one.
+    """``udpin``: binds, and sends everything to all peers heard in the last 10 s, or else to the last one.
+    When there are too many, those that go on speaking stay, and what one more says is heard but not answered:
+    else somebody with many ports could take the stream away from all others.
 
     As pymavlink and unlike mavlink-router's server mode, which answers the last one only: with two peers
     (an autopilot's two ports, a ground station beside a script) each would then see half of the stream.
+    The endpoint's own peer, if it has one, is sent everything always.
     """
 
     def __init__(self, endpoint: UdpIn, clock: Clock) -> None:
@@ -129,7 +133,10 @@ class UdpListener(_Udp):
             peer: time for peer, time in self._peers.items() if peer != source and now - time <= REMEMBERED
         }
         if len(peers) >= MOST_PEERS:
-            del peers[next(iter(peers))]
+            silent = next(iter(peers))
+            if now - peers[silent] <= STEADY:
+                return True
+            del peers[silent]
         peers[source] = now
         self._peers = peers
         return True

@@ -60,6 +60,7 @@ from mavlink_bridge.messages.services import (
     SetGpsGlobalOrigin,
     SetHomePosition,
     SetMode,
+    SetupSigning,
 )
 from mavlink_bridge.messages.source import Source, Vector
 from mavlink_bridge.messages.status import (
@@ -130,6 +131,7 @@ Message = (
     | RawImu
     | HighresImu
     | SimState
+    | SetupSigning
 )
 
 __all__ = [
@@ -182,6 +184,7 @@ __all__ = [
     "SetpointAttitude",
     "SetpointGlobal",
     "SetpointLocal",
+    "SetupSigning",
     "SimState",
     "Source",
     "StatusText",

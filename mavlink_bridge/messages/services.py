@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages.source import Source, Vector
 
 
@@ -142,3 +143,14 @@ class MessageInterval(NamedTuple):
     source: Source
     interval: int
     message_id: int
+
+
+class SetupSigning(NamedTuple):
+    """SETUP_SIGNING (256): sign with ``key`` from now on, which is ``since`` (10 µs since 2015); zeros in
+    both end signing."""
+
+    source: Source
+    since: int
+    target_system: int
+    target_component: int
+    key: Key

@@ -19,6 +19,7 @@ class Plans:
         """``saved``: the items of mission, fence and rally points; what would be refused is left out."""
         self.changed: Callable[[], None] = lambda: None
         self._items: dict[Type, tuple[Item, ...]] = dict.fromkeys(Type, ())
+        self._identities: dict[Type, int] = {}
         for of, items in zip(Type, saved, strict=False):
             sound = all(fault(item, of) == ACCEPTED for item in items)
             if sound and whole_fault(items, of) == ACCEPTED:
@@ -31,11 +32,18 @@ class Plans:
     def replace(self, of: Type, items: tuple[Item, ...]) -> None:
         """Another plan from now on."""
         self._items[of] = items
+        self._identities.pop(of, None)
         if of is Type.MISSION:
             self.changed()
 
     def identity(self, of: Type) -> int:
         """The opaque id of one plan: the same for the same items, 0 for none."""
+        # Worked out once, as it goes out with every acknowledgement.
+        if of not in self._identities:
+            self._identities[of] = self._summed(of)
+        return self._identities[of]
+
+    def _summed(self, of: Type) -> int:
         items = self._items[of]
         if not items:
             return 0

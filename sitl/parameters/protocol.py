@@ -52,29 +52,39 @@ class ParameterProtocol:
         self._changed = changed
         self._bytewise = bytewise
         self._next = 0
+        self._again = False
         self.next_due = _NEVER
 
     def handle(self, message: ParamRequestList | ParamRequestRead | ParamSet, now: int) -> None:
         """Act on a message for this vehicle that arrived at ``now`` (µs)."""
         match message:
             case ParamRequestList():
-                # A second request while a list goes out begins anew, as real ones do.
-                self._next = 0
-                self.next_due = now
-                if self._bytewise:
-                    self._outbox.append(self._hash())
+                # Who asks while a list goes out gets the rest of it and then one more. Real ones begin anew
+                # at once, so that of two who keep asking neither gets the end.
+                if self.next_due == _NEVER:
+                    self._begin(now)
+                else:
+                    self._again = True
             case ParamRequestRead():
-                self._read(message)
+                self._read(message, now)
             case ParamSet():
                 self._set(message, now)
 
     def work(self, now: int) -> None:
         """Send the next part of the list."""
+        if self._next == len(self._values):
+            self._begin(now)
         first, self._next = self._next, min(self._next + _BURST, len(self._values))
-        self.next_due = now + _PAUSE if self._next < len(self._values) else _NEVER
+        goes_on = self._next < len(self._values) or self._again
+        self.next_due = now + _PAUSE if goes_on else _NEVER
         self._outbox += [self._value(number) for number in range(first, self._next)]
 
-    def _read(self, message: ParamRequestRead) -> None:
+    def _begin(self, now: int) -> None:
+        self._next, self._again, self.next_due = 0, False, now
+        if self._bytewise:
+            self._outbox.append(self._hash())
+
+    def _read(self, message: ParamRequestRead, now: int) -> None:
         if message.number >= 0:
             if message.number < len(self._values):
                 self._outbox.append(self._value(message.number))
@@ -86,13 +96,14 @@ class ParameterProtocol:
         if number is not None:
             self._outbox.append(self._named(number))
         elif self._bytewise:
-            self._voice.warn(f"unknown parameter {message.name}")
+            self._voice.complain(f"unknown parameter {message.name}", now)
 
     def _set(self, message: ParamSet, now: int) -> None:
         values = self._values
         if self._bytewise and message.name == HASH:
-            # The client has this list already.
-            self.next_due = _NEVER
+            # The client has this list already; who asked since perhaps not.
+            if not self._again:
+                self.next_due = _NEVER
             return
         number = values.number(message.name)
         if number is None:

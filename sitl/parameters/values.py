@@ -26,6 +26,7 @@ class Values:
         self._numbers = {parameter.name: number for number, parameter in enumerate(self.table)}
         self._initial = [_initial(parameter, config) for parameter in self.table]
         self._values = list(self._initial)
+        self._digest: int | None = None
         for name, value in saved.items():
             number = self._numbers.get(name)
             if number is not None and self.table[number].denial(value) is None:
@@ -54,11 +55,13 @@ class Values:
         denial = parameter.denial(value)
         if denial is None:
             self._values[number] = value
+            self._digest = None
         return denial
 
     def reset(self) -> None:
         """All as at first."""
         self._values = list(self._initial)
+        self._digest = None
 
     @property
     def changed(self) -> dict[str, float]:
@@ -83,6 +86,11 @@ class Values:
 
     def digest(self) -> int:
         """PX4's ``_HASH_CHECK``: CRC-32 over names and values, without inversion at either end."""
+        if self._digest is None:
+            self._digest = self._summed()
+        return self._digest
+
+    def _summed(self) -> int:
         crc = 0
         for parameter, value in zip(self.table, self._values, strict=True):
             data = parameter.name.encode() + encoded(value, parameter.kind, bytewise=True)

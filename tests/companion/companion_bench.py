@@ -18,6 +18,7 @@ from companion.node import COMPONENT, Companion
 from companion.pilot import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     Attitude,
     CommandAck,
@@ -33,6 +34,7 @@ from mavlink_bridge.messages import (
     SysStatus,
 )
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
 
 PROFILES = {"ardupilot": ARDUPILOT, "px4": PX4}
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
@@ -52,7 +54,7 @@ M = TypeVar("M", bound=Message)
 class PerfectAutopilot:
     """Grants every command, climbs at 2 m/s and is where its set-points say. Its origin is the fleet's."""
 
-    def __init__(self, profile: Profile, start: Any) -> None:
+    def __init__(self, profile: Profile, start: Any, key: Key | None = None) -> None:
         self.profile = profile
         self.home = np.asarray(start, dtype=float)
         self.position, self.velocity, self.yaw = self.home.copy(), np.zeros(3), 0.0
@@ -61,11 +63,13 @@ class PerfectAutopilot:
         self.heard: list[Message] = []
         self._local = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
         self._climb: float | None = None
-        self._codec = Codec()
+        self._signing = Signing(key)
+        self._codec = Codec(None, self._signing)
 
     def step(self, now: int, data: bytes) -> bytes:
         """What it says (``mute``: heartbeats only) after ``data``."""
         answers: list[Message] = []
+        self._signing.present(now)
         for message in self._codec.feed(data):
             self.heard.append(message)
             if isinstance(message, CommandLong):
@@ -133,19 +137,29 @@ class PerfectAutopilot:
 
 
 class Bench:
-    """``fly`` lets time pass; ``sent`` holds everything the companion sent, as (time, link, message)."""
+    """``fly`` lets time pass; ``sent`` holds everything the companion sent, as (time, link, message).
+    ``key``: the companion's; ``others``: that of all others."""
 
-    def __init__(self, flavour: str = "ardupilot", start: Any = (0.0, 0.0, 0.0), **settings: Any) -> None:
+    def __init__(
+        self,
+        flavour: str = "ardupilot",
+        start: Any = (0.0, 0.0, 0.0),
+        key: Key | None = None,
+        others: Key | None = None,
+        **settings: Any,
+    ) -> None:
         settings = {"task": "goto", "rates": {"replan_us": 50_000}, **settings}
         self.config = CompanionConfig.model_validate(settings)
         stopwatch = count()
-        self.companion = Companion(self.config, SYSTEM, TARGET, FLEET, lambda: next(stopwatch))
-        self.autopilot = PerfectAutopilot(PROFILES[flavour], start)
+        signing = None if key is None else Signing(key)
+        self.companion = Companion(self.config, SYSTEM, TARGET, FLEET, lambda: next(stopwatch), signing)
+        self.autopilot = PerfectAutopilot(PROFILES[flavour], start, others)
         self.now = START
         self.sent: list[tuple[int, str, Message]] = []
         self.target: GlobalPosition | None = None
         self._readers = {link: Codec() for link in LINKS}
-        self._writer = Codec()
+        self._ground = Signing(others)
+        self._writer = Codec(None, self._ground)
         self._to_autopilot = b""
 
     @property
@@ -205,6 +219,7 @@ class Bench:
         return self.until(Phase.ESCORT)
 
     def datagram(self, link: str, *messages: Message) -> Datagram:
+        self._ground.present(self.now)
         return Datagram(link, b"".join(map(self._writer.encode, messages)))
 
 

@@ -32,6 +32,7 @@ from companion_bench import (
 
 from companion.errors import SolverError
 from companion.guard import Holding
+from companion.node import NAV_LOITER_UNLIM, NAV_RETURN
 from companion.pilot import Phase
 from mavlink_bridge.messages import (
     Attitude,
@@ -432,3 +433,22 @@ def test_absurd_numbers_from_the_own_autopilot_move_nothing(flying, absurd):
     assert found
     assert np.isfinite([numbers_of(m) for m in found]).all()
     np.testing.assert_allclose([place(m) for m in found], np.tile(HOLDING, (len(found), 1)), atol=0.1)
+
+
+# Orders under way
+
+
+def test_it_holds_where_it_is_told_and_comes_back_to_where_it_started(flying):
+    start = flying.autopilot.position.copy()
+    flying.go_to([6.0, 3.0, 6.0])
+    flying.fly(6.0)
+    assert [ack.result for ack in flying.order(NAV_LOITER_UNLIM)] == [ACCEPTED]
+    flying.fly(3.0)
+    held = flying.autopilot.position.copy()
+    flying.go_to([-6.0, 0.0, 6.0])
+    flying.fly(3.0)
+    np.testing.assert_allclose(flying.autopilot.position, held, atol=0.1)
+    assert [ack.result for ack in flying.order(NAV_RETURN)] == [ACCEPTED]
+    flying.fly(8.0)
+    assert flying.phase in (Phase.SETTLE, Phase.LAND, Phase.DONE)
+    assert np.linalg.norm(flying.autopilot.position[:2] - start[:2]) < 0.6

@@ -35,6 +35,7 @@ HEIGHT, GROUND = 6.0, 2.5
 HALF = 500_000
 LOCAL = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
 FLAVOURS = tuple(PROFILES)
+IN_FLIGHT = ExtendedSysState(AUTOPILOT, 0, 2)
 HEALTHY = SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, None, None)
 ILL = SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, 0, None, None)
 
@@ -365,17 +366,124 @@ def test_only_who_settles_can_have_settled(phase):
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize(
-    ("armed", "guided", "streams"),
-    [(True, True, True), (True, False, False), (False, True, False), (False, False, False)],
-)
-def test_in_flight_set_points_are_for_an_armed_vehicle_in_our_mode(flavour, armed, guided, streams):
-    """Somebody takes the vehicle over by its mode switch: nothing is sent, nothing is ordered back."""
+@pytest.mark.parametrize("landing", [False, True])
+def test_who_takes_the_vehicle_over_by_its_mode_switch_has_it_until_they_give_it_back(flavour, landing):
+    """Nothing is sent, nothing is ordered back."""
     rig = Rig(flavour).escorting()
-    assert rig.run(2.0, beat(flavour, armed, guided)) == []
-    assert rig.pilot.streaming == streams
-    rig.tick(beat(flavour, True, True))
+    before = Phase.ESCORT
+    if landing:
+        rig.pilot.land()
+        before = Phase.SETTLE
+    assert rig.run(60.0, beat(flavour, armed=True, guided=False)) == []
+    assert rig.pilot.phase is Phase.YIELDED
+    assert not rig.pilot.streaming
+    rig.tick(beat(flavour, armed=True, guided=True))
+    assert rig.pilot.phase is before
     assert rig.pilot.streaming
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_new_go_takes_the_vehicle_back_in_flight_and_asks_for_the_mode_alone(flavour):
+    rig = Rig(flavour).escorting()
+    rig.run(5.0, beat(flavour, armed=True), HEALTHY, IN_FLIGHT)
+    assert rig.pilot.phase is Phase.YIELDED
+    assert rig.pilot.go(HEIGHT)
+    sent = rig.run(3.0, beat(flavour, armed=True), HEALTHY, IN_FLIGHT, acks=True)
+    assert {command for command, _ in sent} == {INTERVAL, MODE}
+    rig.run(0.2, beat(flavour, armed=True, guided=True))
+    assert rig.pilot.phase is Phase.ESCORT
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("guided", [False, True])
+def test_who_disarms_it_ends_the_flight(flavour, guided):
+    """Armed again by somebody, who will not expect it to fly: a new go is needed."""
+    rig = Rig(flavour).escorting()
+    rig.run(0.1, beat(flavour, guided=guided))
+    assert rig.pilot.phase is Phase.CONNECT
+    sent = rig.run(3.0, beat(flavour, armed=True, guided=True), HEALTHY, IN_FLIGHT, acks=True)
+    assert {command for command, _ in sent} == {INTERVAL}
+    assert rig.pilot.waiting_for == "the operator's go"
+    assert not rig.pilot.streaming
+
+
+LOSS = sorted(PROFILES["px4"].loss_modes)
+
+
+@pytest.mark.parametrize("mode", LOSS)
+@pytest.mark.parametrize("gap", [2.0, 0.0], ids=["after a gap", "out of the blue"])
+def test_px4_is_asked_for_offboard_again_only_where_missing_set_points_ended_it(mode, gap):
+    rig = Rig("px4").escorting()
+    flying = beat("px4", armed=True, guided=True)
+    lost = flying._replace(custom_mode=mode)
+    for _ in range(100):
+        rig.pilot.streamed(rig.now)
+        rig.tick(flying)
+    rig.now += round(gap * 1e6)
+    sent = rig.tick(lost)
+    if not gap:
+        assert rig.pilot.phase is Phase.YIELDED
+        return
+    assert [command for command, _ in sent] == [MODE]
+    assert rig.pilot.streaming
+    rig.pilot.streamed(rig.now)
+    rig.tick(flying)
+    assert rig.pilot.phase is Phase.ESCORT
+    # Later on it was somebody.
+    for _ in range(500):
+        rig.pilot.streamed(rig.now)
+        rig.tick(flying)
+    assert rig.tick(lost) == []
+    assert rig.pilot.phase is Phase.YIELDED
+
+
+def test_asking_for_offboard_again_ends():
+    rig = Rig("px4").escorting()
+    flying = beat("px4", armed=True, guided=True)
+    rig.pilot.streamed(rig.now)
+    rig.tick(flying)
+    rig.now += 2_000_000
+    lost = flying._replace(custom_mode=LOSS[0])
+    sent = []
+    for _ in range(1000):
+        rig.pilot.streamed(rig.now)
+        sent += rig.tick(lost)
+    assert {command for command, _ in sent} == {MODE}
+    assert rig.pilot.phase is Phase.YIELDED
+
+
+def test_a_switch_to_a_mode_of_a_pilot_is_no_accident_even_after_a_gap():
+    rig = Rig("px4").escorting()
+    rig.pilot.streamed(rig.now)
+    rig.now += 2_000_000
+    manual = beat("px4", armed=True)._replace(custom_mode=1 << 16)
+    assert rig.tick(manual) == []
+    assert rig.pilot.phase is Phase.YIELDED
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_hold_come_back_and_go_on(flavour):
+    rig = Rig(flavour).escorting()
+    flying = beat(flavour, armed=True, guided=True)
+    pilot = rig.pilot
+    for order, phase in (
+        (pilot.hold, Phase.HOLD),
+        (pilot.come_back, Phase.RETURN),
+        (lambda: pilot.go(HEIGHT), Phase.ESCORT),
+        (pilot.come_back, Phase.RETURN),
+        (pilot.hold, Phase.HOLD),
+    ):
+        assert order()
+        assert pilot.phase is phase
+        assert rig.run(1.0, flying) == []
+        assert pilot.streaming
+    pilot.returned()
+    assert pilot.phase is Phase.HOLD
+    assert pilot.come_back()
+    pilot.returned()
+    assert pilot.phase is Phase.SETTLE
+    assert not pilot.hold()
+    np.testing.assert_array_equal(pilot.start, [0.0, 0.0, GROUND])
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -13,6 +13,7 @@ from companion.helm import Helm
 from companion.node import COMPONENT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     CommandLong,
     GpsGlobalOrigin,
@@ -27,6 +28,7 @@ from mavlink_bridge.plan_wire import PAYLOAD_TYPE, WirePlan, pack, quantise
 from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
 from mavlink_bridge.roster_wire import Roster
 from mavlink_bridge.roster_wire import pack as pack_roster
+from mavlink_bridge.signing import Signing
 
 SYSTEM = 11
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
@@ -41,9 +43,12 @@ YAW = 0.7
 class Bench:
     """A helm, and a companion that speaks until it is told not to."""
 
-    def __init__(self) -> None:
-        self.helm = Helm(CONFIG, SYSTEM, FLEET)
-        self.codec, self.reader = Codec(), Codec()
+    def __init__(self, key: Key | None = None, companions: Key | None = None) -> None:
+        """``key``: the helm's; ``companions``: its companion's, and the autopilot's."""
+        self.helm = Helm(CONFIG, SYSTEM, FLEET, None if key is None else Signing(key))
+        signing = Signing(companions)
+        signing.present(BEGIN)
+        self.codec, self.reader = Codec(None, signing), Codec()
         self.now = BEGIN
         self.speaks = self.beats = True
         self.mode, self.armed = GUIDED, True
@@ -226,3 +231,23 @@ def test_garbage_is_harmless(garbage: list[tuple[str, bytes]]) -> None:
     bench = silent(Bench())
     bench.helm.step(bench.now, [Datagram(link, data) for link, data in garbage])
     assert bench.run(0.5)
+
+
+KEY = Key.of_passphrase("correct horse")
+
+
+def test_with_the_same_key_it_carries_on_as_without_any():
+    sent = []
+    for key in (None, KEY):
+        bench = Bench(key, key)
+        bench.run(1.0)
+        bench.speaks = False
+        sent.append(bench.run(1.0))
+    assert sent[0] == sent[1] != []
+
+
+def test_with_another_key_it_hears_nobody_and_carries_nothing_on():
+    bench = Bench(KEY, None)
+    bench.run(1.0)
+    bench.speaks = False
+    assert bench.run(2.0) == []

@@ -24,6 +24,7 @@ from wire_values import (
 )
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.key import Key
 
 four = st.tuples(f32, f32, f32, f32)
 name = st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=16)
@@ -43,6 +44,9 @@ SERVICES: Kinds = {
     m.ParamSet: st.builds(m.ParamSet, source, raw, u8, u8, name, u8),
     m.SetGpsGlobalOrigin: st.builds(m.SetGpsGlobalOrigin, source, latitude, longitude, millimetres, u8, u64),
     m.RequestDataStream: st.builds(m.RequestDataStream, source, u16, u8, u8, u8, u8),
+    m.SetupSigning: st.builds(
+        m.SetupSigning, source, u64, u8, u8, st.builds(Key, st.binary(min_size=32, max_size=32))
+    ),
     m.FileTransfer: st.builds(m.FileTransfer, source, u8, u8, u8, st.binary(min_size=251, max_size=251)),
     m.AutopilotVersion: st.builds(
         m.AutopilotVersion,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink_bridge.clock import Clock, SimulatedClock, SkewedClock, WallClock
+from mavlink_bridge.clock import Clock, PacedClock, SimulatedClock, SkewedClock, WallClock
 from mavlink_bridge.node_clock import NodeClock
 
 
@@ -57,3 +58,54 @@ def test_who_waits_on_a_skewed_clock_wakes_when_it_shows_the_time(
         assert target <= clock.now() <= target + 1
         # Slow or fast by 500 ppm at most.
         assert abs((true.now() - before) - wait) <= wait * 0.000501 + 2
+
+
+SPEEDS = st.floats(0.01, 1000.0)
+# µs of wall time that pass between two waits, and how far (µs, simulated) one then waits.
+TURNS = st.lists(st.tuples(st.integers(0, 10**7), st.integers(-(10**5), 10**7)), max_size=20)
+
+
+@given(SPEEDS, st.integers(1, 10**6), TURNS)
+def test_paced_time_never_goes_back_and_no_stride_is_longer_than_allowed(
+    speed: float, stride: int, turns: list[tuple[int, int]]
+) -> None:
+    wall = SimulatedClock(10**15)
+    clock = PacedClock(wall, speed, stride)
+    readings = [clock.now()]
+    assert readings == [0]
+    for busy, ahead in turns:
+        woken = clock.now()
+        wall.wait_until(wall.now() + busy)
+        readings.append(clock.now())
+        assert readings[-1] - woken <= stride
+        target = clock.now() + ahead
+        clock.wait_until(target)
+        readings.append(clock.now())
+        assert readings[-1] >= target
+        # It oversleeps by the rounding of one µs of the wall at most.
+        assert readings[-1] <= max(target, readings[-2]) + 2 * speed + 2
+    assert readings == sorted(readings)
+    assert clock.lost >= 0
+
+
+@given(SPEEDS, TURNS)
+def test_paced_time_keeps_its_speed_as_long_as_nothing_is_lost(
+    speed: float, turns: list[tuple[int, int]]
+) -> None:
+    wall = SimulatedClock(10**15)
+    clock = PacedClock(wall, speed, 10**12)
+    for busy, ahead in turns:
+        wall.wait_until(wall.now() + busy)
+        clock.wait_until(clock.now() + ahead)
+        assert abs(clock.now() - (wall.now() - 10**15) * speed) <= 1
+    assert clock.lost == 0
+
+
+def test_what_is_lost_is_what_is_missing() -> None:
+    wall = SimulatedClock(0)
+    clock = PacedClock(wall, 2.0, 1_000)
+    wall.wait_until(10_000)
+    assert clock.now() == 1_000
+    assert clock.lost == 19_000
+    clock.wait_until(1_500)
+    assert wall.now() == pytest.approx(10_250, abs=2)

@@ -31,6 +31,8 @@ KINDS = (UdpIn, UdpOut, Multicast, TcpOut, TcpIn, Serial, Replay)
         ("udpin:0.0.0.0:14550", UdpIn("0.0.0.0", 14550)),
         ("udpin:127.0.0.1:0", UdpIn("127.0.0.1", 0)),
         ("udpin://localhost:14540", UdpIn("localhost", 14540)),
+        ("udpin:127.0.0.1:14580,127.0.0.1:14540", UdpIn("127.0.0.1", 14580, ("127.0.0.1", 14540))),
+        ("udpin:[::1]:0,[::1]:9", UdpIn("::1", 0, ("::1", 9))),
         ("udpout:192.168.1.7:14550", UdpOut("192.168.1.7", 14550)),
         ("udpout:[fe80::1%eth0]:14550", UdpOut("fe80::1%eth0", 14550)),
         ("tcp:drone-7.local:5760", TcpOut("drone-7.local", 5760)),
@@ -60,6 +62,9 @@ def test_the_forms(text: str, endpoint: Endpoint) -> None:
         ("udpin:127.0.0.1", "the port is missing"),
         ("udpin::14550", "127.0.0.1 for this machine only"),
         ("udpin:127.0.0.1:65536", "port '65536' is outside 0…65535"),
+        ("udpin:127.0.0.1:1,", "the form is udpin:HOST:PORT,HOST:PORT"),
+        ("udpin:127.0.0.1:1,127.0.0.1:0", "port '0' is outside 1…65535"),
+        ("udpin:127.0.0.1:1,127.0.0.1:2,127.0.0.1:3", "host '127.0.0.1:2,127.0.0.1' is neither"),
         ("udpout:127.0.0.1:0", "port '0' is outside 1…65535"),
         ("udpout:127.0.0.1:1_0", "port '1_0'"),
         ("tcp:127.0.0.1:-1", "port '-1'"),
@@ -135,6 +140,7 @@ GROUPS = st.ip_addresses(v=4, network="224.0.0.0/4").map(str)
 INTERFACES = st.none() | st.ip_addresses(v=4).map(str)
 ENDPOINTS = st.one_of(
     st.builds(UdpIn, HOSTS, st.integers(0, 65535)),
+    st.builds(UdpIn, HOSTS, st.integers(0, 65535), st.tuples(HOSTS, st.integers(1, 65535))),
     st.builds(UdpOut, HOSTS, st.integers(1, 65535)),
     st.builds(TcpOut, HOSTS, st.integers(1, 65535)),
     st.builds(TcpIn, HOSTS, st.integers(0, 65535)),

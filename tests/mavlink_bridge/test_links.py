@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import socket
 import tty
+from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 
@@ -30,9 +32,16 @@ from mavlink_bridge.links.endpoints import BAUD_RATES, Multicast, Serial, TcpIn,
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.links.serial_port import SerialPort
 from mavlink_bridge.links.stream import Assembler
-from mavlink_bridge.links.streams import RETRY
-from mavlink_bridge.links.tcp import TcpCaller, TcpListener
-from mavlink_bridge.links.udp import MOST_PEERS, REMEMBERED, MulticastLink, UdpCaller, UdpListener
+from mavlink_bridge.links.streams import HUNG, RETRY
+from mavlink_bridge.links.tcp import BACKLOG, MOST_CALLERS, TcpCaller, TcpListener
+from mavlink_bridge.links.udp import (
+    MOST_PEERS,
+    REMEMBERED,
+    STEADY,
+    MulticastLink,
+    UdpCaller,
+    UdpListener,
+)
 from mavlink_bridge.messages import Message
 from mavlink_bridge.tlog import TlogWriter
 
@@ -62,17 +71,62 @@ def test_a_listener_answers_all_that_it_heard_lately_and_the_last_one_for_ever()
         link.close()
 
 
-def test_a_listener_remembers_a_bounded_number_of_peers() -> None:
-    listener = UdpListener(UdpIn(HOST, 0), SimulatedClock())
+def test_a_listener_answers_a_bounded_number_of_peers_and_those_that_speak_on_stay() -> None:
+    clock = SimulatedClock()
+    listener = UdpListener(UdpIn(HOST, 0), clock)
     callers = [UdpCaller(UdpOut(HOST, listener.address[1])) for _ in range(MOST_PEERS + 1)]
-    for caller in callers:
-        caller.send(frame(1))
-        gather(listener, bool)
-    listener.send(frame(2))
-    assert all(gather(caller, bool) == [frame(2)] for caller in callers[1:])
-    assert callers[0].receive() == []
+    *steady, late = callers
+    silent = steady[7]
+
+    def speak(who: Iterable[UdpCaller]) -> None:
+        for caller in who:
+            caller.send(frame(1))
+            assert gather(listener, bool) == [frame(1)]
+
+    speak(steady)
+    for _ in range(5):
+        clock.wait_until(clock.now() + STEADY // 3)
+        speak(caller for caller in steady if caller is not silent)
+        if clock.now() <= STEADY:
+            # There is no room for one more, however often it speaks.
+            speak([late] * 3)
+            listener.send(frame(2))
+            assert all(gather(caller, bool) == [frame(2)] for caller in steady)
+            assert late.receive() == []
+    speak([late])
+    listener.send(frame(3))
+    assert all(gather(caller, bool) == [frame(3)] for caller in callers if caller is not silent)
+    assert silent.receive() == []
     for link in (listener, *callers):
         link.close()
+
+
+def test_a_listener_with_a_peer_speaks_first_and_to_others_too() -> None:
+    """As an autopilot's port: its ground station need say nothing, and is never forgotten."""
+    clock = SimulatedClock()
+    station = UdpListener(UdpIn(HOST, 0), clock)
+    listener = UdpListener(UdpIn(HOST, 0, (HOST, station.address[1])), clock)
+    listener.send(frame(1))
+    assert gather(station, bool) == [frame(1)]
+    assert listener.peers == 0
+    other = UdpCaller(UdpOut(HOST, listener.address[1]))
+    for speaker in (station, other):
+        speaker.send(frame(2))
+        gather(listener, bool)
+    assert listener.peers == 2
+    listener.send(frame(3))
+    assert gather(station, bool) == gather(other, bool) == [frame(3)]
+    clock.wait_until(2 * REMEMBERED)
+    assert listener.peers == 0
+    listener.send(frame(4))
+    assert gather(station, bool) == [frame(4)]
+    for link in (listener, station, other):
+        link.close()
+
+
+def test_a_listener_and_its_peer_speak_one_protocol() -> None:
+    with pytest.raises(LinkError, match="one is an IPv4 and the other an IPv6 address"):
+        open_link("udpin:127.0.0.1:0,[::1]:14550", SimulatedClock())
 
 
 def test_a_caller_hears_nobody_but_whom_it_called() -> None:
@@ -223,6 +277,74 @@ def test_everyone_who_has_called_hears_everything() -> None:
     assert all(gather(caller, bool) == [frame(2)] for caller in callers[1:])
     for link in (listener, *callers):
         link.close()
+
+
+def test_who_calls_and_never_reads_costs_nobody_else_anything_and_is_given_up() -> None:
+    clock = SimulatedClock()
+    listener = TcpListener(TcpIn(HOST, 0), clock)
+    sleeper = socket.create_connection(listener.address)
+    reader = TcpCaller(TcpOut(HOST, listener.address[1]), clock)
+    meet(reader, listener)
+    while listener.peers < 2:
+        wait(listener)
+        listener.receive()
+    number = heard = 0
+    while listener.peers == 2:
+        # Some seconds of a busy vehicle from one second to the next.
+        clock.wait_until(clock.now() + 1_000_000)
+        for _ in range(20):
+            listener.send(frame(number, 120) * 8)
+            number += 1
+            heard += len(frames(gather(reader, bool)))
+        assert all(len(stream._waiting) <= BACKLOG for stream in listener._streams)
+    assert clock.now() > HUNG
+    assert listener.counters.dropped == 0
+    while heard < 8 * number:
+        heard += len(frames(gather(reader, bool)))
+    assert heard == 8 * number
+    for one in (sleeper, reader, listener):
+        one.close()
+
+
+def test_who_takes_a_little_now_and_then_is_not_given_up() -> None:
+    clock = SimulatedClock()
+    listener = TcpListener(TcpIn(HOST, 0), clock)
+    slow = socket.create_connection(listener.address)
+    while not listener.peers:
+        wait(listener)
+        listener.receive()
+    while not listener.counters.dropped:
+        listener.send(frame(1, 120) * 8)
+    for _ in range(5):
+        clock.wait_until(clock.now() + HUNG - 1)
+        sent = listener.counters.sent
+        while listener.counters.sent == sent:
+            slow.recv(1 << 16)
+            listener.send(frame(2, 120))
+        while listener.counters.sent > sent:
+            sent = listener.counters.sent
+            listener.send(frame(3, 120))
+        assert listener.peers == 1
+    slow.close()
+    listener.close()
+
+
+def test_callers_that_vanish_leave_room_for_others() -> None:
+    """More than there are places for, one after the other and many at once."""
+    listener = TcpListener(TcpIn(HOST, 0), SimulatedClock())
+    for _ in range(3):
+        crowd = [socket.create_connection(listener.address) for _ in range(MOST_CALLERS + 5)]
+        while listener.peers < MOST_CALLERS:
+            wait(listener)
+            listener.receive()
+        for caller in crowd:
+            caller.send(frame(1)[:-3])
+            caller.close()
+        while listener.peers:
+            listener.send(frame(2))
+            listener.receive()
+    assert len(listener._selector.get_map()) == 1
+    listener.close()
 
 
 def test_frames_of_two_callers_are_not_mixed_however_they_are_cut() -> None:
@@ -388,9 +510,12 @@ def test_a_closed_log_says_nothing_more(tmp_path: Path) -> None:
         ("tlog:/no/such/log.tlog", "cannot be read"),
     ],
 )
-def test_what_cannot_be_opened_is_said_in_one_line(text: str, said: str) -> None:
+def test_what_cannot_be_opened_is_said_in_one_line_and_leaves_nothing_open(text: str, said: str) -> None:
+    gc.collect()
+    before = set(os.listdir("/dev/fd"))
     with pytest.raises(BridgeError) as caught:
         open_link(text, SimulatedClock())
+    assert set(os.listdir("/dev/fd")) == before
     message = str(caught.value)
     assert said in message
     assert text.partition(":")[2] in message

@@ -272,3 +272,27 @@ def test_records_feed_a_codec() -> None:
         messages = [message for record in read_tlog(path) for message in codec.feed(record.frame)]
     assert len(messages) == 2
     assert dialect.MAVLINK_MSG_ID_STATUSTEXT == 253
+
+
+def test_no_log_of_ours_holds_a_signature_or_a_key() -> None:
+    """Whoever gets the log could look for the key; and what remains is what was said."""
+    key = bytes(range(1, 33))
+    peer = dialect.MAVLink(None, *ME)
+    peer.signing.secret_key, peer.signing.sign_outgoing = key, True
+    setup = dialect.MAVLink_setup_signing_message(11, 1, list(key), 36_000_000_000_000)
+    unknown = bytearray(dialect.MAVLink_vibration_message(1, 2, 3, 4, 5, 6, 7).pack(peer))
+    unknown[7:10] = b"\xef\xbe\xad"
+    signed = [dialect.MAVLink_heartbeat_message(2, 3, 81, number, 4, 3).pack(peer) for number in range(3)]
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "a.tlog"
+        with TlogWriter(path) as writer:
+            writer.write(NOW, 0, signed[0] + setup.pack(peer) + signed[1])
+            writer.write(NOW, 0, setup.pack(dialect.MAVLink(None)) + frame(7))
+            writer.write(NOW, 0, b"?" + signed[2] + setup.pack(peer) + bytes(unknown))
+            assert (writer.records, writer.withheld, writer.skipped_bytes) == (5, 3, 1)
+        assert key not in path.read_bytes()
+        found = [record.frame for record in read_tlog(path)]
+        assert len(path.read_bytes()) == sum(8 + len(data) for data in found) + 8 + len(unknown) - 13
+    assert all(data[2] == 0 for data in found)
+    heard = [dialect.MAVLink(None).decode(bytearray(data)) for data in found]
+    assert [message.custom_mode for message in heard] == [0, 1, 7, 2]

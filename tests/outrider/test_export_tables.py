@@ -158,6 +158,19 @@ def test_any_message_of_the_dialect_becomes_a_row(tmp_path: Path) -> None:
             assert all_same(other[column].to_pylist(), table[column].to_pylist()), (name, column)
 
 
+def test_a_key_that_a_log_of_others_holds_is_not_passed_on(tmp_path: Path) -> None:
+    peer, key = dialect.MAVLink(None, 255, 190), bytes(range(1, 33))
+    beat = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    setup = dialect.MAVLink_setup_signing_message(11, 1, list(key), 36_000_000_000_000)
+    log = tmp_path / "others.tlog"
+    stamp = (1_700_000_000_000_000).to_bytes(8, "big")
+    log.write_bytes(b"".join(stamp + message.pack(peer) for message in (beat, setup, beat)))
+    export(log, "parquet", tmp_path / "out", as_json=True)
+    found = tables(tmp_path / "out")
+    assert [name for name in found if "mavlink" in name] == ["mavlink/255/HEARTBEAT"]
+    assert len(found["mavlink/255/HEARTBEAT"]) == 2
+
+
 def test_no_two_columns_of_a_table_have_one_name() -> None:
     for number in identifiers():
         of = kind(number)

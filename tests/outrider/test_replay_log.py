@@ -18,8 +18,10 @@ from companion.config import CompanionConfig
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
+from mavlink_bridge.key import Key
 from mavlink_bridge.links.link import memory_pair
 from mavlink_bridge.messages import CommandLong, GlobalPosition, Heartbeat, SetpointLocal, Source
+from mavlink_bridge.signing import Signing
 from mavlink_bridge.tlog import Record, TlogWriter, read_tlog
 from outrider import swarm
 from outrider.replaying.casting import Cast, Part, survey
@@ -178,6 +180,15 @@ def test_only_telemetry_of_vehicles_goes_to_a_live_link() -> None:
     # From its first heartbeat on a sender is known to be a vehicle.
     assert far.receive() == [given_[1], given_[3]]
     assert (forwarder.sent, forwarder.kept) == (2, 6)
+
+
+def test_no_signature_of_a_log_goes_to_a_live_link() -> None:
+    """It would be old there, and a help to whoever looks for the key."""
+    near, far = memory_pair()
+    forwarder, codec = Forwarder(near), Codec(None, Signing(Key(b"k" * 32)))
+    beat = Heartbeat(Source(7, 1), 2, 3, 0x81, 4, 4)
+    forwarder.take(codec.encode(beat))
+    assert far.receive() == [Codec().encode(beat)]
 
 
 def test_nothing_that_asks_or_orders_is_telemetry() -> None:

@@ -95,7 +95,7 @@ def landed_blind(after: float, text: str) -> Callable[[Flown], None]:
         autopilot, companion = flown.flight.autopilots[K], flown.flight.companions[K]
         assert not autopilot.airborne
         assert not autopilot.armed
-        assert companion.pilot.phase is Phase.ESCORT
+        assert companion.pilot.phase is Phase.CONNECT
         assert not companion.pilot.streaming
         assert figure(flown, "estimate_error_m", "max") > 0.5
         samples, times = clock(flown)

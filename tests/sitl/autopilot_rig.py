@@ -22,9 +22,11 @@ from mavlink_bridge.messages import (
     Vector,
 )
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
 from sitl.autopilot_config import AutopilotConfig
 from sitl.config import VehicleConfig
 from sitl.node import LINK, Autopilot
+from sitl.saved import Saved
 
 CONFIG = Path(__file__).parents[2] / "config" / "vehicles" / "firefly.yaml"
 FIREFLY = VehicleConfig.model_validate(yaml.safe_load(CONFIG.read_text()))
@@ -58,11 +60,19 @@ def setpoint(
 
 
 class Rig:
-    def __init__(self, flavour: str = "ardupilot", *, tick: int = 5_000, **settings: Any) -> None:
+    def __init__(
+        self,
+        flavour: str = "ardupilot",
+        *,
+        tick: int = 5_000,
+        signing: Signing | None = None,
+        saved: Saved | None = None,
+        **settings: Any,
+    ) -> None:
         place = {"latitude": SITE.latitude, "longitude": SITE.longitude, "altitude": SITE.altitude}
         self.flavour = flavour
         self.config = AutopilotConfig(**{"system_id": 11, "flavour": flavour, **place, **settings})
-        self.autopilot = Autopilot(self.config, FIREFLY, SITE, seed=1)
+        self.autopilot = Autopilot(self.config, FIREFLY, SITE, seed=1, saved=saved, signing=signing)
         self.now = 0
         self.tick = tick
         self.heard: list[tuple[int, Message]] = []

@@ -14,6 +14,7 @@ from recorded_logs import PIECES
 from mavlink_bridge import messages as m
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_TYPE, TABLE
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     Attitude,
     CommandAck,
@@ -181,6 +182,7 @@ def services() -> tuple[Message, ...]:
         m.HomePosition(AUTOPILOT, *place, ZERO, four, ZERO, 1),
         m.SetHomePosition(GROUND, *place, ZERO, four, ZERO, 11, 1),
         m.MessageInterval(AUTOPILOT, 20_000, 30),
+        m.SetupSigning(GROUND, 36_000_000_000_000, *me, Key(bytes(range(32)))),
         m.MissionCount(GROUND, 2, *me, 0, 0),
         m.MissionItem(GROUND, takeoff[1], x, y, 6.0, 0, takeoff[0], *me, 6, 1, 1, 0),
         m.MissionItemFloat(GROUND, waypoint[1], *place[:2], 8.0, 1, waypoint[0], *me, 3, 0, 1, 0),

@@ -90,6 +90,6 @@ def test_any_payload_is_a_message_or_bad(mutants: Mutants) -> None:
         with mutant:
             codec = Codec()
             found = codec.feed(absurd(mutant.random, mutant.random.choice(FRAMES)))
-            assert codec.counters == (len(found), 1 - len(found), 0, 0, 0)
+            assert codec.counters == (len(found), 1 - len(found), 0, 0, 0, 0)
             for message in found:
                 assert BY_TYPE[type(message)].pack(message)

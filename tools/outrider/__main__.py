@@ -108,6 +108,9 @@ def sitl(
     startup: Annotated[
         str, typer.Option(help="quick, or realistic: GPS and estimator take their time.")
     ] = "quick",
+    response: Annotated[
+        str, typer.Option(help="exact, or firmware: it lags behind set-points as the real one.")
+    ] = "exact",
     origin: Annotated[Optional[str], typer.Option(help="LATITUDE,LONGITUDE[,ALTITUDE].")] = None,  # noqa: UP045
     wind: Annotated[Optional[str], typer.Option(help="m/s towards east, or EAST,NORTH[,UP].")] = None,  # noqa: UP045
     spacing: Annotated[float, typer.Option(min=0.0, max=1000.0, help="m between vehicles.")] = 3.0,
@@ -126,12 +129,22 @@ def sitl(
     from outrider.hangar.command import Terms, run
     from outrider.hangar.request import Options, checked
 
-    asked = checked(
-        Options(
-            count, first_id, flavour, vehicle, sensors, physics, startup, origin, wind, spacing, speedup, seed
-        )
+    options = Options(
+        count=count,
+        first_id=first_id,
+        flavour=flavour,
+        vehicle=vehicle,
+        sensors=sensors,
+        physics=physics,
+        startup=startup,
+        response=response,
+        origin=origin,
+        wind=wind,
+        spacing=spacing,
+        speedup=speedup,
+        seed=seed,
     )
-    raise typer.Exit(run(asked, Terms(port_base, tuple(to or ()), host, state, seconds, as_json)))
+    raise typer.Exit(run(checked(options), Terms(port_base, tuple(to or ()), host, state, seconds, as_json)))
 
 
 @app.command()
@@ -228,6 +241,14 @@ def report(
     from outrider.report.command import report as reporting
 
     raise typer.Exit(reporting(run_dir, out, as_json))
+
+
+@app.command()
+def key(file: Annotated[Path, typer.Argument(help="New; only you may read it.")]) -> None:
+    """Make a key with which vehicles and those who may command them sign what they say (docs/signing.md)."""
+    from outrider.key_files import new_key
+
+    sys.stdout.write(f"{new_key(file)}\n")
 
 
 @app.command()

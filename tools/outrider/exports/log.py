@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.framing import Flaw, frame_at
+from mavlink_bridge.signing import SETUP_SIGNING
 from mavlink_bridge.tlog import read_tlog
 from outrider.exports.dialect import Kind, kind
 
@@ -57,7 +58,8 @@ class Log:
         read_tlog(self.path)
 
     def __iter__(self) -> Iterator[Spoken]:
-        """Every message once, in the order of the file; afterwards ``loss`` says what was left out."""
+        """Every message once, in the order of the file, but for the key that SETUP_SIGNING holds; afterwards
+        ``loss`` says what else was left out."""
         reader = read_tlog(self.path)
         self.done = late = 0
         for record in reader:
@@ -68,6 +70,8 @@ class Log:
             frame = frame_at(record.frame, 0)
             if isinstance(frame, Flaw):
                 raise LogError(f"{self.path}: the reader handed out what is no frame")
+            if frame.message_id == SETUP_SIGNING:
+                continue
             known = kind(frame.message_id)
             yield Spoken(
                 record.time, record.link, frame.system, frame.component, known, known.whole(frame.payload)

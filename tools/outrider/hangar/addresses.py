@@ -25,7 +25,6 @@ from outrider.errors import InputError
 from outrider.hangar.request import FlavourName
 
 PORT_BASE: Final[dict[FlavourName, int]] = {"ardupilot": 5760, "px4": 14540}
-_LOCAL: Final = "127.0.0.1"
 _EVERYWHERE: Final = ("0.0.0.0", "::")
 _LAST_PORT: Final = 65535
 _SERIALS: Final = (0, 2, 3)
@@ -94,14 +93,21 @@ def _loopback(host: str) -> bool:
 def _ardupilot(base: int, index: int, host: str, more: tuple[Endpoint, ...]) -> Address:
     first = base + _INSTANCE * index
     ports = tuple(TcpIn(host, first + serial) for serial in _SERIALS)
-    to = f"{_LOCAL if host in _EVERYWHERE else host}:{first}"
-    return Address((*ports, *more), f"tcp:{to}", f"tcpout://{to}")
+    to = str(TcpOut(_here(host) if host in _EVERYWHERE else host, first))
+    return Address((*ports, *more), to, to.replace("tcp:", "tcpout://", 1))
 
 
 def _px4(base: int, index: int, host: str, more: tuple[Endpoint, ...]) -> Address:
     offboard = base + min(index, _OFFBOARD_PORTS - 1)
+    here = _here(host)
     ports = (
-        UdpIn(host, base + _OWN + index, (_LOCAL, offboard)),
-        UdpIn(host, base + _OWN_FOR_GROUND_STATION + index, (_LOCAL, base + _GROUND_STATION)),
+        UdpIn(host, base + _OWN + index, (here, offboard)),
+        UdpIn(host, base + _OWN_FOR_GROUND_STATION + index, (here, base + _GROUND_STATION)),
     )
-    return Address((*ports, *more), f"udpin:{_LOCAL}:{offboard}", f"udpin://{_LOCAL}:{offboard}")
+    to = str(UdpIn(here, offboard))
+    return Address((*ports, *more), to, to.replace("udpin:", "udpin://", 1))
+
+
+def _here(host: str) -> str:
+    """This machine's loopback address, of the same protocol as ``host``."""
+    return "::1" if ":" in host else "127.0.0.1"

@@ -39,8 +39,8 @@ class Cabinet:
         if self._directory is None:
             return
         for seat in squad.seats:
-            found = seat.node.saved
-            if found != self._kept[seat.system]:
+            found, before = seat.node.saved, self._kept[seat.system]
+            if found != before and not (_empty(found) and _empty(before)):
                 self._kept[seat.system] = found
                 path = self._path(seat.system)
                 if path is not None:
@@ -50,6 +50,10 @@ class Cabinet:
 
     def _path(self, system: int) -> Path | None:
         return None if self._directory is None else self._directory / f"{self._flavour}-{system}.json"
+
+
+def _empty(saved: Saved) -> bool:
+    return not saved.parameters and not any(saved.plans)
 
 
 def prepare(directory: Path | None, flavour: str, systems: range) -> None:

@@ -21,7 +21,7 @@ from outrider.hangar.cabinet import prepare
 from outrider.hangar.crew import Crew
 from outrider.hangar.figures import Value, ready, summary
 from outrider.hangar.request import Request
-from outrider.hangar.watch import watching
+from outrider.hangar.watch import announce, watching
 from outrider.hangar.wiring import wire
 
 _LOOK: Final = 0.1
@@ -48,6 +48,7 @@ def run(asked: Request, terms: Terms) -> int:
     crew = Crew(asked, wire(places, WallClock()), terms.state)
     with _stopping() as stopped:
         try:
+            announce(asked)
             crew.start()
             _wait(crew, stopped, asked.count)
             until = math.inf if terms.seconds is None else time.monotonic() + terms.seconds

@@ -23,11 +23,11 @@ _FAREWELL: Final = 5.0
 """s that a process has to end by itself."""
 
 
-def squads(asked: Request, most: int) -> list[list[int]]:
-    """The indices of all vehicles, for each of up to ``most`` processes those that it has."""
-    busy = ceil(asked.count * max(asked.speed, 1.0) / FULL)
-    number = min(asked.count, most, busy)
-    return [list(range(squad, asked.count, number)) for squad in range(number)]
+def squads(count: int, speed: float, most: int) -> list[list[int]]:
+    """The indices of ``count`` vehicles, for each of up to ``most`` processes those that it has."""
+    busy = ceil(count * max(speed, 1.0) / FULL)
+    number = min(count, most, busy)
+    return [list(range(squad, count, number)) for squad in range(number)]
 
 
 class Crew:
@@ -35,7 +35,7 @@ class Crew:
 
     def __init__(self, asked: Request, links: list[list[Link]], state: Path | None) -> None:
         self._asked, self._links = asked, links
-        self.squads = squads(asked, cores())
+        self.squads = squads(asked.count, asked.speed, cores())
         self.board = Board(asked.count, len(self.squads))
         self._workers = [
             Worker(number, indices, asked, {str(index): links[index] for index in indices}, self.board, state)

@@ -20,6 +20,7 @@ from sitl.battery import BatteryConfig
 from sitl.config import VehicleConfig
 from sitl.node import Autopilot
 from sitl.profiles import ProfileName
+from sitl.response import ResponseName
 from sitl.saved import Saved
 from sitl.weather import WeatherConfig
 
@@ -46,6 +47,7 @@ class Options:
     sensors: str = "truth"
     physics: str = "own"
     startup: str = "quick"
+    response: str = "exact"
     origin: str | None = None
     wind: str | None = None
     spacing: float = 3.0
@@ -65,6 +67,7 @@ class Request:
     sensors: ProfileName
     physics: PhysicsName
     startup: StartupName
+    response: ResponseName
     origin: Origin
     weather: WeatherConfig
     spacing: float
@@ -106,6 +109,7 @@ class Request:
             streams="normal",
             sensors=self.sensors,
             physics=self.physics,
+            response=self.response,
             battery=BatteryConfig(),
             epoch=epoch,
             **changes,
@@ -119,6 +123,7 @@ def checked(options: Options) -> Request:
         "sensors": get_args(ProfileName),
         "physics": get_args(PhysicsName),
         "startup": get_args(StartupName),
+        "response": get_args(ResponseName),
     }
     wrong = [
         f"--{name} {given}: allowed are {', '.join(allowed)}"
@@ -155,6 +160,7 @@ def checked(options: Options) -> Request:
         cast("ProfileName", options.sensors),
         cast("PhysicsName", options.physics),
         cast("StartupName", options.startup),
+        cast("ResponseName", options.response),
         origin,
         weather,
         options.spacing,

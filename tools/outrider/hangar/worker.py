@@ -24,7 +24,7 @@ from outrider.hangar.request import Request
 from outrider.hangar.squad import Squad
 
 PERIOD: Final = 10_000
-"""µs (simulated) between two steps, up to 10 times real time; then more."""
+"""µs (simulated) between two steps from real time to 10 times that."""
 _FASTEST, _LONGEST = 10.0, 5.0
 _GRID: Final = 2500
 # µs; usual steps of physics.
@@ -105,9 +105,10 @@ class Worker:
 
 
 def period(speed: float) -> int:
-    """µs (simulated) between two steps when time is ``speed`` times as fast: on the wall 1 ms or more, as
-    long as that leaves telemetry at 20 Hz in peace."""
-    return round(PERIOD * min(max(speed / _FASTEST, 1.0), _LONGEST)) // _GRID * _GRID
+    """µs (simulated) between two steps when time is ``speed`` times as fast: 10 ms of the wall or less, and
+    1 ms or more as long as that leaves telemetry at 20 Hz in peace."""
+    of_usual = speed if speed < 1.0 else min(max(speed / _FASTEST, 1.0), _LONGEST)
+    return max(int(PERIOD * of_usual) // _GRID, 1) * _GRID
 
 
 def _pace(loop: RealTime, now: int, wall: float) -> Pace:

@@ -13,6 +13,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.clock import Clock
+from mavlink_bridge.framing import without_signature
 from mavlink_bridge.header import header
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.tlog import Record
@@ -83,7 +84,7 @@ class Forwarder:
             else:
                 self._vehicles.add((system, component))
         if message_id in TELEMETRY and (system, component) in self._vehicles:
-            self._link.send(frame)
+            self._link.send(without_signature(frame))
             self.sent += 1
         else:
             self.kept += 1

@@ -1,0 +1,133 @@
+"""The secret that signs MAVLink frames, and the file that holds it."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import os
+import secrets
+import stat
+from pathlib import Path
+from typing import Final
+
+from mavlink_bridge.errors import KeyFileError
+
+LENGTH: Final = 32
+"""Bytes of a key."""
+_LONGEST: Final = 1024
+# An all too short number of digits must not become a passphrase that nobody meant.
+_FEWEST_DIGITS: Final = 32
+_DIGITS: Final = frozenset("0123456789abcdefABCDEF")
+# 160 random bits that can be typed into a tablet: no digit looks like a letter.
+_LETTERS: Final = "abcdefghijklmnopqrstuvwxyz234567"
+_GROUPS, _GROUP = 8, 4
+_OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
+
+
+class Key:
+    """32 secret bytes. What is printed of a key is its fingerprint, which tells keys apart and no more."""
+
+    __slots__ = ("_secret",)
+
+    def __init__(self, secret: bytes) -> None:
+        """Raises ValueError for another number of bytes."""
+        if len(secret) != LENGTH:
+            raise ValueError(f"a key has {LENGTH} bytes, not {len(secret)}")
+        self._secret = bytes(secret)
+
+    @classmethod
+    def of_passphrase(cls, text: str) -> Key:
+        """As the ground stations make one: SHA-256 of the text in UTF-8."""
+        return cls(hashlib.sha256(text.encode()).digest())
+
+    def signature(self, data: bytes) -> bytes:
+        """The six bytes that end a signed frame, of which ``data`` is all before them."""
+        return hashlib.sha256(self._secret + data).digest()[:6]
+
+    @property
+    def blank(self) -> bool:
+        """All zeros, by which SETUP_SIGNING means none."""
+        return not any(self._secret)
+
+    @property
+    def fingerprint(self) -> str:
+        """Eight hexadecimal digits."""
+        return hashlib.sha256(b"fingerprint" + self._secret).hexdigest()[:8]
+
+    def __bytes__(self) -> bytes:
+        return self._secret
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Key) and hmac.compare_digest(self._secret, other._secret)
+
+    def __hash__(self) -> int:
+        return hash(self._secret)
+
+    def __repr__(self) -> str:
+        return f"Key({self.fingerprint})"
+
+
+def read_key(path: Path | str) -> Key:
+    """The key in a file of one line: 64 hexadecimal digits, or a passphrase.
+
+    Raises KeyFileError, one line, if there is no such file, if it holds something else, or if others than its
+    owner may read it or write to it.
+    """
+    text = _text(path)
+    line = text.removesuffix("\n").removesuffix("\r")
+    if not line or not line.isprintable():
+        raise KeyFileError(
+            f"{path}: holds no key; allowed is one line: {2 * LENGTH} hexadecimal digits, or a passphrase"
+        )
+    if len(line) >= _FEWEST_DIGITS and _DIGITS.issuperset(line):
+        if len(line) != 2 * LENGTH:
+            raise KeyFileError(
+                f"{path}: has {len(line)} hexadecimal digits; a key has {2 * LENGTH} (a passphrase has other "
+                f"letters too)"
+            )
+        key = Key(bytes.fromhex(line))
+        if key.blank:
+            raise KeyFileError(f"{path}: nothing but zeros is no key")
+        return key
+    return Key.of_passphrase(line)
+
+
+def create_key(path: Path | str) -> Key:
+    """Write a new random passphrase to a new file that only its owner may read, and return its key.
+
+    A passphrase and not digits, as ground stations take nothing else. Raises KeyFileError, one line.
+    """
+    groups = ("".join(secrets.choice(_LETTERS) for _ in range(_GROUP)) for _ in range(_GROUPS))
+    line = "-".join(groups)
+    try:
+        number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError:
+        raise KeyFileError(f"{path}: is there already; a key is not overwritten") from None
+    except OSError as error:
+        raise KeyFileError(f"{path}: cannot be written: {error.strerror}") from None
+    with open(number, "w", encoding="ascii") as file:
+        file.write(line + "\n")
+    return Key.of_passphrase(line)
+
+
+def _text(path: Path | str) -> str:
+    try:
+        # A pipe would let wait.
+        number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        with open(number, "rb") as file:
+            found = os.fstat(number)
+            if not stat.S_ISREG(found.st_mode):
+                raise KeyFileError(f"{path}: is not a file")
+            if os.name == "posix" and found.st_mode & _OTHERS:
+                raise KeyFileError(
+                    f"{path}: others may read or change it (mode {stat.S_IMODE(found.st_mode):03o}); "
+                    f"chmod 600 {path}"
+                )
+            data = file.read(_LONGEST + 1)
+        if len(data) > _LONGEST:
+            raise KeyFileError(f"{path}: holds more than {_LONGEST} bytes; a key is one line")
+        return data.decode()
+    except UnicodeDecodeError:
+        raise KeyFileError(f"{path}: is not text; a key is one line of UTF-8") from None
+    except OSError as error:
+        raise KeyFileError(f"{path}: cannot be read: {error.strerror}") from None

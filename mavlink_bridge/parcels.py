@@ -1,0 +1,26 @@
+"""Frames to datagrams that go through any network in one piece."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+LONGEST: Final = 1400
+"""Bytes of a datagram: what Ethernet carries in one packet, tunnels included. Some clients read no more than
+2048, and above 65507 UDP sends nothing at all."""
+
+
+def parcels(pieces: Sequence[bytes], longest: int = LONGEST) -> list[bytes]:
+    """``pieces`` (whole frames) in their order, several to a datagram where they fit; a longer one goes
+    alone."""
+    whole = b"".join(pieces)
+    if len(whole) <= longest:
+        return [whole] if whole else []
+    found: list[bytes] = []
+    waiting = b""
+    for piece in pieces:
+        if waiting and len(waiting) + len(piece) > longest:
+            found.append(waiting)
+            waiting = b""
+        waiting += piece
+    return [*found, waiting]

@@ -1,0 +1,343 @@
+"""Vehicles of ``outrider sitl`` under a simulated clock: each hears its own link, all show what they are, and
+what they keep comes back."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.messages import CommandLong, Heartbeat, Message, ParamSet, Source, StatusText, Timesync
+from mavlink_bridge.node import Datagram
+from outrider.errors import InputError, OutriderError
+from outrider.hangar.addresses import addresses
+from outrider.hangar.board import SAYINGS, Board, Gauges, Pace
+from outrider.hangar.cabinet import Cabinet, prepare
+from outrider.hangar.chronicle import Chronicle
+from outrider.hangar.figures import factor
+from outrider.hangar.modes import mode_name
+from outrider.hangar.request import Options, Request, checked
+from outrider.hangar.screen import Screen
+from outrider.hangar.squad import SPREAD, Squad
+from outrider.hangar.traffic import Traffic
+from outrider.hangar.watch import watching
+
+GCS = Source(255, 190)
+PERIOD = 20_000
+
+
+class Field:
+    """A squad and its board, and someone who speaks to its vehicles."""
+
+    def __init__(self, asked: Request, indices: Sequence[int], state: Path | None = None) -> None:
+        self.cabinet = Cabinet(state, asked.flavour)
+        vehicles = {
+            index: asked.autopilot(index, 0, self.cabinet.saved(asked.systems[index])) for index in indices
+        }
+        self.board = Board(asked.count, 1)
+        self.squad = Squad(vehicles, asked.first_id, self.board, asked.speed)
+        self.now = 0
+        self._codec = Codec()
+
+    def run(self, seconds: float, said: dict[int, list[Message]] | None = None) -> dict[str, list[Message]]:
+        """What each link carried out; ``said``: to whom, by index, at the beginning."""
+        inbox = [
+            Datagram(str(index), self._codec.encode(one))
+            for index, messages in (said or {}).items()
+            for one in messages
+        ]
+        heard: dict[str, list[Message]] = {}
+        end = self.now + round(seconds * 1e6)
+        while self.now < end:
+            for link, data in self.squad.step(self.now, inbox):
+                heard.setdefault(link, []).extend(Codec().feed(data))
+            self.squad.show(self.now, lambda _link: 1)
+            inbox = []
+            self.now += PERIOD
+        return heard
+
+
+def arming(system: int) -> CommandLong:
+    return CommandLong(GCS, system, 1, 400, 0, (1.0, 21196.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def asked(**options: object) -> Request:
+    return checked(Options(**options))  # type: ignore[arg-type]
+
+
+def test_a_vehicle_hears_its_own_link_and_speaks_on_it() -> None:
+    field = Field(asked(count=5, first_id=11), [1, 3, 4])
+    heard = field.run(2.0)
+    assert {link: {one.source.system for one in found} for link, found in heard.items()} == {
+        "1": {12},
+        "3": {14},
+        "4": {15},
+    }
+    # To all of a link's listeners; but only one listens there.
+    heard = field.run(0.5, {3: [Timesync(GCS, 0, 77)]})
+    assert [any(isinstance(one, Timesync) for one in heard[link]) for link in ("1", "3", "4")] == [
+        False,
+        True,
+        False,
+    ]
+    field.run(1.0, {4: [arming(14), arming(15)]})
+    assert [field.board.gauges(index).armed for index in range(5)] == [False] * 4 + [True]
+    assert [field.board.gauges(index).up for index in range(5)] == [False, True, False, True, True]
+
+
+def test_what_is_shown_is_so() -> None:
+    request = asked(count=4, flavour="px4", spacing=5.0)
+    field = Field(request, range(4))
+    early = field.run(0.5)
+    heard = field.run(1.5, {2: [Heartbeat(GCS, 6, 8, 0, 0, 4)] * 3})
+    for index in range(4):
+        gauges, node = field.board.gauges(index), field.squad.seats[index].node
+        assert gauges.position == pytest.approx(request.place(index), abs=0.5)
+        assert np.linalg.norm(gauges.velocity) < 0.1
+        assert gauges.custom_mode == node.custom_mode
+        assert gauges.battery == pytest.approx(node.charge, abs=1e-3)
+        assert gauges.clients == 1
+        assert gauges.received == (3 if index == 2 else 0)
+        # It was looked at a fifth of a second ago at most.
+        every = len(early[str(index)]) + len(heard[str(index)])
+        assert every * 0.8 <= gauges.sent <= every
+        assert 2.0 - SPREAD * 1e-6 - 0.4 <= gauges.time <= 2.0
+
+
+def test_vehicles_do_not_all_speak_at_once() -> None:
+    field = Field(asked(count=8), range(8))
+    first: dict[str, int] = {}
+    while len(first) < 8:
+        for link, _ in field.squad.step(field.now, []):
+            first.setdefault(link, field.now)
+        field.now += PERIOD
+    assert len(set(first.values())) == 8
+    assert max(first.values()) <= SPREAD + PERIOD
+
+
+def test_a_vehicle_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    field = Field(asked(count=2, first_id=40), range(2))
+
+    def fail(now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        raise ZeroDivisionError("of what")
+
+    monkeypatch.setattr(field.squad.seats[1].node, "step", fail)
+    with pytest.raises(OutriderError, match=r"^vehicle 41: ZeroDivisionError: of what$"):
+        field.run(1.0)
+
+
+# Kept over a restart
+
+
+def test_parameters_come_back_to_the_vehicle_that_kept_them(tmp_path: Path) -> None:
+    request, state = asked(count=2, first_id=5), tmp_path / "kept"
+    prepare(state, request.flavour, request.systems)
+    field = Field(request, range(2), state)
+    field.run(0.5)
+    value = np.float32(321.0).tobytes()
+    field.run(0.5, {1: [ParamSet(GCS, value, 6, 1, "WPNAV_SPEED", 9)]})
+    field.cabinet.keep(field.squad)
+    assert [path.name for path in state.iterdir()] == ["ardupilot-6.json"]
+    prepare(state, request.flavour, request.systems)
+    again = Field(request, range(2), state)
+    assert [seat.node.saved for seat in again.squad.seats] == [seat.node.saved for seat in field.squad.seats]
+    assert again.squad.seats[1].node.saved.parameters == {"WPNAV_SPEED": 321.0}
+
+
+@pytest.mark.parametrize("damage", ["", "{", '{"parameters": {"A": "x"}}', '{"other": 1}', "\xff"])
+def test_a_damaged_file_is_named_before_anything_starts(damage: str, tmp_path: Path) -> None:
+    path = tmp_path / "px4-3.json"
+    path.write_bytes(damage.encode("latin-1"))
+    prepare(tmp_path, "ardupilot", range(1, 9))
+    with pytest.raises(InputError) as caught:
+        prepare(tmp_path, "px4", range(1, 9))
+    assert str(caught.value).startswith(f"{path}: cannot be used")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_state_that_is_no_directory_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"--state .*file: cannot be made"):
+        prepare(tmp_path / "file", "px4", range(1, 2))
+
+
+def test_without_a_directory_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    field = Field(asked(), [0])
+    field.run(0.2)
+    field.cabinet.keep(field.squad)
+    assert not any(tmp_path.iterdir())
+
+
+# The board
+
+NUMBER = st.floats(-1e6, 1e6)
+PLACE = st.tuples(NUMBER, NUMBER, NUMBER)
+COUNT = st.integers(0, 2**50)
+GAUGES = st.builds(
+    Gauges,
+    st.booleans(),
+    st.booleans(),
+    st.integers(0, 2**32 - 1),
+    PLACE,
+    PLACE,
+    NUMBER,
+    COUNT,
+    COUNT,
+    COUNT,
+    COUNT,
+    NUMBER,
+)
+
+
+@given(st.lists(GAUGES, min_size=1, max_size=4), st.lists(st.tuples(NUMBER, NUMBER), min_size=1, max_size=3))
+def test_what_is_written_on_the_board_can_be_read_there(
+    gauges: list[Gauges], times: list[tuple[float, float]]
+) -> None:
+    board = Board(len(gauges), len(times))
+    assert not any(board.gauges(index).up for index in range(len(gauges)))
+    paces = [Pace(*time, 3, 2, 1, 0.5, 1.5, 7) for time in times]
+    for index, one in enumerate(gauges):
+        board.show(index, one)
+        board.say(index, SAYINGS + index, f"{index} é")
+    for squad, pace in enumerate(paces):
+        board.show_pace(squad, pace)
+        board.fail(squad, "x" * 1000)
+    board.stop = True
+    assert [board.gauges(index) for index in range(len(gauges))] == gauges
+    assert board.paces() == paces
+    assert all(board.saying(index, SAYINGS + index) == f"{index} é" for index in range(len(gauges)))
+    assert {len(board.fault(squad)) for squad in range(len(times))} == {255}
+    assert board.stop
+
+
+def test_the_factor_is_that_of_the_slowest_and_of_late() -> None:
+    before = [Pace(10.0, 10.0), Pace(10.0, 10.0)]
+    after = [Pace(14.0, 14.0), Pace(12.0, 14.0)]
+    assert factor(after, before) == pytest.approx(0.5)
+    assert factor(after) == pytest.approx(12.0 / 14.0)
+    assert factor(after, after) == factor(after)
+    assert factor([Pace()]) == 0.0
+
+
+# What passes by
+
+
+@given(st.lists(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1, max_size=120)))
+def test_all_that_is_said_is_heard_and_every_frame_counted(texts: list[str]) -> None:
+    # Codecs strip the ends of texts, and pieces are cut there.
+    texts = [text.strip() for text in texts if "  " not in text and text.strip()]
+    codec, traffic = Codec(), Traffic()
+    data = [codec.encode(Heartbeat(Source(1, 1), 2, 3, 0, 0, 4))]
+    data += [codec.encode(StatusText(Source(1, 1), 4, text)) for text in texts]
+    traffic.send(b"".join(data))
+    assert traffic.sayings == texts
+    assert traffic.sent == 1 + sum(-(-len(text) // 50) for text in texts)
+    traffic.receive(b"".join(data))
+    assert traffic.received == traffic.sent
+
+
+@given(st.binary(max_size=600), st.integers(0, 5))
+def test_anything_may_be_received(garbage: bytes, frames: int) -> None:
+    traffic = Traffic()
+    beat = Codec().encode(Heartbeat(GCS, 6, 8, 0, 0, 4))
+    traffic.receive(garbage.replace(b"\xfd", b"").replace(b"\xfe", b"") + beat * frames)
+    assert traffic.received == frames
+    traffic.receive(garbage)
+
+
+# Words and pictures
+
+
+@pytest.mark.parametrize(
+    ("flavour", "number", "name"),
+    [
+        ("ardupilot", 0, "STABILIZE"),
+        ("ardupilot", 4, "GUIDED"),
+        ("ardupilot", 99, "99"),
+        ("px4", 6 << 16, "OFFBOARD"),
+        ("px4", 4 << 16 | 2 << 24, "TAKEOFF"),
+        ("px4", 4 << 16 | 77 << 24, "4.77"),
+    ],
+)
+def test_modes_have_the_names_that_ground_stations_give_them(flavour: str, number: int, name: str) -> None:
+    assert mode_name(flavour, number) == name
+
+
+def test_what_happens_is_told_once() -> None:
+    request = asked(count=2, first_id=3)
+    board = Board(2, 1)
+    chronicle = Chronicle(request, board)
+    assert chronicle.look() == []
+    board.show(1, Gauges(up=True, custom_mode=4, time=2.0))
+    assert chronicle.look() == []
+    for number in range(SAYINGS + 2):
+        board.say(1, number, f"text {number}")
+    board.show(1, Gauges(True, True, 9, clients=2, said=SAYINGS + 2, time=12.5))
+    lines = chronicle.look()
+    assert [line.split("vehicle 4: ")[1] for line in lines] == [
+        *(f"says 'text {number}'" for number in range(2, SAYINGS + 2)),
+        "mode LAND",
+        "armed",
+        "2 clients",
+    ]
+    assert all("12.5 s" in line for line in lines)
+    assert chronicle.look() == []
+
+
+def test_a_pipe_that_nobody_reads_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    request = asked(count=4)
+    board = Board(4, 1)
+    near, far = os.pipe()
+    os.set_blocking(far, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(far, bytes(4096))
+    os.set_blocking(far, True)
+    with open(far, "w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stderr", full)
+        with watching(request, addresses("ardupilot", 4, None, "127.0.0.1", ()), board) as look:
+            board.show(0, Gauges(up=True, armed=True))
+            look()
+        monkeypatch.undo()
+    os.close(near)
+
+
+@pytest.mark.parametrize(("width", "height", "count"), [(80, 24, 3), (80, 24, 50), (200, 60, 12)])
+def test_a_picture_fits_the_terminal(width: int, height: int, count: int) -> None:
+    request = asked(count=count, flavour="px4")
+    board = Board(count, 1)
+    for index in range(count):
+        board.show(
+            index,
+            Gauges(True, True, 6 << 16, (-123.4, 1234.5, 45.6), (3.0, 4.0, 0.0), 0.87, 99, 9999, 12, 0, 3.0),
+        )
+    board.show_pace(0, Pace(4.0, 4.0, 400, 1, 1, 4.9))
+    shown = io.StringIO()
+    console = Console(file=shown, force_terminal=True, width=width, height=height, color_system=None)
+    screen = Screen(request, addresses("px4", count, None, "127.0.0.1", ()), board, console)
+    with screen.live:
+        screen.look()
+        drawn = shown.getvalue()
+    lines = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", drawn).splitlines()
+    assert max(map(len, lines)) <= width
+    rows = [line for line in lines if "OFFBOARD" in line]
+    assert 3 <= len(rows) <= count
+    assert len(lines) <= height
+    assert "5.0" in rows[0]
+    assert "87%" in rows[0]
+    assert "…" not in rows[0]
+    assert any("1.00 × real time" in line for line in lines)
+    if len(rows) < count:
+        assert any(f"and {count - len(rows)} more" in line for line in lines)
