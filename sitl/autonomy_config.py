@@ -28,6 +28,13 @@ class FenceConfig(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     enabled: Literal["off", "on"] = Field("off", description="ArduPilot's FENCE_ENABLE; PX4's is always on")
+    kinds: float = Field(
+        7.0,
+        ge=0.0,
+        le=15.0,
+        description="ArduPilot's FENCE_TYPE, a sum: 1 height, 2 radius, 4 areas, 8 floor",
+    )
+    floor: float = Field(-10.0, description="above home at least (m), where FENCE_TYPE has it; ArduPilot")
     height: float | None = Field(None, ge=0.0, description="above home at most (m); 0: any")
     radius: float | None = Field(None, ge=0.0, description="from home at most (m); 0: any")
     action: Literal["nothing", "warn", "hold", "return", "land", "terminate"] | None = None

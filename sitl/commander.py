@@ -18,6 +18,8 @@ from sitl.voice import Voice
 
 # PX4's position mode without sticks sinks with this speed (m/s).
 _SINKING: Final = 0.6
+# What failsafes enter, by how grave it is; other modes are none of theirs.
+_GRAVITY: Final = {Mode.HOLD: 1, Mode.RETURN: 2, Mode.LAND: 3}
 
 
 class Commander:
@@ -59,8 +61,9 @@ class Commander:
 
     def configure(self, config: AutopilotConfig) -> None:
         """Other settings from now on."""
+        if config.takeoff_height != self._config.takeoff_height:
+            self._takeoff_height = config.takeoff_height
         self._config = config
-        self._takeoff_height = config.takeoff_height
 
     def status(self, now: int) -> Status:
         """What decisions at ``now`` (µs) depend on."""
@@ -97,7 +100,7 @@ class Commander:
         self.armed = True
         self._postpone(now)
         self._voice.inform("Armed")
-        if self.mode in MODES:
+        if self.mode is Mode.MISSION:
             self._journeys.begin(self.mode, self._estimate())
         if self.mode is Mode.TAKEOFF:
             self._guidance.takeoff(self._takeoff_height + self._home.height, self._estimate().pose)
@@ -117,8 +120,9 @@ class Commander:
             self._stop(why)
 
     def fail_safe(self, mode: Mode, now: int) -> None:
-        """Change to ``mode`` because something is wrong; on the ground there is nothing to do."""
-        if not self.armed or self.landed or mode is self.mode:
+        """Change to ``mode`` because something is wrong; on the ground there is nothing to do, and what is
+        graver is not left for it."""
+        if not self.armed or self.landed or _GRAVITY.get(mode, 0) <= _GRAVITY.get(self.mode, 0):
             return
         self._switch(mode if self.ready else Mode.LAND, now)
 
@@ -133,6 +137,7 @@ class Commander:
         if isinstance(verdict, Denial):
             return verdict
         self.mode, self._takeoff_height = verdict.mode, verdict.height
+        self._lost = False
         if self.armed:
             self._postpone(now)
             self._guidance.takeoff(verdict.height + self._home.height, self._estimate().pose)
@@ -153,6 +158,11 @@ class Commander:
         if not self.armed:
             self._chosen = mode
         return None
+
+    @property
+    def follows(self) -> bool:
+        """Whether a leader leads it."""
+        return self.armed and not self.landed and self.mode is Mode.FOLLOW
 
     def steered(self, now: int) -> None:
         """A usable set-point came: PX4 goes on with OFFBOARD if nothing but their silence had ended it."""
@@ -206,7 +216,6 @@ class Commander:
     def _switch(self, mode: Mode, now: int) -> None:
         self.mode = mode
         self._lost = False
-        self._journeys.following.active = mode is Mode.FOLLOW
         if self.armed and mode is Mode.MISSION:
             self._journeys.begin(mode, self._estimate())
             return
@@ -268,7 +277,7 @@ class Commander:
     def _stop(self, why: str) -> None:
         self.armed = False
         self._guidance.idle()
-        self._journeys.itinerary.landed()
+        self._journeys.end()
         if self._flavour.keeps_choice:
             self.mode = self._chosen
         elif self.mode is Mode.LAND:

@@ -59,7 +59,9 @@ class Failsafes:
 
     def fence_status(self, source: Source) -> FenceStatus:
         """FENCE_STATUS (162)."""
-        return FenceStatus(source, self._breached_at, self.breached, self._breaches, int(self._breach))
+        return FenceStatus(
+            source, self._breached_at, self.breached, self._breaches & 0xFFFF, int(self._breach)
+        )
 
     def doubts(self) -> list[str]:
         """What speaks against arming, beside what the mode may have against it."""
@@ -80,7 +82,9 @@ class Failsafes:
         commander = self._commander
         if commander.armed and commander.ready:
             self._watch_fence(now)
-        elif not commander.armed and self._flavour.repeats_doubts and now - self._said_at >= _AGAIN:
+        elif not commander.armed:
+            self._breach = Breach.NONE
+        if not commander.armed and self._flavour.repeats_doubts and now - self._said_at >= _AGAIN:
             self._said_at = now
             self.say_doubts()
 
@@ -96,6 +100,8 @@ class Failsafes:
         if charge.remaining <= 0.0 and commander.armed:
             commander.cut("Battery empty: motors stopped")
         worry = self._flavour.worry(charge)
+        if not commander.armed and worry.level < self._worry.level:
+            self._worry = worry
         if worry.level <= self._worry.level:
             self._worse_since = None
             return
@@ -109,7 +115,7 @@ class Failsafes:
 
     def _where(self) -> Breach:
         rules = self._flavour.fence_rules
-        limited = self._fences.uploaded or min(rules.height, rules.radius) < math.inf
+        limited = self._fences.uploaded or min(rules.height, rules.radius, -rules.floor) < math.inf
         if not (rules.enabled and limited):
             return Breach.NONE
         return self._fences.breach(self._estimate().position, rules)

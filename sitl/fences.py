@@ -29,13 +29,16 @@ class Breach(IntEnum):
 
 class Rules(NamedTuple):
     """What a firmware makes of it. ``any_area``: within one of the areas to stay in is enough (PX4), else
-    within all of them; ``height`` and ``radius`` (m) are infinite where there is no limit."""
+    within all of them; ``areas``: whether they count; ``floor``, ``height`` and ``radius`` (m) are infinite
+    where there is no limit."""
 
     enabled: bool
     any_area: bool
     height: float
     radius: float
     action: str
+    areas: bool = True
+    floor: float = -math.inf
 
 
 class _Area(NamedTuple):
@@ -80,9 +83,11 @@ class Fences:
         x, y, z = position
         if -z - self._home.height > rules.height:
             return Breach.TOO_HIGH
+        if -z - self._home.height < rules.floor:
+            return Breach.TOO_LOW
         if math.dist(self._home.position[:2], (x, y)) > rules.radius:
             return Breach.BOUNDARY
-        areas = self._known()
+        areas = self._known() if rules.areas else ()
         within = [area.holds(x, y) for area in areas if area.stay_in]
         kept_in = not within or (any(within) if rules.any_area else all(within))
         kept_out = not any(area.holds(x, y) for area in areas if not area.stay_in)

@@ -26,10 +26,7 @@ def answer(message: FileTransfer, source: Source) -> FileTransfer | None:
     if opcode in (_TERMINATE, _RESET):
         said, data = _ACK, b""
     else:
-        error = (
-            _NOT_FOUND if opcode in _OF_FILES else _NO_SESSION if opcode in _OF_SESSIONS else _UNKNOWN_COMMAND
-        )
-        said, data = _NAK, bytes((error,))
+        said, data = _NAK, bytes((_error(opcode),))
     head = _HEADER.pack((sequence + 1) & 0xFFFF, session, said, len(data), opcode, 0, 0)
     payload = (head + data).ljust(len(message.payload), b"\0")
     return FileTransfer(source, 0, *message.source, payload)

@@ -17,6 +17,8 @@ from sitl.setpoints import POSITION, ZERO, Pose, Setpoint, rotated
 _MOVING: Final = 0.3
 # Nearer than this (m) there is no bearing to turn to.
 _NEAR: Final = 1.0
+# PX4 has no limit of its own; what is further off (m) is no leader but damage.
+_FARTHEST: Final = 1000.0
 _FIRM: Final = (POSITION, POSITION, POSITION)
 
 
@@ -34,15 +36,15 @@ class Following:
         self._offset: Vector | None = None
         self._course = 0.0
         self._heard = -math.inf
-        self._system = 0
-        self.active = False
-        self.configure(config)
+        self._config = config
+        self._system = round(config.system)
 
     def configure(self, config: FollowConfig) -> None:
         """Other settings from now on."""
-        self._config = config
-        self._system = round(config.system)
-        self._offset = None
+        if config != self._config:
+            self._config = config
+            self._system = round(config.system)
+            self._offset = None
 
     def choose(self, system: int) -> None:
         """As DO_FOLLOW (32): this one from now on."""
@@ -56,12 +58,12 @@ class Following:
         self._heard = -math.inf
 
     def hear(self, message: FollowTarget | GlobalPosition, here: Pose, now: int) -> None:
-        """Someone says where he is, at ``now`` (µs); followed if ``active`` and if it is the one."""
-        if not self.active or not self._is_meant(message):
+        """Someone says where he is, at ``now`` (µs); followed if it is the one."""
+        if not self._is_meant(message):
             return
         self._system = self._system or message.source.system
         there, velocity = self._motion(message)
-        if math.dist(there, here.position) > self._config.limit and not self._px4:
+        if math.dist(there, here.position) > (_FARTHEST if self._px4 else self._config.limit):
             return
         self._heard = now
         station = self._station(there, message, velocity, here)

@@ -43,6 +43,7 @@ class Guidance:
     """
 
     def __init__(self, config: AutopilotConfig) -> None:
+        self._limits: dict[Activity, Limits] = {}
         self.configure(config)
         self._shaper = Shaper()
         exact = config.response == "exact"
@@ -60,8 +61,10 @@ class Guidance:
         limits = config.max_speed, config.max_acceleration, config.max_jerk
         gentle = config.gentle_acceleration, config.max_jerk
         self._config = config
+        # The way that is being flown keeps its own speed.
+        going = self._limits.get(Activity.GO, Limits(config.waypoint_speed, *gentle))
         self._limits = {
-            Activity.GO: Limits(config.waypoint_speed, *gentle),
+            Activity.GO: Limits(going.speed, *gentle),
             Activity.TAKEOFF: Limits(config.takeoff_speed, *gentle),
             Activity.TRACK: Limits(*limits),
             Activity.HOLD: Limits(config.max_speed, *gentle),
@@ -130,7 +133,7 @@ class Guidance:
 
     def hasten(self, speed: float) -> None:
         """From now on at up to ``speed`` (m/s) to where it goes."""
-        if self.activity is Activity.GO:
+        if self.activity is Activity.GO or (self._interrupted and self._interrupted[0] is Activity.GO):
             self._limits[Activity.GO] = self._limits[Activity.GO]._replace(speed=speed)
 
     def look(self, yaw: float) -> None:
@@ -142,12 +145,14 @@ class Guidance:
         """Whether it stays on ``pause``."""
         return self._interrupted is not None
 
-    def pause(self) -> None:
-        """Brake and stay. ``go_on`` goes on with what it does now, or what ``track`` is told meanwhile."""
+    def pause(self) -> bool:
+        """Brake and stay. ``go_on`` goes on with what it does now, or what ``track`` is told meanwhile.
+        False where there is nothing to interrupt."""
         if self._interrupted is None and self.activity in _INTERRUPTIBLE:
             interrupted = self.activity, self._setpoint
             self.hold()
             self._interrupted = interrupted
+        return self.paused
 
     def go_on(self) -> None:
         """End of ``pause``."""

@@ -63,6 +63,8 @@ class Homing:
             if not self._ready():
                 return Denial(TEMPORARILY_REJECTED, "Home refused: no position yet")
             return self._move(*self._origin.geodetic(self._estimate().position))
+        if order.integer and order.relative is None:
+            return Denial(DENIED, "Home refused: this frame is not known")
         latitude, longitude, altitude = order.place
         if order.relative:
             altitude += self._home.altitude
@@ -70,9 +72,9 @@ class Homing:
 
     def _move(self, latitude: float, longitude: float, altitude: float) -> Denial | None:
         if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and abs(altitude) <= _FAR):
-            return Denial(DENIED, "Home refused: no such place")
+            return Denial(DENIED, "Home refused: no such place on the globe")
         if math.dist(self._origin.local(latitude, longitude, altitude), (0.0, 0.0, 0.0)) > _FAR:
-            return Denial(DENIED, "Home refused: too far away")
+            return Denial(DENIED, "Home refused: more than 100 km from here")
         self._home.move(latitude, longitude, altitude)
         self._telemetry.request(HOME)
         return None

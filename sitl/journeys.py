@@ -43,6 +43,11 @@ class Journeys:
         else:
             self.itinerary.pause()
 
+    def end(self) -> None:
+        """The motors have stopped."""
+        self.itinerary.landed()
+        self._returning.end()
+
     def advance(self, mode: Mode, now: int, here: Estimate) -> Event | None:
         """Fly on at ``now`` (µs), if this is one of ``MODES``."""
         if self._guidance.paused:

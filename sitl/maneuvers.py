@@ -113,7 +113,8 @@ class Maneuvers:
         if self._commander.mode not in (Mode.MISSION, Mode.GUIDED):
             return Denial(DENIED, "Pause refused: neither in AUTO nor in GUIDED")
         if wish == 0.0:
-            self._guidance.pause()
+            if not self._guidance.pause():
+                return Denial(FAILED, "Pause refused: neither on the way nor holding")
         elif wish == 1.0:
             self._guidance.go_on()
         else:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_TYPE
+from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, SetupSigning, Source, Vector
 from mavlink_bridge.node import Datagram
@@ -220,6 +221,7 @@ class Autopilot:
             steering,
             following,
             self._services.handlers,
+            self._flavour.set_mode_ack,
         )
         if signing is None and config.signing_setup == "obeyed":
             signing = Signing()
@@ -235,6 +237,8 @@ class Autopilot:
         self._work_due = self._services.next_due
         # A real ArduCopter beats at once when its mode was changed. Quiet flights stay as they are.
         self._announces = config.streams == "normal" and not bytewise
+        self.untold = 0
+        """Messages that could not be told."""
         self._boot: int | None = None
         self._now = 0
         if config.start_height:
@@ -301,9 +305,17 @@ class Autopilot:
             messages = told + messages if len(messages) > _ANSWERS else messages + told
         if not messages:
             return []
-        data = parcels([self._codec.encode(message) for message in messages])
+        data = parcels([encoded for message in messages if (encoded := self._encoded(message))])
         self._outbox.clear()
         return [Datagram(LINK, parcel) for parcel in data]
+
+    def _encoded(self, message: Message) -> bytes:
+        """Nothing for what does not fit its message: one that cannot be told must not end the vehicle."""
+        try:
+            return self._codec.encode(message)
+        except EncodeError:
+            self.untold += 1
+            return b""
 
     def _configure(self) -> None:
         """Take over the parameters that are settings, but for the system id, which counts from the next boot

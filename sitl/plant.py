@@ -70,6 +70,9 @@ class Plant:
         """All physics steps that end by ``now`` (µs, not decreasing), under a reference that is renewed on a
         fixed grid. Without one the motors stand still, or idle when ``armed``."""
         vehicle, guidance, period, stride = self.vehicle, self._guidance, self._period, self._stride
+        if not armed:
+            # Whatever was asked for: nothing turns the motors of a vehicle that is not armed.
+            guidance.idle()
         self._trace_start = self._steps
         self._trace.clear()
         last = now // period

@@ -27,9 +27,6 @@ from sitl.sensors import Estimate
 from sitl.steering import Steering
 from sitl.voice import Voice
 
-# ArduPilot acknowledges SET_MODE as if its number were a command's.
-_SET_MODE = 11
-
 
 class Reception:
     """Hands messages for this vehicle to ``orders``, ``steering`` and ``services``, answers TIMESYNC (111)
@@ -45,8 +42,10 @@ class Reception:
         steering: Steering,
         following: Following,
         services: Mapping[type[Any], Callable[[Any, int], None]],
+        set_mode_ack: int,
     ) -> None:
-        """``services``: who handles a message that arrived at some time (µs), by its type."""
+        """``services``: who handles a message that arrived at some time (µs), by its type.
+        ``set_mode_ack``: the command that COMMAND_ACK names when SET_MODE (11) was obeyed."""
         self._source = source
         self._outbox = outbox
         self._voice = voice
@@ -55,6 +54,7 @@ class Reception:
         self._steering = steering
         self._following = following
         self._services = services
+        self._set_mode_ack = set_mode_ack
 
     def handle(self, message: Message, now: int, estimate: Estimate) -> None:
         """Act on a message that arrived at ``now`` (µs since boot), when ``estimate`` was believed."""
@@ -66,7 +66,7 @@ class Reception:
                 if self._is_mine(message.target_system, message.target_component):
                     self._obey(message, now)
             case FollowTarget() | GlobalPosition():
-                if message.source.system != self._source.system:
+                if self._commander.follows and message.source.system != self._source.system:
                     self._following.hear(message, estimate.pose, now)
             case Timesync(tc1=0):
                 # Zero would make the reply a request.
@@ -94,7 +94,7 @@ class Reception:
 
     def _change_mode(self, message: SetMode, now: int) -> None:
         result, reason = self._orders.set_mode(message.custom_mode, message.base_mode, now)
-        self._outbox.append(CommandAck(self._source, _SET_MODE, result, 0, 0, *message.source))
+        self._outbox.append(CommandAck(self._source, self._set_mode_ack, result, 0, 0, *message.source))
         if reason:
             self._voice.complain(reason, now)
 

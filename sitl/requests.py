@@ -51,9 +51,13 @@ class Requests:
         if self._flavour.groups_streams:
             self.set_rate(message.stream, message.rate if message.start else 0, now)
 
-    def set_rate(self, stream: int, rate: float, now: int) -> None:
-        """All messages of a MAV_DATA_STREAM at ``rate`` (Hz), as far as it is granted; 0 for none."""
-        interval = max(self._flavour.shortest_interval, round(1e6 / rate)) if rate > 0 else -1
+    def set_rate(self, stream: int, rate: float | None, now: int) -> None:
+        """All messages of a MAV_DATA_STREAM at ``rate`` (Hz), as far as it is granted; 0 for none, None for
+        the usual one."""
+        if rate is None:
+            interval = 0
+        else:
+            interval = max(self._flavour.shortest_interval, round(1e6 / rate)) if rate > 0 else -1
         for message_id in members(stream):
             self._telemetry.set_interval(message_id, interval, now)
 

@@ -47,6 +47,10 @@ class Returning:
         self._go((north, east, -height), self._config.waypoint_climb, None, here)
         self._stage = _Stage.CLIMB
 
+    def end(self) -> None:
+        """Nothing is on its way any more."""
+        self._stage = _Stage.IDLE
+
     def advance(self, now: int, here: Estimate) -> None:
         """Fly on: to be called in each step at ``now`` (µs)."""
         if self._stage is _Stage.PAUSE:

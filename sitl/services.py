@@ -32,6 +32,7 @@ from sitl.voice import Voice
 
 # MAV_CMD_PREFLIGHT_STORAGE, and its first parameter
 STORAGE: Final = 245
+FENCE_ENABLE: Final = 207
 _READ, _WRITE, _RESET = 0.0, 1.0, 2.0
 
 
@@ -81,6 +82,8 @@ class Services:
             **failures.commands,
             STORAGE: self._store,
         }
+        if flavour.stops:
+            self.commands[FENCE_ENABLE] = self._enable_fence
         self._stream(0)
 
     @property
@@ -102,26 +105,38 @@ class Services:
         self._configure()
         self._stream(self._now)
 
-    def _stream(self, now: int) -> None:
+    def _stream(self, now: int, *, resets: bool = False) -> None:
         """Give the groups of messages the rates that ArduPilot's SR0_ parameters say, where they changed."""
         for group, rate in self._rates.items():
             wanted = self._values.named(f"SR0_{group}")
             if wanted != rate:
                 self._rates[group] = wanted
-                self._requests.set_rate(STREAMS[group], wanted, now)
+                # 0 is how it began: what flows then flows again.
+                usual = wanted == 0.0 and resets
+                self._requests.set_rate(STREAMS[group], None if usual else wanted, now)
 
     def _refuse_file(self, message: FileTransfer, _now: int) -> None:
         answer = files.answer(message, self._source)
         if answer is not None:
             self._outbox.append(answer)
 
+    def _enable_fence(self, order: Order) -> Denial | None:
+        """DO_FENCE_ENABLE, as ArduPilot has it: parameter 1 is FENCE_ENABLE."""
+        number = self._values.number("FENCE_ENABLE")
+        if number is None or order.params[0] not in (0.0, 1.0):
+            return Denial(DENIED, "Fence refused: parameter 1 must be 0 or 1")
+        self._values.set(number, order.params[0])
+        self._now = order.now
+        self._changed()
+        return None
+
     def _store(self, order: Order) -> Denial | None:
         """PREFLIGHT_STORAGE: what is set is kept anyhow; all can be made as at first."""
         wish = order.params[0]
         if wish == _RESET:
             self._values.reset()
-            self._now = order.now
-            self._changed()
+            self._configure()
+            self._stream(order.now, resets=True)
             return None
         if wish in (_READ, _WRITE):
             return None

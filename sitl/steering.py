@@ -68,8 +68,9 @@ class Steering:
         can be flown."""
         reading = self._read(message, here)
         if not isinstance(reading, Setpoint):
-            self._voice.complain(reading.reason, now)
-            if isinstance(reading, Stop) and self._guidance.activity is Activity.TRACK:
+            denial = self._flavour.steering_denial(status)
+            self._voice.complain(denial or reading.reason, now)
+            if isinstance(reading, Stop) and denial is None and self._guidance.activity is Activity.TRACK:
                 self._guidance.hold()
             return False
         self.stream = Stream(reading, now, self.stream.newest)

@@ -7,7 +7,7 @@ from math import degrees, radians, remainder, tau
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.fields.units import FULL_CIRCLE_CDEG, UNKNOWN_U16, Fields, degrees_e7, on_globe
+from mavlink_bridge.fields.units import FULL_CIRCLE_CDEG, UNKNOWN_U16, Fields, degrees_e7, int16, on_globe
 
 _UNKNOWN_U8 = 0xFF
 _CELLS = 10
@@ -141,8 +141,8 @@ def raw_imu(s: m.Source, f: Fields) -> m.RawImu:
 
 
 def raw_imu_fields(x: m.RawImu) -> Fields:
-    force = (round(value / _MILLI_G) for value in x.specific_force)
-    rest = (round(value * 1e3) for value in (*x.body_rates, *x.magnetic_field))
+    force = (int16(value / _MILLI_G) for value in x.specific_force)
+    rest = (int16(value * 1e3) for value in (*x.body_rates, *x.magnetic_field))
     return x.time_boot, *force, *rest, 0, 0
 
 

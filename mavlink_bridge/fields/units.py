@@ -19,6 +19,11 @@ def degrees_e7(name: str, value: float, limit: int) -> int:
     return round(value * 1e7)
 
 
+def int16(value: float) -> int:
+    """Rounded, and the nearest that fits, for a sensor that saturates."""
+    return max(-0x8000, min(0x7FFF, round(value)))
+
+
 def on_globe(latitude_e7: int, longitude_e7: int) -> bool:
     """Whether there is such a place."""
     return abs(latitude_e7) <= 900_000_000 and abs(longitude_e7) <= 1_800_000_000

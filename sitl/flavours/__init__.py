@@ -124,6 +124,8 @@ class Flavour(Protocol):
     after_return: Mode
     after_mission: Mode
     """The mode when the last item is done."""
+    set_mode_ack: int
+    """The command that COMMAND_ACK (77) names after SET_MODE (11)."""
     first_item: int
     """The first item of a mission that is flown: ArduPilot keeps home as item 0."""
     start_arms: bool

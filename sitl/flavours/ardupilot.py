@@ -71,7 +71,7 @@ _MODES: Final = {
     17: Mode.HOLD,
     23: Mode.FOLLOW,
 }
-_NAMES: Final = {Mode.MISSION: "AUTO", Mode.RETURN: "RTL"}
+_NAMES: Final = {Mode.MISSION: "AUTO", Mode.RETURN: "RTL", Mode.HOLD: "BRAKE"}
 _NOT_ARMABLE: Final = (Mode.LAND, Mode.HOLD, Mode.MISSION, Mode.RETURN, Mode.FOLLOW)
 _FRAMES: Final = (LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED)
 _TRIPLES: Final = (IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION)
@@ -98,6 +98,8 @@ class ArduPilot:
     keeps_choice = False
     after_return = Mode.RETURN
     after_mission = Mode.MISSION
+    # As if the number of the message were a command's.
+    set_mode_ack = 11
     first_item = 1
     start_arms = False
     after_loss = Mode.GUIDED
@@ -121,12 +123,15 @@ class ArduPilot:
         self._battery = config.battery_failsafe
         self._follows = config.follow.enabled == "on"
         fence = config.fence
+        kinds = round(fence.kinds)
         self.fence_rules = Rules(
             fence.enabled == "on",
             False,
-            limit(fence.height, 100.0),
-            limit(fence.radius, 300.0),
+            limit(fence.height, 100.0) if kinds & 1 else math.inf,
+            limit(fence.radius, 300.0) if kinds & 2 else math.inf,
             fence.action or "return",
+            areas=bool(kinds & 4),
+            floor=fence.floor if kinds & 8 else -math.inf,
         )
 
     def custom_mode(self, mode: Mode) -> int:

@@ -80,6 +80,8 @@ class Px4:
     keeps_choice = True
     after_return = Mode.HOLD
     after_mission = Mode.HOLD
+    # It makes a DO_SET_MODE of it.
+    set_mode_ack = 176
     first_item = 0
     start_arms = True
     # EKF2_NOAID_TOUT.
@@ -123,8 +125,8 @@ class Px4:
     def arming_denial(self, status: Status) -> str | None:
         if status.mode is Mode.GUIDED and not _streaming(status):
             return "no offboard signal"
-        if status.mode is Mode.FOLLOW:
-            return "FOLLOW mode is not armable"
+        if status.mode in (Mode.FOLLOW, Mode.RETURN):
+            return f"{status.mode.name} mode is not armable"
         return None
 
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:

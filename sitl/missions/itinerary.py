@@ -124,6 +124,14 @@ class Itinerary:
         self._speed = None
         self._jumps.clear()
 
+    def replaced(self) -> None:
+        """The mission is another: from its beginning; ArduPilot in flight goes on with the item of the same
+        number."""
+        if self._px4 or self._guidance.activity is Activity.IDLE or self.current >= len(self._items):
+            self.rewind()
+        else:
+            self.pause()
+
     def select(self, seq: int) -> bool:
         """Go on with item ``seq``; False if there is none such. Begins when ``advance`` is called."""
         if not 0 <= seq < len(self._items):
@@ -263,7 +271,8 @@ class Itinerary:
         north, east, down = here.position
         if item.command == LAND or item.command == TAKEOFF:
             if item.here or item.command == TAKEOFF:
-                return north, east, down if item.command == LAND else -self._height(item)
+                # A takeoff in the air leads up or nowhere.
+                return north, east, down if item.command == LAND else min(down, -self._height(item))
             x, y, _ = self._origin.local(item.x / 1e7, item.y / 1e7, self._origin.altitude)
             return x, y, down
         if item.here:

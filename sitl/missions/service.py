@@ -66,7 +66,7 @@ class MissionService:
         self._outbox = outbox
         self._voice = voice
         self.transfer = Transfer(source, plans, outbox, voice, asks_int=asks_int)
-        plans.changed = itinerary.rewind
+        plans.changed = itinerary.replaced
         transfer = self.transfer
         self.handlers: dict[type[Any], Callable[[Any, int], None]] = {
             MissionCount: transfer.count,

@@ -53,6 +53,8 @@ BOUND: Final = {
     "BATT_FS_LOW_ACT": Bound("battery_failsafe.low_action", options=_ACTIONS),
     "BATT_FS_CRT_ACT": Bound("battery_failsafe.critical_action", options=_ACTIONS),
     "FENCE_ENABLE": Bound("fence.enabled", options=_SWITCH),
+    "FENCE_TYPE": Bound("fence.kinds"),
+    "FENCE_ALT_MIN": Bound("fence.floor"),
     "FENCE_ALT_MAX": Bound("fence.height"),
     "FENCE_RADIUS": Bound("fence.radius"),
     "FENCE_ACTION": Bound("fence.action", options=((0, "warn"), (1, "return"), (2, "land"), (4, "hold"))),

@@ -9,8 +9,9 @@ import pytest
 from autopilot_rig import FLAVOURS, PILOT, SET_MODE, SITE, VELOCITY_YAW, Rig, setpoint
 from mission_client import at, upload
 from outside_client import Client
+from pymavlink.dialects.v20 import all as dialect
 
-from mavlink_bridge.messages import CommandAck, CommandInt, FollowTarget, GlobalPosition, Source
+from mavlink_bridge.messages import Attitude, CommandAck, CommandInt, FollowTarget, GlobalPosition, Source
 from sitl.flavours import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Mode
 
 LOITER, FOLLOW, YAW, SPEED, TERMINATE, REPOSITION, PAUSE, CHECK = 17, 32, 115, 178, 185, 192, 193, 401
@@ -279,3 +280,92 @@ def test_checks_say_what_speaks_against_arming(flavour):
     rig.heard.clear()
     assert rig.order(CHECK) == [ACCEPTED]
     assert rig.texts == []
+
+
+# What a look at all of it together had found
+
+
+def turning(rig):
+    return bool((rig.autopilot.state.rotor_speeds > 1.0).any())
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("mode", ["follow", "return"])
+def test_nothing_turns_the_motors_of_a_vehicle_that_is_not_armed(flavour, mode):
+    numbers = {
+        ("ardupilot", "follow"): (1, 23),
+        ("ardupilot", "return"): (1, 6),
+        ("px4", "follow"): (1, 4, 8),
+        ("px4", "return"): (1, 4, 5),
+    }
+    rig = Rig(flavour, follow={"enabled": "on", "z": -3.0})
+    rig.run(1.1)
+    assert rig.order(SET_MODE, *numbers[flavour, mode]) == [ACCEPTED]
+    follow(rig, 3.0)
+    assert not turning(rig)
+    # Nor does it leave the ground when it is armed there by force, or later, in another mode.
+    assert rig.order(400, 1, 21196) == [ACCEPTED]
+    follow(rig, 3.0)
+    assert -rig.position[2] < 0.1
+
+
+def test_a_vehicle_that_was_cut_in_follow_stays_down_when_it_is_armed_again():
+    rig = Rig("px4").hover(5.0)
+    assert rig.order(SET_MODE, 1, 4, 8) == [ACCEPTED]
+    follow(rig, 2.0)
+    assert rig.order(TERMINATE, 1) == [ACCEPTED]
+    follow(rig, 4.0)
+    assert not turning(rig)
+    assert rig.order(400, 1) == [ACCEPTED]
+    here = rig.position.copy()
+    follow(rig, 3.0)
+    assert np.linalg.norm(rig.position - here) < 0.1
+
+
+def test_px4_follows_no_leader_on_the_other_side_of_the_world():
+    rig = Rig("px4").hover(5.0)
+    assert rig.order(SET_MODE, 1, 4, 8) == [ACCEPTED]
+    rig.run(2.0, FollowTarget(LEADER, 1, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)))
+    assert rig.speed < 0.02
+
+
+def test_another_parameter_changes_nothing_of_what_is_flown():
+    rig = Rig("ardupilot").hover(5.0)
+    client = Client(rig)
+    assert reposition(rig, 60.0, 0.0, 5.0) == [ACCEPTED]
+    assert rig.order(SPEED, 1, 1.0) == [ACCEPTED]
+    name = b"RC1_TRIM".ljust(16, b"\0")
+    client.send(dialect.MAVLink_param_set_message(11, 1, name, 1501.0, 4))
+    rig.run(6.0)
+    assert rig.speed == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_pause_is_refused_where_it_cannot_be():
+    rig = Rig("ardupilot")
+    rig.run(1.1)
+    assert rig.guided() == [ACCEPTED]
+    assert rig.order(400, 1) == [ACCEPTED]
+    assert rig.order(22, 0, 0, 0, 0, 0, 0, 10.0) == [ACCEPTED]
+    rig.run(1.0)
+    assert rig.order(PAUSE, 0) == [FAILED]
+
+
+def test_a_stop_outside_guided_stops_nothing():
+    rig = Rig("ardupilot", follow={"enabled": "on"}).hover(5.0)
+    assert rig.order(SET_MODE, 1, 23) == [ACCEPTED]
+    follow(rig, 4.0)
+    speed = rig.speed
+    assert speed > 1.0
+    rig.step(setpoint(VELOCITY_YAW, velocity=(0.0, 0.0, 0.0), frame=20))
+    rig.run(0.1)
+    assert rig.speed == pytest.approx(speed, abs=0.3)
+
+
+def test_what_cannot_be_told_is_left_out_and_the_rest_is_told():
+    rig = Rig("ardupilot").hover(5.0)
+    rig.autopilot._home.altitude = -3.0e6
+    rig.heard.clear()
+    rig.run(2.0)
+    assert rig.all(GlobalPosition) == []
+    assert len(rig.all(Attitude)) > 50
+    assert rig.autopilot.untold > 0

@@ -296,10 +296,38 @@ def test_the_same_mission_twice_is_the_same_to_the_bit():
     assert flights[0] == flights[1]
 
 
-def test_a_new_mission_in_flight_begins_at_its_beginning():
+def test_a_new_mission_in_flight_begins_at_its_beginning_with_px4():
     client = ready("px4", at(0, 0, 5, TAKEOFF), at(30, 0, 5))
     take_off_by_mission(client)
     client.wait(6.0)
     assert upload(client, [at(0, 9, 5), at(-9, 9, 5)]) == 0
     track = fly(client, 16.0)
     passes(track, (0, 9, -5), (-9, 9, -5))
+
+
+def test_a_new_mission_in_flight_goes_on_where_the_old_one_was_with_ardupilot():
+    rig = Rig("ardupilot").hover(5.0)
+    client = Client(rig)
+    assert upload(client, [at(0, 0, 0), at(9, 0, 5), at(40, 0, 5)]) == 0
+    assert client.command(SET_MODE, *AUTO["ardupilot"]) == 0
+    client.wait(8.0)
+    # On its way to the second item, which is now elsewhere; the first it does not fly again.
+    assert rig.position[0] > 9.0
+    assert upload(client, [at(0, 0, 0), at(0, -30, 5), at(9, 9, 5)]) == 0
+    track = fly(client, 12.0)
+    assert np.linalg.norm(track[-1] - (9.0, 9.0, -5.0)) < 2.5
+    assert track[:, 1].min() > -1.0
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_takeoff_item_in_the_air_leads_up_or_nowhere(flavour):
+    home = [at(0, 0, 0)] if flavour == "ardupilot" else []
+    rig = Rig(flavour).hover(12.0)
+    client = Client(rig)
+    assert upload(client, [*home, at(0, 0, 5, TAKEOFF), at(6, 0, 12)]) == 0
+    assert client.command(SET_MODE, *AUTO[flavour]) == 0
+    lowest = 12.0
+    for _ in range(100):
+        client.wait(0.1)
+        lowest = min(lowest, -rig.position[2])
+    assert lowest > 11.5

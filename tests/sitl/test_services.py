@@ -214,7 +214,7 @@ def test_home_is_set_here_by_message_and_not_in_nonsense(flavour):
             dialect.MAVLink_set_home_position_message(11, latitude, 85455940, 488000, 0, 0, 0, nan, 0, 0, 0)
         )
         assert len(client.of("HOME_POSITION")) == seen + ok
-    assert client.texts[-1] == "Home refused: too far away"
+    assert client.texts[-1] == "Home refused: more than 100 km from here"
     assert client.command(SET_HOME, 0, 0, 0, 0, 91.0, 0.0, 0.0) == 2
     assert client.command(SET_HOME, 0, 0, 0, 0, math.nan, 0.0, 0.0) == 2
 
@@ -349,7 +349,7 @@ def test_failures_need_leave_and_then_happen():
 
 
 @pytest.mark.parametrize(
-    ("flavour", "custom", "command"), [("ardupilot", 4, 11), ("px4", 4 << 16 | 3 << 24, 11)]
+    ("flavour", "custom", "command"), [("ardupilot", 4, 11), ("px4", 4 << 16 | 3 << 24, 176)]
 )
 def test_set_mode_as_a_message(flavour, custom, command):
     client = up(flavour)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import Final
 
 from pydantic import ValidationError
 
 from outrider.errors import InputError
 from outrider.hangar.squad import Squad
 from sitl.saved import Saved
+
+_IDS: Final = ("SYSID_THISMAV", "MAV_SYS_ID")
 
 
 class Cabinet:
@@ -18,6 +22,7 @@ class Cabinet:
     def __init__(self, directory: Path | None, flavour: str) -> None:
         self._directory, self._flavour = directory, flavour
         self._kept: dict[int, Saved] = {}
+        self._complained = False
 
     def saved(self, system: int) -> Saved:
         """What vehicle ``system`` kept; InputError if its file is damaged."""
@@ -26,6 +31,9 @@ class Cabinet:
         if path is not None and path.exists():
             try:
                 kept = Saved.model_validate_json(path.read_bytes())
+                # Ids are given by --first-id: two vehicles must never have one.
+                others = {name: v for name, v in kept.parameters.items() if name not in _IDS}
+                kept = kept.model_copy(update={"parameters": others})
             except (OSError, ValidationError) as error:
                 why = error.strerror if isinstance(error, OSError) else "it is damaged"
                 raise InputError(
@@ -48,9 +56,20 @@ class Cabinet:
                 self._kept[seat.system] = found
                 path = self._path(seat.system)
                 if path is not None:
-                    beside = path.with_suffix(".new")
-                    beside.write_text(found.model_dump_json(indent=1), encoding="utf-8")
-                    beside.replace(path)
+                    self._write(path, found)
+
+    def _write(self, path: Path, kept: Saved) -> None:
+        """A directory that is gone or full ends no flight; it is said once."""
+        beside = path.with_suffix(".new")
+        try:
+            beside.write_text(kept.model_dump_json(indent=1), encoding="utf-8")
+            beside.replace(path)
+        except OSError as error:
+            if not self._complained:
+                self._complained = True
+                sys.stderr.write(
+                    f"outrider sitl: {path}: cannot be written, nothing is kept: {error.strerror}\n"
+                )
 
     def _path(self, system: int) -> Path | None:
         return None if self._directory is None else self._directory / f"{self._flavour}-{system}.json"

@@ -122,7 +122,8 @@ class Request:
             sensors=self.sensors,
             physics=self.physics,
             response=self.response,
-            battery=BatteryConfig(),
+            # Three cells are low at the 10.5 V of BATT_LOW_VOLT; PX4 counts shares.
+            battery=BatteryConfig(cells=3 if self.flavour == "ardupilot" else 4),
             epoch=epoch,
             **changes,
         )
