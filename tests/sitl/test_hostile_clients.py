@@ -213,21 +213,28 @@ def test_nobody_without_the_key_ends_a_flight(flavour: str, how: str) -> None:
 
 # Whatever is asked
 
-USUAL = st.sampled_from([0.0, 1.0, -1.0, 2.0, 4.0, 30.0, 148.0, 511.0, 2e4, 1e6])
+USUAL = st.sampled_from([0.0, 1.0, -1.0, 2.0, 3.0, 4.0, 8.0, 30.0, 101.0, 148.0, 511.0, 9900.0, 2e4, 1e6])
 EXTREME = USUAL | st.sampled_from([1e10, 3.4e38, -3.4e38, 1e-40, 65535.0, 65536.0, NAN, math.inf, -math.inf])
-NUMBERS = st.sampled_from([20, 21, 22, 176, 179, 192, 224, 245, 300, 400, 410, 420, 510, 511, 512, 520])
+NUMBERS = st.sampled_from(
+    [
+        *(17, 20, 21, 22, 32, 115, 176, 178, 179, 185, 192, 193),
+        *(207, 224, 245, 300, 400, 401, 410, 420, 510, 511, 512, 520),
+    ]
+)
+PAUSE = st.sampled_from([0.005, 0.05, 0.5, 2.0])
 
 
 @given(
     st.sampled_from(FLAVOURS),
-    st.lists(st.tuples(NUMBERS, st.lists(EXTREME, max_size=7)), min_size=1, max_size=12),
+    st.lists(st.tuples(NUMBERS, st.lists(EXTREME, max_size=7), PAUSE), min_size=1, max_size=12),
 )
 @settings(max_examples=150, deadline=None)
 def test_no_order_and_no_sequence_of_orders_ends_the_autopilot(
-    flavour: str, asked: list[tuple[int, list[float]]]
+    flavour: str, asked: list[tuple[int, list[float], float]]
 ) -> None:
     rig = Rig(flavour, start_height=5.0, streams="normal", failures="obeyed")
-    for number, params in asked:
+    for number, params, pause in asked:
+        rig.run(pause)
         (sent,) = flood(rig, [], 0.005, Codec().encode(command(number, *params)))
         assert len([ack for ack in heard(sent, CommandAck) if ack.command == number]) == 1
         assert np.isfinite(rig.autopilot.state.position).all()
