@@ -23,6 +23,8 @@ _RC: Final = 0x10000
 """MAV_SYS_STATUS_SENSOR_RC_RECEIVER: an escort needs none."""
 _CONSTANT_POSITION, _UNINITIALISED = 0x80, 0x400
 _LOW, _EMPTY = 0.3, 0.15
+_BRIEF: Final = 1.0
+"""s."""
 _POOR_HDOP, _POOR_ACCURACY = 2.0, 2.5
 
 
@@ -199,7 +201,7 @@ def battery(case: Case) -> Iterator[Finding]:
 
 def _spells(condition: Condition) -> str:
     """What of it was not so before."""
-    if not condition.missing:
+    if condition.missing < _BRIEF:
         return ""
     times = f", and it was lost {condition.lost} times" if condition.lost > 1 else ", and it was lost once"
     return f" For {condition.missing:.0f} s it was not so{times if condition.lost else ', to begin with'}."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from rich.console import Console
-from rich.padding import Padding
+from rich.table import Table
 from rich.text import Text
 
 from outrider.doctor.finding import Severity, Verdict
@@ -16,8 +16,6 @@ _STYLES: Final = {
     Severity.NOTE: "cyan",
     Severity.OK: "green",
 }
-_WIDEST: Final = max(len(severity.value) for severity in Severity)
-_INDENT: Final = (0, 0, 0, _WIDEST + 2)
 
 
 def show(name: str, verdict: Verdict) -> None:
@@ -28,13 +26,16 @@ def show(name: str, verdict: Verdict) -> None:
     counts = ", ".join(f"{count} {severity.value}" for severity, count in told if count)
     ready = "ready for an escort" if verdict.ready else "NOT ready for an escort"
     console.print(Text(f"{name}: {ready} ({counts})", style="bold"))
+    table = Table.grid(padding=(0, 2))
     for what, severity, why, do in verdict.findings:
-        line = Text(f"{severity.value:{_WIDEST}}  ", style=_STYLES[severity])
-        console.print(line.append(_plain(what), style="default"))
+        lines = [what]
         if severity is not Severity.OK:
-            console.print(Padding(Text(_plain(why)), _INDENT))
+            lines.append(why)
         if do:
-            console.print(Padding(Text(f"→ {_plain(do)}"), _INDENT))
+            lines.append(f"→ {do}")
+        words = "\n".join(_plain(line) for line in lines)
+        table.add_row(Text(severity.value, style=_STYLES[severity]), Text(words))
+    console.print(table)
 
 
 def document(verdict: Verdict) -> dict[str, Any]:
