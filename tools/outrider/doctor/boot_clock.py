@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from mavlink_bridge.messages import Message
+
 _RESTART: Final = 1_000_000
 _LEAP: Final = 5_000_000
 _FASTEST: Final = 100
@@ -12,29 +14,31 @@ _FASTEST: Final = 100
 
 class BootClock:
     """Fed with pairs of times. ``restarts``: it went back by more than a second; ``backward``: it went back
-    at all, of ``stamps``; ``leaps``: it went ahead by far more than the time that passed."""
+    at all, or said something else of the same instant, of ``stamps``; ``leaps``: it went ahead by far more
+    than the time that passed."""
 
     def __init__(self) -> None:
         self.restarts = self.backward = self.leaps = self.stamps = 0
-        self._before: dict[type, tuple[int, int]] = {}
+        self._before: dict[type, tuple[int, int, Message]] = {}
         self._start: tuple[int, int] | None = None
         self._end = (0, 0)
 
-    def tell(self, now: int, kind: type, boot: int) -> None:
-        """A message of ``kind`` that came at ``now`` says ``boot`` (both µs)."""
+    def tell(self, now: int, message: Message, boot: int) -> None:
+        """``message``, which came at ``now``, says ``boot`` (both µs)."""
+        kind = type(message)
         self.stamps += 1
         before = self._before.get(kind)
         if before is not None:
             passed, gone = now - before[0], boot - before[1]
             restarted, leapt = gone < -_RESTART, gone > _LEAP + _FASTEST * passed
-            self.backward += gone < 0
+            self.backward += gone < 0 or (gone == 0 and message != before[2])
             self.restarts += restarted
             self.leaps += leapt
             if restarted or leapt:
                 # What other messages said before is of the old count: the same step would count again.
                 self._start = None
                 self._before.clear()
-        self._before[kind] = now, boot
+        self._before[kind] = now, boot, message
         self._start = self._start or (now, boot)
         self._end = now, boot
 

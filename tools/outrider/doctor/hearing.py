@@ -61,4 +61,8 @@ class Hearing:
     def vehicle(self, system: int | None = None) -> Speaker | None:
         """The autopilot of ``system``, or the one that says most."""
         found = [one for one in self.autopilots if system is None or one.source.system == system]
-        return max(found, key=lambda one: (one.source.component == 1, one.frames), default=None)
+        return max(
+            found,
+            key=lambda one: (one.source.system > 0, one.source.component == 1, one.frames),
+            default=None,
+        )

@@ -144,6 +144,13 @@ def _namesakes(case: Case) -> Iterator[Finding]:
             f"Only component {vehicle.source.component} was looked at; orders to the whole system reach all.",
             "An escort talks to component 1 only. See which of them flies the vehicle.",
         )
+    if number == 0:
+        yield Finding(
+            "the vehicle's system id is 0",
+            Severity.BLOCKING,
+            "That means everybody: nothing can be addressed to it.",
+            "Set SYSID_THISMAV (ArduPilot) or MAV_SYS_ID (PX4) to 1…250.",
+        )
     if number == 255:
         yield Finding(
             "the vehicle's system id is 255",

@@ -132,7 +132,7 @@ class Speaker:
     def _note(self, now: int, message: Message) -> None:
         boot = getattr(message, "time_boot", None)
         if isinstance(boot, int) and boot:
-            self.clock.tell(now, type(message), boot)
+            self.clock.tell(now, message, boot)
         guided = self.vehicle.armed and self.vehicle.in_guided_mode
         self.vehicle.hear(message)
         self.vehicle.tick(now)

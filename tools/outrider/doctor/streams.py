@@ -22,7 +22,7 @@ class Need(NamedTuple):
 
 
 NEEDS: Final = (
-    Need(32, "LOCAL_POSITION_NED", 50.0, 4.0, True, "Every plan begins where this says that it is."),
+    Need(32, "LOCAL_POSITION_NED", 50.0, 2.0, True, "Every plan begins where this says that it is."),
     Need(30, "ATTITUDE", 10.0, 2.0, True, "It says where the nose points when set-points begin."),
     Need(1, "SYS_STATUS", 1.0, 0.2, True, "It has the pre-arm check and the battery."),
     Need(245, "EXTENDED_SYS_STATE", 2.0, 0.5, False, "It says whether an armed vehicle stands or flies."),
