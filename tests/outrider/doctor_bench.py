@@ -11,6 +11,7 @@ from mavlink_bridge.codec import Codec
 from mavlink_bridge.framing import Frame, leading_frames
 from mavlink_bridge.messages import CommandLong, Message, Source
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
 from outrider.doctor.consultation import Consultation
 from outrider.doctor.finding import Finding, Severity, Verdict
 from sitl.autopilot_config import AutopilotConfig
@@ -22,7 +23,13 @@ GCS = Source(255, 190)
 INJECT, GPS, BATTERY, OFF = 420, 4, 100, 1
 
 
-def autopilot(flavour: str = "ardupilot", system: int = 11, seed: int = 1, **settings: Any) -> Autopilot:
+def autopilot(
+    flavour: str = "ardupilot",
+    system: int = 11,
+    seed: int = 1,
+    signing: Signing | None = None,
+    **settings: Any,
+) -> Autopilot:
     """As ``outrider sitl`` has them."""
     place = {"latitude": SITE.latitude, "longitude": SITE.longitude, "altitude": SITE.altitude}
     values = {
@@ -34,7 +41,7 @@ def autopilot(flavour: str = "ardupilot", system: int = 11, seed: int = 1, **set
         **place,
         **settings,
     }
-    return Autopilot(AutopilotConfig(**values), FIREFLY, SITE, seed=seed)
+    return Autopilot(AutopilotConfig(**values), FIREFLY, SITE, seed=seed, signing=signing)
 
 
 class Bench:
@@ -54,7 +61,7 @@ class Bench:
         self.heard: list[Message] = []
         self._speed, self._passes = speed, passes
         self._mail: list[bytes] = []
-        self._codec, self._sender = Codec(), Codec()
+        self._sender = Codec()
 
     def tick(self, *said: Message) -> list[bytes]:
         """20 ms (of the doctor's time); what the vehicles told."""
@@ -88,12 +95,16 @@ class Bench:
         *,
         beside: Callable[[int], list[bytes]] = lambda _now: [],
         until: float | None = None,
+        signing: Signing | None = None,
+        now: int = 0,
+        baud: int | None = None,
     ) -> Verdict:
         """Until the doctor is done. ``beside``: frames of others at a time; the vehicles fall silent after
-        ``until`` s."""
-        consultation = Consultation(round(seconds * 1e6), system)
-        passed = 0
-        while not consultation.over(passed):
+        ``until`` s. ``now``: Unix time, µs, for who signs."""
+        consultation = Consultation(round(seconds * 1e6), system, signing)
+        consultation.examination.baud = baud
+        passed, reader = 0, Codec()
+        while not consultation.over(now + passed):
             told = self.tick() if until is None or passed < until * 1e6 else []
             arrived = [
                 frame.data
@@ -101,8 +112,8 @@ class Bench:
                 for frame in leading_frames(data)[0]
                 if self._passes(frame)
             ]
-            for data in consultation.step(passed, arrived):
-                self.heard += self._codec.feed(data)
+            for data in consultation.step(now + passed, arrived):
+                self.heard += reader.feed(data)
                 self._mail.append(data)
             passed += TICK
         return consultation.examination.verdict()

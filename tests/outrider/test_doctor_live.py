@@ -11,6 +11,7 @@ from autopilot_rig import ARM, FLAVOURS, GUIDED, SET_MODE, TAKEOFF
 from doctor_bench import BATTERY, GCS, GPS, INJECT, OFF, Bench, autopilot, blocking, found, warnings
 
 from mavlink_bridge.codec import Codec
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     CommandLong,
     Heartbeat,
@@ -19,6 +20,7 @@ from mavlink_bridge.messages import (
     SetpointLocal,
     Source,
 )
+from mavlink_bridge.signing import Signing
 from outrider.doctor.finding import Severity
 from outrider.doctor.questions import COMPONENT, STRANGER
 from outrider.doctor.settings import names
@@ -268,6 +270,33 @@ def test_a_simulation_that_is_sped_up() -> None:
     assert verdict.ready
     assert found(verdict, "its clock runs 5.0").severity is Severity.NOTE
     assert found(verdict, "LOCAL_POSITION_NED at 20")
+
+
+def test_a_signed_vehicle() -> None:
+    key = Key(b"k" * 32)
+
+    def bench() -> Bench:
+        vehicle = Bench(autopilot("px4", signing=Signing(key)))
+        vehicle.run(3.0)
+        return vehicle
+
+    unsigned = bench().consult()
+    assert found(unsigned, "of its messages are signed").severity is Severity.NOTE
+    assert "no GPS_GLOBAL_ORIGIN" not in "".join(blocking(unsigned))  # it flows by itself
+    assert found(unsigned, "COM_OBL_RC_ACT is not told").severity is Severity.WARNING
+    signed = bench().consult(signing=Signing(key), now=1_700_000_003_000_000)
+    assert signed.ready
+    assert found(signed, "COM_OBL_RC_ACT = 5").severity is Severity.OK
+    wrong = bench().consult(signing=Signing(Key(b"x" * 32)), now=1_700_000_003_000_000)
+    (said,) = blocking(wrong)
+    assert "frames arrive, and none counts: signed with another key" in said
+
+
+@pytest.mark.parametrize(("baud", "severity"), [(38_400, Severity.WARNING), (57_600, Severity.OK)])
+def test_the_room_on_a_serial_port(baud: int, severity: Severity) -> None:
+    bench = Bench(autopilot("px4"))
+    bench.run(3.0)
+    assert found(bench.consult(baud=baud), "of the port) are taken").severity is severity
 
 
 def test_one_that_falls_silent() -> None:

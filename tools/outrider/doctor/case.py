@@ -17,12 +17,13 @@ _BYTEWISE = 0x10
 
 class Case(NamedTuple):
     """One vehicle on one link. ``log``: it is a recording, so nobody could ask for what is not in it;
-    ``me``: as whom the doctor speaks, None if it does not."""
+    ``me``: as whom the doctor speaks, None if it does not; ``baud`` of a serial port."""
 
     hearing: Hearing
     vehicle: Speaker
     log: bool
     me: Source | None
+    baud: int | None = None
 
     @property
     def profile(self) -> Profile | None:

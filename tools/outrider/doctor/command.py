@@ -13,9 +13,10 @@ from rich.markup import escape
 from mavlink_bridge.clock import Clock, WallClock
 from mavlink_bridge.errors import EndpointError, LinkError, LogError
 from mavlink_bridge.framing import Frame, frame_at
-from mavlink_bridge.links.endpoints import Endpoint, Replay, parse_endpoint
+from mavlink_bridge.links.endpoints import Endpoint, Replay, Serial, parse_endpoint
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.signing import Signing
 from mavlink_bridge.tlog import TlogReader
 from outrider.console import share_progress
 from outrider.doctor.consultation import Consultation
@@ -23,6 +24,7 @@ from outrider.doctor.examination import Examination
 from outrider.doctor.finding import Verdict
 from outrider.doctor.page import document, show
 from outrider.errors import InputError
+from outrider.key_files import key_of
 from outrider.replaying.timeline import on_one_line
 
 READY, NOT_READY = 0, 1
@@ -32,12 +34,17 @@ _OFTEN: Final = 4096
 """Records from one look at the progress to the next."""
 
 
-def doctor(endpoint: str, system: int | None, seconds: float, as_json: bool) -> int:
-    """Examine what is at ``endpoint``, for ``seconds`` at most; the exit status. InputError for an endpoint
-    that is none, or cannot be opened."""
+def doctor(endpoint: str, system: int | None, seconds: float, key: Path | None, as_json: bool) -> int:
+    """Examine what is at ``endpoint``, for ``seconds`` at most, with the key in a file if there is one; the
+    exit status. InputError for an endpoint that is none or cannot be opened, and for a key that is none."""
     try:
         place = parse_endpoint(endpoint)
-        verdict = of_log(place, system) if isinstance(place, Replay) else _of_link(place, system, seconds)
+        if isinstance(place, Replay):
+            if key is not None:
+                raise InputError(f"doctor {endpoint}: --key is for live links; a log is not asked anything")
+            verdict = of_log(place, system)
+        else:
+            verdict = _of_link(place, system, seconds, key)
     except (EndpointError, LinkError, LogError) as error:
         raise InputError(f"doctor {error}") from None
     if as_json:
@@ -69,10 +76,13 @@ def of_log(place: Replay, system: int | None) -> Verdict:
     return examination.verdict()
 
 
-def _of_link(place: Endpoint, system: int | None, seconds: float) -> Verdict:
+def _of_link(place: Endpoint, system: int | None, seconds: float, key: Path | None) -> Verdict:
     clock = WallClock()
+    signing = None if key is None else Signing(key_of(key))
+    consultation = Consultation(round(seconds * 1e6), system, signing)
+    consultation.examination.baud = place.baud if isinstance(place, Serial) else None
     with closing(open_link(place, clock)) as link:
-        return consult(link, clock, Consultation(round(seconds * 1e6), system), seconds)
+        return consult(link, clock, consultation, seconds)
 
 
 def consult(link: Link, clock: Clock, consultation: Consultation, seconds: float) -> Verdict:

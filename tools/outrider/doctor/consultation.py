@@ -7,6 +7,7 @@ from typing import Final
 
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.framing import Framer
+from mavlink_bridge.signing import Signing
 from outrider.doctor.examination import Examination
 from outrider.doctor.questions import Questions
 
@@ -15,12 +16,14 @@ _LONG_ENOUGH: Final = 5_000_000
 
 
 class Consultation:
-    """Of the autopilot ``system`` (None: the one that says most), for ``limit`` µs at most."""
+    """Of the autopilot ``system`` (None: the one that says most), for ``limit`` µs at most. With ``signing``
+    it asks signed, counts only what is, and has to be told Unix time."""
 
-    def __init__(self, limit: int, system: int | None = None) -> None:
+    def __init__(self, limit: int, system: int | None = None, signing: Signing | None = None) -> None:
         self.examination = Examination(system)
         self._questions = Questions(self.examination)
-        self._framer, self._codec = Framer(), Codec()
+        self._signing = signing or Signing()
+        self._framer, self._codec = Framer(), Codec(signing=self._signing)
         self._limit = limit
         self._start: int | None = None
 
@@ -29,9 +32,15 @@ class Consultation:
         self._start = now if self._start is None else self._start
         hearing = self.examination.hearing
         hearing.wait(now)
+        self._signing.present(now)
         for data in arrived:
             for frame in self._framer.feed(data):
-                hearing.hear(now, frame)
+                refusal = self._signing.check(frame)
+                if refusal is None:
+                    hearing.hear(now, frame)
+                else:
+                    hearing.refused += 1
+                    hearing.refusal = refusal.value
         hearing.bad, hearing.skipped_bytes = self._framer.bad, self._framer.skipped_bytes
         return [self._codec.encode(message) for message in self._questions.due(now)]
 
@@ -44,6 +53,6 @@ class Consultation:
 
     def doing(self) -> str:
         """What it waits for, in a few words."""
-        if not self.examination.hearing.frames:
+        if not self.examination.hearing.frames and not self.examination.hearing.refused:
             return "waiting for MAVLink"
         return "waiting for an autopilot" if self.examination.vehicle is None else "listening and asking"

@@ -39,6 +39,8 @@ class Examination:
     def __init__(self, system: int | None = None, *, log: bool = False, me: Source | None = None) -> None:
         self.hearing = Hearing()
         self.system, self.log, self.me = system, log, me
+        self.baud: int | None = None
+        """Of the serial port that it is behind."""
         self.asked: dict[int, int] = {}
         """How often the doctor asked for a message, by its id."""
 
@@ -53,6 +55,6 @@ class Examination:
         if vehicle is None:
             return Verdict((presence.nobody(self.hearing, self.system, self.log),))
         vehicle.vehicle.tick(self.hearing.end)
-        case = Case(self.hearing, vehicle, self.log, self.me)
+        case = Case(self.hearing, vehicle, self.log, self.me, self.baud)
         found = chain(*(check(case) for check in _CHECKS), streams(case, self.asked))
         return Verdict(tuple(sorted(found, key=lambda finding: _WORST_FIRST.index(finding.severity))))

@@ -16,20 +16,23 @@ SETPOINTS: Final = frozenset((82, 84, 86))
 
 
 class Hearing:
-    """Fed with frames. ``begin``, ``end``: of all that was heard or waited for (µs); ``bad``,
-    ``skipped_bytes``: frames whose checksum failed, and bytes that belong to no frame; ``unheard``: frames of
-    those beyond the number of whom note is taken."""
+    """Fed with frames. ``begin``, ``end``: of all that was heard or waited for (µs); ``octets`` of frames;
+    ``bad``, ``skipped_bytes``: frames whose checksum failed, and bytes that belong to no frame; ``unheard``:
+    frames of those beyond the number of whom note is taken; ``refused``: frames that do not count for who has
+    the key, and ``refusal`` why the last did not."""
 
     def __init__(self) -> None:
         self.speakers: dict[Source, Speaker] = {}
         self.begin: int | None = None
         self.end = 0
-        self.frames = self.bad = self.skipped_bytes = self.unheard = 0
+        self.frames = self.octets = self.bad = self.skipped_bytes = self.unheard = self.refused = 0
+        self.refusal = ""
 
     def hear(self, now: int, frame: Frame) -> None:
         """``frame`` arrived at ``now`` (µs); a time that goes back counts as the one before."""
         now = self.wait(now)
         self.frames += 1
+        self.octets += len(frame.data)
         source = Source(frame.system, frame.component)
         speaker = self.speakers.get(source)
         if speaker is None:

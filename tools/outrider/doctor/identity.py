@@ -108,7 +108,8 @@ def dialect(case: Case) -> Iterator[Finding]:
             f"{vehicle.signed / max(vehicle.frames, 1):.0%} of its messages are signed",
             Severity.NOTE,
             "It obeys only those who sign with its key.",
-            "Give the companion the same key file (docs/signing.md).",
+            "Give the companion its key file (docs/signing.md), and the doctor too (--key): unsigned it "
+            "hears no answers.",
         )
 
 

@@ -16,12 +16,23 @@ COMPANION: Final = 195
 """The component that ``fly`` speaks as."""
 _MANY_BAD: Final = 0.01
 _SEVERAL: Final = 3
+_LONG_ENOUGH: Final = 2.0
+_WANTED: Final = 2500.0
+"""Bytes/s: LOCAL_POSITION_NED (40) at 50 Hz, ATTITUDE (40) at 10 Hz, and little else."""
 
 
 def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
     """Why there is no vehicle to examine."""
     severity = Severity.BLOCKING
     if not hearing.frames:
+        if hearing.refused:
+            return Finding(
+                f"{hearing.refused} frames arrive, and none counts: {hearing.refusal}",
+                severity,
+                "Who has a key believes only what is signed with it, and is new.",
+                "Give the vehicle the same key (docs/signing.md), or leave --key out; see that the "
+                "clocks are right.",
+            )
         if hearing.skipped_bytes:
             return Finding(
                 f"{hearing.skipped_bytes} bytes arrive, and no MAVLink among them",
@@ -88,7 +99,15 @@ def company(case: Case) -> Iterator[Finding]:
             "Somebody floods the link, or makes senders up.",
             "Find out who can send there; sign the link (docs/signing.md).",
         )
+    if case.hearing.refused:
+        yield Finding(
+            f"{case.hearing.refused} frames do not count: {case.hearing.refusal}",
+            Severity.WARNING,
+            "Somebody on the link has not the key, or says again what was said before.",
+            "Give the key to all who belong here; find out who else can send.",
+        )
     yield from _damage(case.hearing)
+    yield from _load(case)
 
 
 def _about(case: Case, speaker: Speaker) -> Iterator[Finding]:
@@ -176,6 +195,27 @@ def _damage(hearing: Hearing) -> Iterator[Finding]:
             "What is lost is not sent again: a plan, a position, an order may be among it.",
             "Check cable, baud rate and the radio's distance; use flow control where there is some.",
         )
+
+
+def _load(case: Case) -> Iterator[Finding]:
+    """How much of a serial port is taken, at ten bits a byte."""
+    hearing = case.hearing
+    if not case.baud or hearing.seconds < _LONG_ENOUGH:
+        return
+    rate = hearing.octets / hearing.seconds
+    share = 10.0 * rate / case.baud
+    room = case.baud / 10.0 - rate
+    what = f"{rate / 1e3:.1f} kB/s of {case.baud / 1e4:.1f} ({share:.0%} of the port) are taken"
+    if room < _WANTED:
+        yield Finding(
+            what,
+            Severity.WARNING,
+            f"Position and attitude as fly asks for them take {_WANTED / 1e3:.1f} kB/s more: messages "
+            "will be late.",
+            "Set 921600 baud (SERIALn_BAUD, SER_TEL1_BAUD), or have less streamed there (SRn_…, MAV_n_MODE).",
+        )
+    else:
+        yield Finding(what, Severity.OK, "There is room for what fly asks for.")
 
 
 def _listed(numbers: list[int]) -> str:
