@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Final
+
+_BRIEF: Final = 1.0
+"""s that are not worth a word."""
+
 
 class Condition:
     """``holds``: whether it is so, None if nobody said; ``lost``: how often it was so and then was not."""
@@ -17,6 +22,14 @@ class Condition:
             self._missing += max(now - self._since, 0)
         self.lost += self.holds is True and not holds
         self.holds, self._since = holds, now
+
+    @property
+    def history(self) -> str:
+        """A sentence on what was not so before; empty if all was well."""
+        if self.missing < _BRIEF:
+            return ""
+        times = f", and it was lost {self.lost} times" if self.lost > 1 else ", and it was lost once"
+        return f" For {self.missing:.0f} s it was not so{times if self.lost else ', to begin with'}."
 
     @property
     def missing(self) -> float:

@@ -7,7 +7,7 @@ from itertools import chain
 from typing import Final
 
 from mavlink_bridge.messages import Source
-from outrider.doctor import clocks, health, identity, place, presence, settings
+from outrider.doctor import clocks, health, identity, place, positioning, presence, settings, wire
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity, Verdict
 from outrider.doctor.hearing import Hearing
@@ -19,8 +19,8 @@ _CHECKS: Final[tuple[Callable[[Case], Iterator[Finding]], ...]] = (
     identity.dialect,
     identity.state,
     health.checks,
-    health.estimator,
-    health.gps,
+    positioning.estimator,
+    positioning.gps,
     health.battery,
     place.origin,
     place.home,
@@ -28,6 +28,7 @@ _CHECKS: Final[tuple[Callable[[Case], Iterator[Finding]], ...]] = (
     clocks.clock,
     settings.settings,
     presence.company,
+    wire.wire,
 )
 _WORST_FIRST: Final = (Severity.BLOCKING, Severity.WARNING, Severity.NOTE, Severity.OK)
 

@@ -14,11 +14,6 @@ from outrider.logs.words import enumerated
 
 COMPANION: Final = 195
 """The component that ``fly`` speaks as."""
-_MANY_BAD: Final = 0.01
-_SEVERAL: Final = 3
-_LONG_ENOUGH: Final = 2.0
-_WANTED: Final = 2500.0
-"""Bytes/s: LOCAL_POSITION_NED (40) at 50 Hz, ATTITUDE (40) at 10 Hz, and little else."""
 
 
 def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
@@ -55,7 +50,7 @@ def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
     present = sorted({one.source.system for one in hearing.autopilots})
     if system is not None and present:
         return Finding(
-            f"system {system} is not there; here are {_listed(present)}",
+            f"system {system} is not there; here are {listed(present)}",
             severity,
             "Commands to a system id that nobody has are obeyed by nobody.",
             f"Say --system {present[0]}, or set the vehicle's id to {system} (SYSID_THISMAV; MAV_SYS_ID "
@@ -73,13 +68,12 @@ def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
 
 
 def company(case: Case) -> Iterator[Finding]:
-    """Others on the link, and what is odd about how the vehicle is heard."""
-    yield from _namesakes(case)
+    """Others on the link."""
     others = [one for one in case.hearing.autopilots if one is not case.vehicle]
     systems = sorted({one.source.system for one in others} - {case.vehicle.source.system})
     if systems:
         yield Finding(
-            f"{len(systems)} more vehicles on this link: systems {_listed(systems)}"
+            f"{len(systems)} more vehicles on this link: systems {listed(systems)}"
             if len(systems) > 1
             else f"another vehicle on this link: system {systems[0]}",
             Severity.NOTE if case.log else Severity.WARNING,
@@ -99,15 +93,6 @@ def company(case: Case) -> Iterator[Finding]:
             "Somebody floods the link, or makes senders up.",
             "Find out who can send there; sign the link (docs/signing.md).",
         )
-    if case.hearing.refused:
-        yield Finding(
-            f"{case.hearing.refused} frames do not count: {case.hearing.refusal}",
-            Severity.WARNING,
-            "Somebody on the link has not the key, or says again what was said before.",
-            "Give the key to all who belong here; find out who else can send.",
-        )
-    yield from _damage(case.hearing)
-    yield from _load(case)
 
 
 def _about(case: Case, speaker: Speaker) -> Iterator[Finding]:
@@ -144,79 +129,6 @@ def _about(case: Case, speaker: Speaker) -> Iterator[Finding]:
         )
 
 
-def _namesakes(case: Case) -> Iterator[Finding]:
-    vehicle = case.vehicle
-    number = vehicle.source.system
-    if vehicle.clock.doubled or len(vehicle.identities) > 1:
-        yield Finding(
-            f"two vehicles with the same system id {number}",
-            Severity.BLOCKING,
-            "Their positions are mixed, and both obey what is meant for one.",
-            "Give each an id of its own: SYSID_THISMAV (ArduPilot), MAV_SYS_ID (PX4), then restart it.",
-        )
-    twins = [one for one in case.hearing.autopilots if one is not vehicle and one.source.system == number]
-    if twins:
-        components = _listed(sorted(one.source.component for one in [vehicle, *twins]))
-        yield Finding(
-            f"{len(twins) + 1} autopilots in system {number}: components {components}",
-            Severity.WARNING,
-            f"Only component {vehicle.source.component} was looked at; orders to the whole system reach all.",
-            "An escort talks to component 1 only. See which of them flies the vehicle.",
-        )
-    if number == 0:
-        yield Finding(
-            "the vehicle's system id is 0",
-            Severity.BLOCKING,
-            "That means everybody: nothing can be addressed to it.",
-            "Set SYSID_THISMAV (ArduPilot) or MAV_SYS_ID (PX4) to 1…250.",
-        )
-    if number == 255:
-        yield Finding(
-            "the vehicle's system id is 255",
-            Severity.WARNING,
-            "That is what ground stations take: each may think that the other is itself.",
-            "Set SYSID_THISMAV (ArduPilot) or MAV_SYS_ID (PX4) to 1…250.",
-        )
-    if vehicle.repeated >= max(_SEVERAL, _MANY_BAD * vehicle.frames):
-        yield Finding(
-            f"{vehicle.repeated} frames came twice",
-            Severity.NOTE if case.log else Severity.WARNING,
-            "There are two ways to here, or a loop. Copies are left out here, but take room on a radio.",
-            "Look for an endpoint that stands twice in the router's configuration.",
-        )
-
-
-def _damage(hearing: Hearing) -> Iterator[Finding]:
-    share = hearing.bad / max(hearing.bad + hearing.frames, 1)
-    if share > _MANY_BAD and hearing.bad >= _SEVERAL:
-        yield Finding(
-            f"{share:.0%} of the frames are damaged ({hearing.bad})",
-            Severity.WARNING,
-            "What is lost is not sent again: a plan, a position, an order may be among it.",
-            "Check cable, baud rate and the radio's distance; use flow control where there is some.",
-        )
-
-
-def _load(case: Case) -> Iterator[Finding]:
-    """How much of a serial port is taken, at ten bits a byte."""
-    hearing = case.hearing
-    if not case.baud or hearing.seconds < _LONG_ENOUGH:
-        return
-    rate = hearing.octets / hearing.seconds
-    share = 10.0 * rate / case.baud
-    room = case.baud / 10.0 - rate
-    what = f"{rate / 1e3:.1f} kB/s of {case.baud / 1e4:.1f} ({share:.0%} of the port) are taken"
-    if room < _WANTED:
-        yield Finding(
-            what,
-            Severity.WARNING,
-            f"Position and attitude as fly asks for them take {_WANTED / 1e3:.1f} kB/s more: messages "
-            "will be late.",
-            "Set 921600 baud (SERIALn_BAUD, SER_TEL1_BAUD), or have less streamed there (SRn_…, MAV_n_MODE).",
-        )
-    else:
-        yield Finding(what, Severity.OK, "There is room for what fly asks for.")
-
-
-def _listed(numbers: list[int]) -> str:
+def listed(numbers: list[int]) -> str:
+    """With commas; not all of very many."""
     return ", ".join(map(str, numbers[:12])) + (" …" if len(numbers) > 12 else "")
