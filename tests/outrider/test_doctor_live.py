@@ -192,6 +192,14 @@ def test_two_vehicles_on_one_link() -> None:
         assert verdict.ready
 
 
+def test_of_several_it_is_the_lowest_and_all_of_it() -> None:
+    bench = Bench(autopilot("px4", 13), autopilot("ardupilot", 12), boots=(0, 2_000_000))
+    bench.run(1.0)
+    verdict = bench.consult()
+    assert found(verdict, "ArduPilot ").what.endswith("system 12")
+    assert all(found(verdict, f"{name} = ") for name in names(px4=False) if name != "BATT_LOW_VOLT")
+
+
 @pytest.mark.parametrize("later", [60_000, 8_000_000])
 def test_two_vehicles_with_one_id(later: int) -> None:
     # With sensors' noise: two without it say the same, byte for byte.

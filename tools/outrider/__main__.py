@@ -154,7 +154,7 @@ def doctor(
     ],
     system: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(min=1, max=255, help="System id of the vehicle; if not said, who says most."),
+        typer.Option(min=1, max=255, help="System id of the vehicle; if not said, the lowest."),
     ] = None,
     seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Wait so long at most.")] = 15.0,
     key: Annotated[Optional[Path], typer.Option(help="Key file of a link that is signed.")] = None,  # noqa: UP045

@@ -16,7 +16,7 @@ _LONG_ENOUGH: Final = 5_000_000
 
 
 class Consultation:
-    """Of the autopilot ``system`` (None: the one that says most), for ``limit`` µs at most. With ``signing``
+    """Of the autopilot ``system`` (None: the lowest), for ``limit`` µs at most. With ``signing``
     it asks signed, counts only what is, and has to be told Unix time."""
 
     def __init__(self, limit: int, system: int | None = None, signing: Signing | None = None) -> None:

@@ -34,8 +34,8 @@ _WORST_FIRST: Final = (Severity.BLOCKING, Severity.WARNING, Severity.NOTE, Sever
 
 
 class Examination:
-    """Of the autopilot ``system`` (None: the one that says most). ``log``: of a recording; ``me``: as whom
-    the doctor speaks."""
+    """Of the autopilot ``system`` (None: the lowest, in a log the one that says most). ``log``: it is a
+    recording; ``me``: as whom the doctor speaks."""
 
     def __init__(self, system: int | None = None, *, log: bool = False, me: Source | None = None) -> None:
         self.hearing = Hearing()
@@ -48,7 +48,7 @@ class Examination:
     @property
     def vehicle(self) -> Speaker | None:
         """Who is examined, as far as it has shown itself."""
-        return self.hearing.vehicle(self.system)
+        return self.hearing.vehicle(self.system, lowest=not self.log)
 
     def verdict(self) -> Verdict:
         """By what was heard until now."""

@@ -61,11 +61,16 @@ class Hearing:
             self.speakers[source] for source in sorted(self.speakers) if self.speakers[source].is_autopilot
         ]
 
-    def vehicle(self, system: int | None = None) -> Speaker | None:
-        """The autopilot of ``system``, or the one that says most."""
+    def vehicle(self, system: int | None = None, *, lowest: bool = False) -> Speaker | None:
+        """The autopilot of ``system``, or the one that says most; ``lowest``: rather that with the lowest id,
+        which does not change as they speak."""
         found = [one for one in self.autopilots if system is None or one.source.system == system]
         return max(
             found,
-            key=lambda one: (one.source.system > 0, one.source.component == 1, one.frames),
+            key=lambda one: (
+                one.source.system > 0,
+                one.source.component == 1,
+                -one.source.system if lowest else one.frames,
+            ),
             default=None,
         )

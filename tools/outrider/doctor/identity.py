@@ -17,7 +17,7 @@ _ROTORCRAFT: Final = {2, 3, 4, 13, 14, 15, 29, 35, 43}
 """MAV_TYPE of what can hover: quadrotor, coaxial, helicopter, hexa-, octo-, tri-, dodeca-, decarotor, generic
 multirotor."""
 _TRIED: Final = {ARDUPILOT_NUMBER: (4, 6), PX4_NUMBER: (1, 16)}
-_TAKES_SETPOINTS, _SPEAKS_V2 = 0x80, 0x2000
+_TAKES_SETPOINTS: Final = 0x80
 """MAV_PROTOCOL_CAPABILITY."""
 _SILENT: Final = 5.0
 _STARTING: Final = (1, 2)
@@ -88,8 +88,7 @@ def _version(case: Case, kind: str) -> Iterator[Finding]:
             "it says that it takes no SET_POSITION_TARGET_LOCAL_NED",
             Severity.BLOCKING,
             "An escort steers by nothing else.",
-            "Use a build with it (ArduPilot: AP_MAVLINK set-points and mode GUIDED; PX4: mavlink with "
-            "offboard).",
+            "Use a build that takes it: ArduCopter with GUIDED, PX4 with OFFBOARD.",
         )
 
 

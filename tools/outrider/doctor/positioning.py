@@ -27,7 +27,7 @@ def estimator(case: Case) -> Iterator[Finding]:
             f"the estimator's state is not told ({name})",
             Severity.NOTE,
             "Whether it has an absolute position shows only in the pre-arm check.",
-            "Nobody asked for it in this log." if case.log else f"Ask for {name} if you want to watch it.",
+            "Nobody asked for it in this log." if case.log else "It was asked for and did not come.",
         )
         return
     if told.flags & ABSOLUTE_POSITION and not told.flags & _UNINITIALISED:
@@ -62,7 +62,7 @@ def gps(case: Case) -> Iterator[Finding]:
             "GPS is not told (GPS_RAW_INT)",
             Severity.NOTE,
             "How good positions are is not known.",
-            "" if case.log else "Ask for it, if you want to know how far apart vehicles must stay.",
+            "" if case.log else "It was asked for and did not come.",
         )
         return
     satellites = "" if told.satellites is None else f", {told.satellites} satellites"

@@ -33,19 +33,16 @@ def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
                 f"{hearing.skipped_bytes} bytes arrive, and no MAVLink among them",
                 severity,
                 "Nothing can be read.",
-                "Set the baud rate of the endpoint to the one of the autopilot's port (SERIALn_BAUD, "
-                "SER_TEL1_BAUD), and the "
-                "port's protocol to MAVLink 2 (SERIALn_PROTOCOL = 2, MAV_n_CONFIG).",
+                "Set the baud rate of the endpoint to that of the autopilot's port (SERIALn_BAUD, "
+                "SER_TEL1_BAUD), and the port's protocol to MAVLink 2 (SERIALn_PROTOCOL = 2, MAV_n_CONFIG).",
             )
         return Finding(
             f"nothing arrives in {hearing.seconds:.0f} s",
             severity,
             "There is nobody to talk to.",
-            "See that the autopilot runs and that the endpoint is the one that it speaks to: "
-            "udpin:127.0.0.1:14540 for PX4's "
-            "offboard link, tcp:127.0.0.1:5760 for ArduPilot's SITL, /dev/DEVICE,BAUD for a serial port; "
-            "that nobody else has "
-            "it open; and that TX and RX are crossed.",
+            "See that the autopilot runs, and that this is where it speaks: udpin:127.0.0.1:14540 for "
+            "PX4's offboard link, tcp:127.0.0.1:5760 for ArduPilot's SITL, /dev/DEVICE,BAUD for a serial "
+            "port; that nobody else has it open; and that TX and RX are crossed.",
         )
     present = sorted({one.source.system for one in hearing.autopilots})
     if system is not None and present:
@@ -78,8 +75,7 @@ def company(case: Case) -> Iterator[Finding]:
             else f"another vehicle on this link: system {systems[0]}",
             Severity.NOTE if case.log else Severity.WARNING,
             f"All of this is about system {case.vehicle.source.system}. A companion commands one vehicle "
-            "by its id; on a link of "
-            "several a wrong id commands another.",
+            "by its id; on a link of several a wrong id commands another.",
             "Give each companion a link of its own, or be sure of its system id (--system ID examines "
             "another).",
         )

@@ -48,6 +48,7 @@ class Questions:
         self._examination = examination
         self._asked: dict[int | str, _Asked] = {}
         self._met: int | None = None
+        self._whom: Source | None = None
         self._beat: int | None = None
         self.me = STRANGER
 
@@ -55,7 +56,11 @@ class Questions:
         """What to say at ``now`` (µs)."""
         vehicle = self._examination.vehicle
         if vehicle is not None:
-            self._met = now if self._met is None else self._met
+            if vehicle.source != self._whom:
+                # One with a lower id has spoken up: begin anew.
+                self._whom, self._met = vehicle.source, now
+                self._asked.clear()
+                self._examination.asked.clear()
             self.me = self._examination.me = Source(vehicle.source.system, COMPONENT)
         said: list[Message] = []
         if self._beat is None or now - self._beat >= _HEARTBEAT_EVERY:
