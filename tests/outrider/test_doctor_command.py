@@ -64,6 +64,8 @@ def test_it_does_not_wait_for_ever() -> None:
         (("tlog:nothing.tlog",), "nothing.tlog: no such file; allowed: a .tlog, or a .tlog.gz"),
         (("tlog:.",), ".: is no file; allowed: a .tlog, or a .tlog.gz"),
         (("/dev/nothing,57600",), "/dev/nothing"),
+        (("tlog:nothing.tlog", "--key", "fleet.key"), "--key is for live links"),
+        (("udpin:127.0.0.1:14999", "--key", "fleet.key"), "fleet.key"),
         (("udpin:127.0.0.1:14999", "--system", "256"), "--system"),
         (("udpin:127.0.0.1:14999", "--seconds", "0"), "--seconds"),
     ],

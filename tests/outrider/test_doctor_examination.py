@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
+from random import Random
 from struct import pack
 from typing import Any
 
@@ -32,6 +34,7 @@ from mavlink_bridge.messages import (
     SysStatus,
 )
 from mavlink_bridge.param_value import number_of
+from mavlink_bridge.tlog import TlogReader
 from outrider.doctor.boot_clock import BootClock
 from outrider.doctor.consultation import Consultation
 from outrider.doctor.examination import Examination
@@ -40,6 +43,7 @@ from outrider.doctor.hearing import MOST
 from outrider.doctor.page import document, show
 from outrider.doctor.questions import COMPONENT
 
+PIECES = sorted((Path(__file__).parents[1] / "data" / "doctor").glob("*.tlog.gz"))
 ME = Source(1, 1)
 BEATS = [Heartbeat(ME, 2, autopilot, 0x81, 4, 4) for autopilot in (3, 12, 0, 8)]
 SYSTEMS = st.sampled_from([0, 1, 1, 1, 2, 255])
@@ -269,3 +273,23 @@ def test_nothing_but_bytes() -> None:
         now += TICK
     (what,) = blocking(consultation.examination.verdict())
     assert "bytes arrive, and no MAVLink among them" in what
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.sampled_from(PIECES), st.integers(0, 2**32), st.booleans())
+def test_whatever_happens_to_a_recorded_log(piece: Path, seed: int, log: bool) -> None:
+    chance = Random(seed)
+    records = list(TlogReader(piece))
+    first = chance.randrange(len(records))
+    examination = Examination(log=log)
+    for time, _, data in records[first : first + 500]:
+        (frame,) = leading_frames(data)[0]
+        if chance.random() < 0.3:
+            payload = bytearray(frame.payload.ljust(30, b"\0"))
+            payload[chance.randrange(len(payload))] = chance.choice((0, 127, 128, 255))
+            number = chance.choice((frame.message_id, 0, 1, 22, 24, 32, 33, 49, 148, 193, 230, 242))
+            source = chance.choice((0, 3, frame.system)), frame.component
+            data = frame_v2(number, CRC_EXTRA[number], source, frame.sequence, bytes(payload))
+            (frame,) = leading_frames(data)[0]
+        examination.hearing.hear(time + chance.choice((0, 0, 0, -10_000_000, 100_000_000)), frame)
+    sound(examination.verdict())
