@@ -153,6 +153,26 @@ def sitl(
 
 
 @app.command()
+def doctor(
+    endpoint: Annotated[
+        str, typer.Argument(help="udpin:HOST:PORT, tcp:HOST:PORT, /dev/DEVICE,BAUD, …, or tlog:PATH.")
+    ],
+    system: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(min=1, max=255, help="System id of the vehicle; if not said, the lowest."),
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Wait so long at most.")] = 15.0,
+    key: Annotated[Optional[Path], typer.Option(help="Key file of a link that is signed.")] = None,  # noqa: UP045
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Say what is at an endpoint or in a log, what an escort misses there, and what to do about it. It asks,
+    and changes nothing. Ends with 1 if something is in the way of an escort."""
+    from outrider.doctor.command import doctor as examining
+
+    raise typer.Exit(examining(endpoint, system, seconds, key, as_json))
+
+
+@app.command()
 def sweep(
     name: Annotated[str, typer.Argument(help="A file, or the name of a shipped sweep.")],
     runs: Annotated[Optional[int], typer.Option(min=1, max=1_000_000, help="Seeds per cell.")] = None,  # noqa: UP045

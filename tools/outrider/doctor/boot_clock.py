@@ -1,0 +1,62 @@
+"""A vehicle's own clock (time_boot) against the one of whoever listens."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from mavlink_bridge.messages import Message
+
+_RESTART: Final = 1_000_000
+_LEAP: Final = 5_000_000
+_FASTEST: Final = 100
+"""Times: simulations are rarely sped up by more."""
+
+
+class BootClock:
+    """Fed with pairs of times. ``restarts``: it went back by more than a second; ``backward``: it went back
+    at all, or said something else of the same instant, of ``stamps``; ``leaps``: it went ahead by far more
+    than the time that passed."""
+
+    def __init__(self) -> None:
+        self.restarts = self.backward = self.leaps = self.stamps = 0
+        self._before: dict[type, tuple[int, int, Message]] = {}
+        self._start: tuple[int, int] | None = None
+        self._end = (0, 0)
+
+    def tell(self, now: int, message: Message, boot: int) -> None:
+        """``message``, which came at ``now``, says ``boot`` (both µs)."""
+        kind = type(message)
+        self.stamps += 1
+        before = self._before.get(kind)
+        if before is not None:
+            passed, gone = now - before[0], boot - before[1]
+            restarted, leapt = gone < -_RESTART, gone > _LEAP + _FASTEST * passed
+            self.backward += gone < 0 or (gone == 0 and message != before[2])
+            self.restarts += restarted
+            self.leaps += leapt
+            if restarted or leapt:
+                # What other messages said before is of the old count: the same step would count again.
+                self._start = None
+                self._before.clear()
+        self._before[kind] = now, boot, message
+        self._start = self._start or (now, boot)
+        self._end = now, boot
+
+    @property
+    def seconds(self) -> float:
+        """For how long (s of the listener) it has run without a step."""
+        return 0.0 if self._start is None else (self._end[0] - self._start[0]) * 1e-6
+
+    @property
+    def rate(self) -> float | None:
+        """Its seconds per second of the listener's, since its last step; None if that is too short to
+        say."""
+        if self._start is None or self.seconds < 1.0:
+            return None
+        rate = (self._end[1] - self._start[1]) * 1e-6 / self.seconds
+        return rate if rate > 0.0 else None
+
+    @property
+    def doubled(self) -> bool:
+        """Whether two clocks are in it: it goes back and ahead again and again."""
+        return self.backward >= 5 and self.backward >= 0.02 * self.stamps

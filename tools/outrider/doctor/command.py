@@ -1,0 +1,98 @@
+"""``outrider doctor``: on a live link, or of a log."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import Final
+
+from rich.markup import escape
+
+from mavlink_bridge.clock import Clock, WallClock
+from mavlink_bridge.errors import EndpointError, LinkError, LogError
+from mavlink_bridge.framing import Frame, frame_at
+from mavlink_bridge.links.endpoints import Endpoint, Replay, Serial, parse_endpoint
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.signing import Signing
+from mavlink_bridge.tlog import TlogReader
+from outrider.console import share_progress
+from outrider.doctor.consultation import Consultation
+from outrider.doctor.examination import Examination
+from outrider.doctor.finding import Verdict
+from outrider.doctor.page import document, show
+from outrider.errors import InputError
+from outrider.key_files import key_of
+from outrider.replaying.timeline import on_one_line
+
+READY, NOT_READY = 0, 1
+_STEP: Final = 20_000
+"""µs between two looks at the link."""
+_OFTEN: Final = 4096
+"""Records from one look at the progress to the next."""
+
+
+def doctor(endpoint: str, system: int | None, seconds: float, key: Path | None, as_json: bool) -> int:
+    """Examine what is at ``endpoint``, for ``seconds`` at most, with the key in a file if there is one; the
+    exit status. InputError for an endpoint that is none or cannot be opened, and for a key that is none."""
+    try:
+        place = parse_endpoint(endpoint)
+        if isinstance(place, Replay):
+            if key is not None:
+                raise InputError(f"doctor {endpoint}: --key is for live links; a log is not asked anything")
+            verdict = of_log(place, system)
+        else:
+            verdict = _of_link(place, system, seconds, key)
+    except (EndpointError, LinkError, LogError) as error:
+        raise InputError(f"doctor {error}") from None
+    if as_json:
+        sys.stdout.write(json.dumps(document(verdict)) + "\n")
+    else:
+        show(endpoint, verdict)
+    return READY if verdict.ready else NOT_READY
+
+
+def of_log(place: Replay, system: int | None) -> Verdict:
+    """Of a whole log, read at once. LogError if it cannot be read."""
+    path = Path(place.path)
+    if not path.is_file():
+        raise LogError(
+            f"{path}: {'is no file' if path.exists() else 'no such file'}; allowed: a .tlog, or a .tlog.gz"
+        )
+    reader, examination = TlogReader(path), Examination(system, log=True)
+    hearing, size = examination.hearing, max(path.stat().st_size, 1)
+    with share_progress() as watch:
+        for number, (time, _, data) in enumerate(on_one_line(reader)):
+            frame = frame_at(data, 0)
+            if isinstance(frame, Frame):
+                hearing.hear(time, frame)
+            if number % _OFTEN == 0:
+                watch(escape(path.name), reader.bytes_read / size)
+    hearing.bad, hearing.skipped_bytes = reader.report.bad, reader.report.skipped_bytes
+    if not hearing.frames:
+        raise LogError(f"{path}: holds no MAVLink frame; allowed: a .tlog, or a .tlog.gz")
+    return examination.verdict()
+
+
+def _of_link(place: Endpoint, system: int | None, seconds: float, key: Path | None) -> Verdict:
+    clock = WallClock()
+    signing = None if key is None else Signing(key_of(key))
+    consultation = Consultation(round(seconds * 1e6), system, signing)
+    consultation.examination.baud = place.baud if isinstance(place, Serial) else None
+    with closing(open_link(place, clock)) as link:
+        return consult(link, clock, consultation, seconds)
+
+
+def consult(link: Link, clock: Clock, consultation: Consultation, seconds: float) -> Verdict:
+    """Over ``link``, by ``clock``, until it is over: after ``seconds`` at most."""
+    start = now = clock.now()
+    with share_progress() as watch:
+        while not consultation.over(now):
+            for data in consultation.step(now, link.receive()):
+                link.send(data)
+            watch(consultation.doing(), (now - start) * 1e-6 / seconds)
+            clock.wait_until(now + _STEP)
+            now = clock.now()
+    return consultation.examination.verdict()

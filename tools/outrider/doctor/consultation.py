@@ -1,0 +1,58 @@
+"""An examination on a live link, without I/O: bytes in, bytes out, and when it is over."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.framing import Framer
+from mavlink_bridge.signing import Signing
+from outrider.doctor.examination import Examination
+from outrider.doctor.questions import Questions
+
+_LONG_ENOUGH: Final = 5_000_000
+"""µs of listening that show rates and a clock."""
+
+
+class Consultation:
+    """Of the autopilot ``system`` (None: the lowest), for ``limit`` µs at most. With ``signing``
+    it asks signed, counts only what is, and has to be told Unix time."""
+
+    def __init__(self, limit: int, system: int | None = None, signing: Signing | None = None) -> None:
+        self.examination = Examination(system)
+        self._questions = Questions(self.examination)
+        self._signing = signing or Signing()
+        self._framer, self._codec = Framer(), Codec(signing=self._signing)
+        self._limit = limit
+        self._start: int | None = None
+
+    def step(self, now: int, arrived: Sequence[bytes]) -> list[bytes]:
+        """Take in what has ``arrived`` by ``now`` (µs); what to send."""
+        self._start = now if self._start is None else self._start
+        hearing = self.examination.hearing
+        hearing.wait(now)
+        self._signing.present(now)
+        for data in arrived:
+            for frame in self._framer.feed(data):
+                refusal = self._signing.check(frame)
+                if refusal is None:
+                    hearing.hear(now, frame)
+                else:
+                    hearing.refused += 1
+                    hearing.refusal = refusal.value
+        hearing.bad, hearing.skipped_bytes = self._framer.bad, self._framer.skipped_bytes
+        return [self._codec.encode(message) for message in self._questions.due(now)]
+
+    def over(self, now: int) -> bool:
+        """Whether there is nothing more to wait for."""
+        if self._start is None:
+            return False
+        passed = now - self._start
+        return passed >= self._limit or (passed >= _LONG_ENOUGH and self._questions.done(now))
+
+    def doing(self) -> str:
+        """What it waits for, in a few words."""
+        if not self.examination.hearing.frames and not self.examination.hearing.refused:
+            return "waiting for MAVLink"
+        return "waiting for an autopilot" if self.examination.vehicle is None else "listening and asking"

@@ -1,0 +1,115 @@
+"""Whether it may be armed: pre-arm check, sensors, battery."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from pymavlink.dialects.v20 import all as dialect
+
+from companion.vehicle import PREARM_OK
+from mavlink_bridge.messages import BatteryStatus, StatusText, SysStatus
+from outrider.doctor.case import Case
+from outrider.doctor.finding import Finding, Severity
+
+_PREFIX: Final = "MAV_SYS_STATUS_"
+_SENSORS: Final = {
+    number: entry.name.removeprefix(_PREFIX).removeprefix("SENSOR_").lower().replace("_", " ")
+    for number, entry in dialect.enums["MAV_SYS_STATUS_SENSOR"].items()
+    if entry.name.startswith(_PREFIX) and number != PREARM_OK
+}
+_RC: Final = 0x10000
+"""MAV_SYS_STATUS_SENSOR_RC_RECEIVER: an escort needs none."""
+_LOW, _EMPTY = 0.3, 0.15
+
+
+def checks(case: Case) -> Iterator[Finding]:
+    """What SYS_STATUS says of arming and sensors."""
+    status = case.vehicle.latest(SysStatus)
+    if status is None:
+        return
+    if case.vehicle.vehicle.healthy:
+        yield Finding(
+            "the pre-arm check has passed", Severity.OK, f"It may be armed.{case.vehicle.armable.history}"
+        )
+    elif not case.vehicle.tells_checks and not case.px4:
+        yield Finding(
+            "SYS_STATUS does not tell whether it may be armed",
+            Severity.BLOCKING,
+            "A companion waits for the pre-arm bit (health 0x10000000) before it arms, here for ever.",
+            "Update the firmware (ArduCopter 4.0 and later tell it).",
+        )
+    else:
+        said = _complaints(case)
+        yield Finding(
+            "the pre-arm check fails (SYS_STATUS, health 0x10000000)",
+            Severity.BLOCKING,
+            "The autopilot will refuse to arm." + (f" It said: {'; '.join(said)}." if said else ""),
+            "Mend what it said."
+            if said
+            else "Its STATUSTEXTs say why (PreArm: … every 30 s; PX4: commander check).",
+        )
+    wrong = status.present & status.enabled & ~status.health & ~PREARM_OK
+    names = [name for bit, name in _SENSORS.items() if wrong & bit]
+    if names:
+        yield Finding(
+            f"unhealthy: {', '.join(names)}",
+            Severity.NOTE if wrong == _RC else Severity.WARNING,
+            "An escort needs no remote control, but a pilot does."
+            if wrong == _RC
+            else "It says so itself (SYS_STATUS).",
+            "Look at the sensor, calibrate it, or see what its driver says in a ground station.",
+        )
+
+
+def _complaints(case: Case) -> list[str]:
+    """What it lately said against arming, each once."""
+    texts: list[StatusText] = [text for _, text in case.vehicle.texts]
+    against = [
+        text.text
+        for text in texts
+        if text.text.lower().startswith(("prearm", "preflight", "arming denied", "arm:"))
+    ]
+    return list(dict.fromkeys(against))[-4:]
+
+
+def battery(case: Case) -> Iterator[Finding]:
+    """SYS_STATUS and BATTERY_STATUS, against what the autopilot itself calls low."""
+    status, told = case.vehicle.latest(SysStatus), case.vehicle.latest(BatteryStatus)
+    remaining = told.remaining if told is not None else None
+    voltage = status.battery_voltage if status is not None else None
+    if remaining is None and status is not None:
+        remaining = status.battery_remaining
+    low_voltage = case.parameter("BATT_LOW_VOLT") or 0.0
+    empty = max(case.parameter("BAT_LOW_THR") or 0.0, _EMPTY)
+    volts = f", {voltage:.1f} V" if voltage else ""
+    if voltage and voltage < low_voltage:
+        yield Finding(
+            f"battery: {voltage:.1f} V, below BATT_LOW_VOLT ({low_voltage:.1f} V)",
+            Severity.BLOCKING,
+            "Its failsafe lands or returns it in the middle of an escort.",
+            "Put a charged battery in.",
+        )
+    elif remaining is None:
+        yield Finding(
+            f"the battery's charge is not told{volts}",
+            Severity.NOTE,
+            "An escort cannot see in time that it has to go home.",
+            "Set BATT_MONITOR and BATT_CAPACITY (BAT1_SOURCE, BAT1_N_CELLS and BAT1_CAPACITY with PX4).",
+        )
+    elif remaining <= empty:
+        yield Finding(
+            f"battery: {remaining:.0%}{volts}",
+            Severity.BLOCKING,
+            f"That is what the autopilot takes for low ({empty:.0%}): its failsafe is next.",
+            "Put a charged battery in.",
+        )
+    elif remaining <= _LOW:
+        yield Finding(
+            f"battery: {remaining:.0%}{volts}",
+            Severity.WARNING,
+            "It will not last long.",
+            "Charge it before an escort.",
+        )
+    else:
+        yield Finding(f"battery: {remaining:.0%}{volts}", Severity.OK, "Enough to begin with.")

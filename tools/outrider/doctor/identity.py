@@ -1,0 +1,196 @@
+"""What flies there: firmware, version, vehicle, mode, how it speaks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from companion.vehicle import IN_AIR, ON_GROUND
+from mavlink_bridge.messages import AutopilotVersion, ExtendedSysState, Heartbeat
+from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
+from outrider.doctor.finding import Finding, Severity
+from outrider.doctor.speaker import CRITICAL
+from outrider.hangar.modes import mode_name
+from outrider.logs.words import enumerated
+
+_ROTORCRAFT: Final = {2, 3, 4, 13, 14, 15, 29, 35, 43}
+"""MAV_TYPE of what can hover: quadrotor, coaxial, helicopter, hexa-, octo-, tri-, dodeca-, decarotor, generic
+multirotor."""
+_TRIED: Final = {ARDUPILOT_NUMBER: (4, 6), PX4_NUMBER: (1, 16)}
+_TAKES_SETPOINTS: Final = 0x80
+"""MAV_PROTOCOL_CAPABILITY."""
+_SILENT: Final = 5.0
+_STARTING: Final = (1, 2)
+"""MAV_STATE: boot, calibrating."""
+
+
+def firmware(case: Case) -> Iterator[Finding]:
+    """Which autopilot, and which vehicle."""
+    beat = case.vehicle.vehicle.heartbeat
+    if beat is None:
+        return
+    kind = (enumerated("MAV_TYPE", beat.type) or "").removeprefix("MAV_TYPE_").lower().replace("_", " ")
+    if case.profile is None:
+        name = (enumerated("MAV_AUTOPILOT", beat.autopilot) or "").removeprefix("MAV_AUTOPILOT_").lower()
+        yield Finding(
+            f"an autopilot that is not known: {name} ({beat.autopilot}), {kind}",
+            Severity.BLOCKING,
+            "How to arm it, and which set-points it takes, is known of ArduPilot (3) and PX4 (12) only.",
+            "Use ArduCopter or PX4.",
+        )
+        return
+    if beat.type not in _ROTORCRAFT:
+        yield Finding(
+            f"{case.profile.name}, {kind}: no multicopter",
+            Severity.BLOCKING,
+            "An escort stands still in the air, goes sideways and turns on the spot.",
+            "Use a vehicle that hovers; if it is one, set its frame (FRAME_CLASS; SYS_AUTOSTART and "
+            "MAV_TYPE with PX4).",
+        )
+    yield from _version(case, kind)
+
+
+def _version(case: Case, kind: str) -> Iterator[Finding]:
+    name = case.profile.name if case.profile is not None else ""
+    told = case.vehicle.latest(AutopilotVersion)
+    if told is None or not told.flight_version:
+        yield Finding(
+            f"{name}, {kind}; its version is not told (AUTOPILOT_VERSION)",
+            Severity.NOTE if case.log else Severity.WARNING,
+            "What was measured of ArduCopter 4.6 and PX4 1.16 may not hold for it.",
+            "Nobody asked for it in this log."
+            if case.log
+            else "See that REQUEST_MESSAGE reaches it; an old firmware: update it.",
+        )
+        return
+    major, minor, patch, _ = told.flight_version.to_bytes(4, "big")
+    what = f"{name} {major}.{minor}.{patch}, {kind}, system {case.vehicle.source.system}"
+    tried = _TRIED[case.autopilot]
+    if (major, minor) == tried:
+        yield Finding(what, Severity.OK, "This version has been measured.")
+    elif (major, minor) < tried:
+        yield Finding(
+            what,
+            Severity.WARNING,
+            f"Older than what has been measured ({tried[0]}.{tried[1]}): it may refuse set-points with "
+            "acceleration or yaw rate.",
+            f"Update it to {name} {tried[0]}.{tried[1]}, or try it without people first.",
+        )
+    else:
+        yield Finding(
+            what,
+            Severity.NOTE,
+            f"Newer than what has been measured ({tried[0]}.{tried[1]}): parameters may have other names.",
+            "Read its release notes on guided or offboard flight.",
+        )
+    if told.capabilities and not told.capabilities & _TAKES_SETPOINTS:
+        yield Finding(
+            "it says that it takes no SET_POSITION_TARGET_LOCAL_NED",
+            Severity.BLOCKING,
+            "An escort steers by nothing else.",
+            "Use a build that takes it: ArduCopter with GUIDED, PX4 with OFFBOARD.",
+        )
+
+
+def dialect(case: Case) -> Iterator[Finding]:
+    """MAVLink 1 or 2, signed or not."""
+    vehicle = case.vehicle
+    if vehicle.versions == {1}:
+        yield Finding(
+            "it speaks MAVLink 1",
+            Severity.WARNING,
+            "Nothing can be signed, and messages above 255 do not exist.",
+            "SERIALn_PROTOCOL = 2 (ArduPilot), MAV_PROTO_VER = 2 (PX4).",
+        )
+    if vehicle.signed:
+        yield Finding(
+            f"{vehicle.signed / max(vehicle.frames, 1):.0%} of its messages are signed",
+            Severity.NOTE,
+            "It obeys only those who sign with its key.",
+            "Give the companion its key file (docs/signing.md), and the doctor too (--key): unsigned it "
+            "hears no answers.",
+        )
+
+
+def state(case: Case) -> Iterator[Finding]:
+    """Mode, motors, on the ground or not, its own opinion of itself."""
+    beat = case.vehicle.vehicle.heartbeat
+    if beat is None:
+        return
+    if not case.log and not case.vehicle.vehicle.alive:
+        yield Finding(
+            f"no HEARTBEAT for {case.silent_for(0):.0f} s",
+            Severity.BLOCKING,
+            "Whether it still follows is not known; after 3 s a companion sends nothing more.",
+            "See whether the autopilot hangs or the link is gone.",
+        )
+    elif case.log and case.silent > _SILENT:
+        yield Finding(
+            f"it says nothing in the last {case.silent:.0f} s of the log",
+            Severity.WARNING,
+            "The link was lost, or it was switched off. All of this is about how it was before.",
+            "If it was not switched off: a stronger radio, or a companion on board, which needs none.",
+        )
+    mode = _mode(case, beat)
+    armed = "armed" if case.vehicle.vehicle.armed else "disarmed"
+    where = _where(case)
+    steered = case.vehicle.vehicle.in_guided_mode
+    what = f"mode {mode}, {armed}{where}"
+    if not case.vehicle.vehicle.armed or case.log:
+        why = (
+            "So it ends in this log."
+            if case.log
+            else "An escort arms it after the operator's go, and changes the mode itself."
+        )
+        yield Finding(what, Severity.OK, why)
+    else:
+        yield Finding(
+            what,
+            Severity.WARNING,
+            "Somebody's set-points may steer it now."
+            if steered
+            else "Somebody flies it: a go takes it over where it is.",
+            "Land and disarm it, unless it is meant to be taken over in the air.",
+        )
+    if beat.system_status in _STARTING:
+        yield Finding(
+            "it is still starting",
+            Severity.BLOCKING,
+            "Sensors are being calibrated; it refuses to arm.",
+            "Leave it still and ask again in half a minute.",
+        )
+    elif beat.system_status >= CRITICAL:
+        yield Finding(
+            "its state is critical"
+            if beat.system_status == CRITICAL
+            else "its state is an emergency, or it shuts down",
+            Severity.BLOCKING,
+            "A failsafe of the autopilot is at work (battery, estimator, links), and has the last word.",
+            _last_warning(case) or "Look at its STATUSTEXTs in a ground station.",
+        )
+    if losses := case.vehicle.guided_losses:
+        yield Finding(
+            f"while armed it fell out of the mode that set-points steer, {losses} times",
+            Severity.WARNING,
+            "That is what happens when set-points stop for longer than COM_OF_LOSS_T; COM_OBL_RC_ACT "
+            "says what it does then.",
+            "Set COM_OBL_RC_ACT to 5 (hold), and look for what interrupted the stream.",
+        )
+
+
+def _mode(case: Case, beat: Heartbeat) -> str:
+    if not case.px4 and beat.type not in _ROTORCRAFT:
+        return str(beat.custom_mode)  # other ArduPilots have other numbers
+    return mode_name("px4" if case.px4 else "ardupilot", beat.custom_mode)
+
+
+def _where(case: Case) -> str:
+    extended = case.vehicle.latest(ExtendedSysState)
+    if extended is None:
+        return ""
+    words = {ON_GROUND: ", on the ground", IN_AIR: ", in the air", 3: ", taking off", 4: ", landing"}
+    return words.get(extended.landed_state, "")
+
+
+def _last_warning(case: Case) -> str:
+    return f"It said: {case.vehicle.vehicle.said!r}. Answer that first." if case.vehicle.vehicle.said else ""

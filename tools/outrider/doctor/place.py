@@ -1,0 +1,152 @@
+"""Where its local frame begins, where home is, and whether its positions agree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from mavlink_bridge.frames import FleetFrame, ned_to_enu
+from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, HomePosition
+from outrider.doctor.case import Case
+from outrider.doctor.finding import Finding, Severity
+
+_APART: Final = 3.0
+"""m between the same place said in two ways, horizontally."""
+_FAR_HOME: Final = 500.0
+_WRONG_SIGN: Final = -0.5
+
+
+def origin(case: Case) -> Iterator[Finding]:
+    """GPS_GLOBAL_ORIGIN: every set-point counts from there."""
+    origins = case.vehicle.origins
+    if len(origins) > 1:
+        frame = _frame(origins[0])
+        moved = max(float(np.linalg.norm(frame.to_enu(*one[1:4]))) for one in origins[1:])
+        yield Finding(
+            f"the origin has moved, by {moved:.1f} m",
+            Severity.WARNING,
+            "Positions before and after mean different places; a companion that misses it flies beside "
+            "its goal.",
+            "Let nobody set it in flight (SET_GPS_GLOBAL_ORIGIN), and begin with a good fix.",
+        )
+    if origins:
+        last = origins[-1]
+        if last.latitude == 0.0 and last.longitude == 0.0:
+            yield Finding(
+                "the origin is at 0°, 0°",
+                Severity.BLOCKING,
+                "That is in the sea before Africa: it is not set.",
+                "Wait for a fix, or set it in a ground station where there is no GPS.",
+            )
+            return
+        yield Finding(
+            f"origin: {last.latitude:.7f}°, {last.longitude:.7f}°, {last.altitude:.1f} m above the sea",
+            Severity.OK,
+            "Its own local frame begins there; each vehicle's is another one.",
+        )
+        return
+    if case.log:
+        found = _worked_out(case)
+        place = (
+            ""
+            if found is None
+            else f"; worked out from two positions: {found[0]:.6f}°, {found[1]:.6f}°, {found[2]:.1f} m"
+        )
+        yield Finding(
+            f"the log has no GPS_GLOBAL_ORIGIN{place}",
+            Severity.WARNING if found is not None else Severity.BLOCKING,
+            "Without it set-points and positions cannot be related to those of others.",
+            "fly asks for it (REQUEST_MESSAGE 49), and replay works it out; record the answer.",
+        )
+        return
+    yield Finding(
+        "no GPS_GLOBAL_ORIGIN, though it was asked for",
+        Severity.BLOCKING,
+        "Its local frame begins nobody knows where, so that neither target nor neighbours can be placed "
+        "in it.",
+        "Wait for a fix; indoors set it in a ground station (SET_GPS_GLOBAL_ORIGIN).",
+    )
+
+
+def home(case: Case) -> Iterator[Finding]:
+    """HOME_POSITION against the origin: return goes to the one, set-points count from the other."""
+    told, origins = case.vehicle.latest(HomePosition), case.vehicle.origins
+    if told is None:
+        yield Finding(
+            "home is not told (HOME_POSITION)",
+            Severity.NOTE,
+            "The autopilot's own return flies there.",
+            "" if case.log else "Wait for a fix; it is set on arming at the latest.",
+        )
+        return
+    if not origins:
+        return
+    east, north, up = (
+        float(part) for part in _frame(origins[-1]).to_enu(told.latitude, told.longitude, told.altitude)
+    )
+    away = float(np.hypot(east, north))
+    what = f"home is {away:.1f} m from the origin, {abs(up):.1f} m {'above' if up >= 0.0 else 'below'} it"
+    if away > _FAR_HOME:
+        yield Finding(
+            what,
+            Severity.WARNING,
+            "A failsafe's return crosses all of that, and nobody's plan knows of it.",
+            "Set home here (MAV_CMD_DO_SET_HOME), or restart the autopilot where it stands.",
+        )
+    else:
+        yield Finding(what, Severity.OK, "Return and landing go to home, set-points count from the origin.")
+
+
+def agreement(case: Case) -> Iterator[Finding]:
+    """LOCAL_POSITION_NED from the origin against GLOBAL_POSITION_INT, and its climb against its height."""
+    pair, origins = case.vehicle.pair, case.vehicle.origins
+    if pair is not None and origins:
+        there, here = pair
+        claimed = np.asarray(_frame(origins[-1]).to_enu(there.latitude, there.longitude, there.altitude))
+        off = claimed - ned_to_enu(np.asarray(here.position_ned))
+        away = float(np.hypot(off[0], off[1]))
+        allowed = _APART + 0.2 * float(np.linalg.norm(here.velocity_ned))
+        if not away <= allowed:
+            yield Finding(
+                f"local and global position disagree by {away:.1f} m",
+                Severity.BLOCKING,
+                "Either the origin is not the one that the local frame counts from, or one of the two is "
+                "wrong.",
+                "Restart the autopilot; if it stays so, do not fly this firmware with others.",
+            )
+        else:
+            yield Finding(
+                f"local and global position agree ({away:.1f} m apart)",
+                Severity.OK,
+                "The origin is the right one.",
+            )
+    slope = case.vehicle.climb.value
+    if slope is not None and slope < _WRONG_SIGN:
+        yield Finding(
+            "GLOBAL_POSITION_INT says vz positive when it climbs",
+            Severity.WARNING,
+            "MAVLink wants it positive downwards: others would expect it to sink when it rises.",
+            "Turn the sign where this vehicle is a target or a neighbour (velocity_up: true).",
+        )
+
+
+def _frame(place: GpsGlobalOrigin) -> FleetFrame:
+    return FleetFrame(place.latitude, place.longitude, place.altitude)
+
+
+def _worked_out(case: Case) -> tuple[float, float, float] | None:
+    """Where the local frame begins, from one place in both."""
+    if case.vehicle.pair is None:
+        return None
+    there, here = case.vehicle.pair
+    if not _placed(there):
+        return None
+    frame = FleetFrame(there.latitude, there.longitude, there.altitude)
+    return frame.to_geodetic(tuple(-ned_to_enu(np.asarray(here.position_ned))))
+
+
+def _placed(place: GlobalPosition) -> bool:
+    """Without a fix it is all zeros."""
+    return bool(place.latitude or place.longitude)

@@ -1,0 +1,96 @@
+"""Whether it knows where it is: estimator and GPS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from mavlink_bridge.messages import EkfStatus, EstimatorStatus, GpsRaw
+from outrider.doctor.case import Case
+from outrider.doctor.finding import Finding, Severity
+from outrider.doctor.speaker import ABSOLUTE_POSITION, FIX_3D
+
+_CONSTANT_POSITION: Final = 0x80
+_RELATIVE_POSITION: Final = 0x8
+_UNINITIALISED: Final = 0x400
+"""ArduPilot's, of EKF_STATUS_REPORT."""
+_POOR_HDOP, _POOR_ACCURACY = 2.0, 2.5
+
+
+def estimator(case: Case) -> Iterator[Finding]:
+    """EKF_STATUS_REPORT of ArduPilot, ESTIMATOR_STATUS of PX4."""
+    told: EkfStatus | EstimatorStatus | None
+    told = case.vehicle.latest(EstimatorStatus) if case.px4 else case.vehicle.latest(EkfStatus)
+    if told is None:
+        name = "ESTIMATOR_STATUS" if case.px4 else "EKF_STATUS_REPORT"
+        yield Finding(
+            f"the estimator's state is not told ({name})",
+            Severity.NOTE,
+            "Whether it has an absolute position shows only in the pre-arm check.",
+            "Nobody asked for it in this log." if case.log else "It was asked for and did not come.",
+        )
+        return
+    if told.flags & ABSOLUTE_POSITION and not told.flags & _UNINITIALISED:
+        yield Finding(
+            "the estimator has an absolute position",
+            Severity.OK,
+            f"Set-points in local NED mean a place on the globe.{case.vehicle.located.history}",
+        )
+        return
+    if not case.px4 and told.flags & _CONSTANT_POSITION:
+        why = "It assumes that it does not move at all (constant position)."
+    elif told.flags & _RELATIVE_POSITION:
+        why = "It knows only how it moved (optical flow, dead reckoning), not where on the globe it is."
+    else:
+        why = "It has no position."
+    yield Finding(
+        "the estimator has no absolute position",
+        Severity.BLOCKING,
+        f"{why} Others could not be kept away from it.",
+        "Wait for GPS with open sky, half a minute after boot and more; if it stays so, see "
+        "EK3_SRC1_POSXY and AHRS_EKF_TYPE."
+        if not case.px4
+        else "Wait for GPS with open sky; if it stays so, see EKF2_GPS_CTRL and EKF2_GPS_CHECK.",
+    )
+
+
+def gps(case: Case) -> Iterator[Finding]:
+    """GPS_RAW_INT."""
+    told = case.vehicle.latest(GpsRaw)
+    if told is None:
+        yield Finding(
+            "GPS is not told (GPS_RAW_INT)",
+            Severity.NOTE,
+            "How good positions are is not known.",
+            "" if case.log else "It was asked for and did not come.",
+        )
+        return
+    satellites = "" if told.satellites is None else f", {told.satellites} satellites"
+    if told.fix_type < FIX_3D:
+        yield Finding(
+            f"GPS: no fix in three dimensions{satellites}",
+            Severity.BLOCKING,
+            f"Neither target nor neighbours can be related to this vehicle.{case.vehicle.fixed.history}",
+            "Open sky, time, or a look at the receiver (GPS1_TYPE; GPS_1_CONFIG with PX4).",
+        )
+        return
+    words = {3: "3D fix", 4: "DGPS", 5: "RTK float", 6: "RTK fixed"}
+    what = f"GPS: {words.get(told.fix_type, f'fix {told.fix_type}')}{satellites}"
+    poor = (told.hdop is not None and told.hdop > _POOR_HDOP) or told.horizontal_accuracy > _POOR_ACCURACY
+    if poor:
+        yield Finding(
+            f"{what}, poor",
+            Severity.WARNING,
+            f"HDOP {told.hdop or 0:.1f}, accuracy {told.horizontal_accuracy:.1f} m: neighbours may be "
+            "nearer than they say.",
+            "Wait for more satellites, or keep wider distances (position_sigma).",
+        )
+    elif told.fix_type >= 5:
+        yield Finding(what, Severity.OK, f"Good to centimetres or decimetres.{case.vehicle.fixed.history}")
+    else:
+        yield Finding(
+            what,
+            Severity.OK,
+            "Good to a metre or two; the distances kept must allow for that "
+            f"(position_sigma).{case.vehicle.fixed.history}",
+        )

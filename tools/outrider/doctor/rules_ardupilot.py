@@ -1,0 +1,82 @@
+"""ArduCopter's parameters that decide what becomes of an escort."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from outrider.doctor.case import Case
+from outrider.doctor.rule import NOTE, OK, WARNING, Rule, Said, fence, low_battery, number
+
+
+def _guided_timeout(value: float, _case: Case) -> Said:
+    if value > 3.0:
+        return Said(
+            WARNING,
+            f"When set-points stop it flies on as last told for {value:g} s.",
+            "Set GUID_TIMEOUT to 3 s or less.",
+        )
+    if value < 0.3:
+        return Said(WARNING, "A short break of the link makes it brake.", "Set GUID_TIMEOUT to 1 s.")
+    return Said(
+        OK,
+        f"When set-points stop it flies on as last told for {value:g} s, then brakes (3 s: about 8 m from "
+        "2 m/s).",
+    )
+
+
+def _ground_failsafe(value: float, case: Case) -> Said:
+    if value == 0:
+        return Said(NOTE, "It flies on when the ground station is lost: the companion alone sees to it.")
+    station = case.parameter("SYSID_MYGCS")
+    there = {one.source.system for one in case.hearing.speakers.values() if one.is_ground_station}
+    if station is None or station in there:
+        return Said(
+            NOTE,
+            "When the ground station's HEARTBEAT is lost it returns or lands, escort or not.",
+            "Keep that station on.",
+        )
+    seen = ", ".join(map(str, sorted(there))) or "none"
+    return Said(
+        WARNING,
+        f"It watches for ground station {station:g} (SYSID_MYGCS), and here is {seen}: once seen and "
+        "lost, it returns or lands.",
+        "Give the ground station that id, set SYSID_MYGCS to its own, or FS_GCS_ENABLE to 0.",
+    )
+
+
+def _station(value: float, case: Case) -> Said:
+    if value == case.vehicle.source.system:
+        return Said(WARNING, "It takes itself for its ground station.", "Set SYSID_MYGCS to 255.")
+    return Said(
+        OK,
+        "Whose HEARTBEAT FS_GCS_ENABLE watches. A companion speaks with the vehicle's own id and never "
+        "counts as it.",
+    )
+
+
+def _arming(value: float, _case: Case) -> Said:
+    if value == 0:
+        return Said(WARNING, "It arms without any check.", "Set ARMING_CHECK to 1.")
+    return Said(
+        OK if int(value) & 1 else NOTE,
+        "It checks itself before it arms." if int(value) & 1 else "Some checks are left out.",
+    )
+
+
+def _estimator_failsafe(value: float, _case: Case) -> Said:
+    if value == 0:
+        return Said(WARNING, "It flies on when its estimator fails.", "Set FS_EKF_ACTION to 1 (land).")
+    return Said(OK, "It lands, or holds its height, when its estimator fails.")
+
+
+ARDUPILOT_RULES: Final = (
+    Rule("GUID_TIMEOUT", _guided_timeout, "How long it flies on when set-points stop: 3 s by default."),
+    Rule("FS_GCS_ENABLE", _ground_failsafe, "What it does when the ground station is lost."),
+    Rule("SYSID_MYGCS", _station, "Whose HEARTBEAT counts as the ground station's: 255 by default."),
+    Rule("FS_EKF_ACTION", _estimator_failsafe, "What it does when its estimator fails."),
+    Rule("ARMING_CHECK", _arming, "Whether it checks itself before it arms."),
+    Rule("FENCE_ENABLE", fence, "Whether a fence holds it in."),
+    Rule("BATT_FS_LOW_ACT", low_battery, "What it does when the battery is low."),
+    Rule("SYSID_THISMAV", number, "Its id after the next start."),
+)
+"""In the order in which they are told."""

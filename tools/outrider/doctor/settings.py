@@ -1,0 +1,60 @@
+"""The parameters that decide what becomes of an escort."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from outrider.doctor.case import Case
+from outrider.doctor.finding import Finding, Severity
+from outrider.doctor.rule import Rule
+from outrider.doctor.rules_ardupilot import ARDUPILOT_RULES
+from outrider.doctor.rules_px4 import PX4_RULES
+
+_ALSO: Final = {True: ("BAT_LOW_THR",), False: ("BATT_LOW_VOLT",)}
+"""What other checks want to know, by whether it is PX4."""
+_URGENT: Final = frozenset(("COM_OBL_RC_ACT", "GUID_TIMEOUT"))
+
+
+def rules(*, px4: bool) -> tuple[Rule, ...]:
+    """Those of a firmware."""
+    return PX4_RULES if px4 else ARDUPILOT_RULES
+
+
+def names(*, px4: bool) -> tuple[str, ...]:
+    """Which parameters to ask for."""
+    return tuple(rule.name for rule in rules(px4=px4)) + _ALSO[px4]
+
+
+def settings(case: Case) -> Iterator[Finding]:
+    """A finding for each that was told, and one for those that were not."""
+    if case.profile is None:
+        return
+    untold = []
+    for rule in rules(px4=case.px4):
+        value = case.parameter(rule.name)
+        if value is None:
+            untold.append(rule)
+        else:
+            severity, why, do = rule.judge(value, case)
+            yield Finding(f"{rule.name} = {value:g}", severity, why, do)
+    urgent = [rule for rule in untold if rule.name in _URGENT]
+    for rule in urgent:
+        yield Finding(
+            f"{rule.name} is not {'in the log' if case.log else 'told'}",
+            Severity.WARNING if case.px4 else Severity.NOTE,
+            rule.unknown,
+            f"Read it (param show {rule.name}), and set it to 5."
+            if case.px4
+            else f"Read it (param show {rule.name}).",
+        )
+    others = [rule.name for rule in untold if rule not in urgent]
+    if others:
+        yield Finding(
+            f"not {'in the log' if case.log else 'told'}: {', '.join(others)}",
+            Severity.NOTE,
+            "What the autopilot does when something is lost is not known from here.",
+            "Have the ground station load all parameters while it records."
+            if case.log
+            else "Read them in a ground station.",
+        )

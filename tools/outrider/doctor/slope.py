@@ -1,0 +1,24 @@
+"""By how much one thing changes when another does."""
+
+from __future__ import annotations
+
+from typing import Final
+
+_ENOUGH: Final = 0.5
+
+
+class Slope:
+    """Least squares through zero, of changes that have the same unit."""
+
+    def __init__(self) -> None:
+        self._both = self._square = 0.0
+
+    def tell(self, change: float, answer: float) -> None:
+        """When one thing changed by ``change`` the other did by ``answer``."""
+        self._both += change * answer
+        self._square += change * change
+
+    @property
+    def value(self) -> float | None:
+        """The slope; None if too little has changed to say."""
+        return self._both / self._square if self._square > _ENOUGH else None

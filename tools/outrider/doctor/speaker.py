@@ -1,0 +1,181 @@
+"""One component on the link, as heard."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final, TypeVar, cast
+
+from companion.vehicle import INVALID, PREARM_OK, Vehicle
+from mavlink_bridge.framing import Frame
+from mavlink_bridge.messages import (
+    AutopilotVersion,
+    EkfStatus,
+    EstimatorStatus,
+    GlobalPosition,
+    GpsGlobalOrigin,
+    GpsRaw,
+    Heartbeat,
+    LocalPosition,
+    Message,
+    ParamValue,
+    Source,
+    StatusText,
+    SysStatus,
+)
+from outrider.doctor.boot_clock import BootClock
+from outrider.doctor.condition import Condition
+from outrider.doctor.slope import Slope
+
+M = TypeVar("M", bound=Message)
+GROUND_STATION: Final = 6
+"""MAV_TYPE_GCS."""
+ABSOLUTE_POSITION: Final = 0x10
+"""Of ESTIMATOR_STATUS_FLAGS, which EKF_STATUS_REPORT shares."""
+CRITICAL: Final = 5
+"""MAV_STATE; 6 is emergency."""
+FIX_3D: Final = 3
+_KEPT_FRAMES, _KEPT_TEXTS, _KEPT_PARAMETERS, _KEPT_PLACES = 32, 40, 4096, 8
+_TOGETHER: Final = 60_000
+"""µs between two positions that are compared."""
+
+
+class Stream:
+    """One message of one component: how often, from when to when (µs), and its longest silence."""
+
+    __slots__ = ("count", "first", "last", "longest")
+
+    def __init__(self, now: int) -> None:
+        self.count = 0
+        self.first = self.last = now
+        self.longest = 0
+
+    def tell(self, now: int) -> None:
+        """One more."""
+        self.count += 1
+        self.longest = max(self.longest, now - self.last)
+        self.last = now
+
+    @property
+    def rate(self) -> float:
+        """Per second of the listener; 0 for fewer than two."""
+        return (self.count - 1) / ((self.last - self.first) * 1e-6) if self.last > self.first else 0.0
+
+
+class Speaker:
+    """All that ``source`` has said. Repeated frames are counted in ``repeated``, and nowhere else.
+
+    ``origins``: the different GPS_GLOBAL_ORIGINs in their order; ``pair``: the last global and local position
+    of about one instant; ``guided_losses``: how often its mode fell out of the one in which set-points steer,
+    while armed, as it does when they stop.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.vehicle = Vehicle()
+        self.streams: dict[int, Stream] = {}
+        self.clock = BootClock()
+        self.parameters: dict[str, ParamValue] = {}
+        self.texts: deque[tuple[int, StatusText]] = deque(maxlen=_KEPT_TEXTS)
+        self.frames = self.repeated = self.signed = self.guided_losses = 0
+        self.last = 0
+        """When it last spoke, µs."""
+        self.versions: set[int] = set()
+        self.identities: set[tuple[int, bytes]] = set()
+        self.origins: list[GpsGlobalOrigin] = []
+        self.pair: tuple[GlobalPosition, LocalPosition] | None = None
+        self.armable, self.located, self.fixed = Condition(), Condition(), Condition()
+        self.climb = Slope()
+        self.tells_checks = False
+        """Whether SYS_STATUS ever mentioned the pre-arm check."""
+        self._latest: dict[type, Message] = {}
+        self._recent: deque[bytes] = deque(maxlen=_KEPT_FRAMES)
+
+    def tell(self, now: int, frame: Frame, message: Message | None) -> None:
+        """It said ``message`` in ``frame`` at ``now`` (µs); None: one that nobody here reads."""
+        if frame.data in self._recent:
+            self.repeated += 1
+            return
+        self._recent.append(frame.data)
+        self.frames += 1
+        self.last = now
+        self.signed += frame.signed
+        self.versions.add(frame.version)
+        self.streams.setdefault(frame.message_id, Stream(now)).tell(now)
+        if message is not None:
+            self._note(now, message)
+
+    def latest(self, kind: type[M]) -> M | None:
+        """The last message of ``kind``."""
+        return cast("M | None", self._latest.get(kind))
+
+    def rate(self, message_id: int) -> float:
+        """Messages per second of *its* clock: a simulation may run faster than the wall's."""
+        stream = self.streams.get(message_id)
+        return 0.0 if stream is None else stream.rate / (self.clock.rate or 1.0)
+
+    @property
+    def heartbeat(self) -> Heartbeat | None:
+        """The last, of whatever kind."""
+        return self.latest(Heartbeat)
+
+    @property
+    def is_autopilot(self) -> bool:
+        """Whether it flies something."""
+        beat = self.heartbeat
+        return beat is not None and beat.autopilot != INVALID and beat.type != GROUND_STATION
+
+    @property
+    def is_ground_station(self) -> bool:
+        """By its heartbeat."""
+        return self.heartbeat is not None and self.heartbeat.type == GROUND_STATION
+
+    def _note(self, now: int, message: Message) -> None:
+        boot = getattr(message, "time_boot", None)
+        if isinstance(boot, int) and boot:
+            self.clock.tell(now, message, boot)
+        guided = self.vehicle.armed and self.vehicle.in_guided_mode
+        self.vehicle.hear(message)
+        self.vehicle.tick(now)
+        match message:
+            case Heartbeat():
+                profile = self.vehicle.profile
+                fell = profile is not None and message.custom_mode in profile.loss_modes
+                failed = fell and message.system_status >= CRITICAL
+                self.guided_losses += guided and self.vehicle.armed and failed
+            case StatusText():
+                self.texts.append((now, message))
+            case ParamValue() if len(self.parameters) < _KEPT_PARAMETERS:
+                self.parameters[message.name] = message
+            case AutopilotVersion() if len(self.identities) < _KEPT_PLACES:
+                self.identities.add((message.uid, message.uid2))
+            case SysStatus():
+                self.armable.tell(now, self.vehicle.healthy)
+                self.tells_checks |= bool((message.present | message.health) & PREARM_OK)
+            case EkfStatus() | EstimatorStatus():
+                self.located.tell(now, bool(message.flags & ABSOLUTE_POSITION))
+            case GpsRaw():
+                self.fixed.tell(now, message.fix_type >= FIX_3D)
+            case GpsGlobalOrigin():
+                self._move(message)
+            case GlobalPosition():
+                before = self.latest(GlobalPosition)
+                if before is not None:
+                    seconds = (message.time_boot - before.time_boot) * 1e-6
+                    if 0.0 < seconds < 1.0:
+                        middle = -0.5 * (message.velocity_ned[2] + before.velocity_ned[2])
+                        self.climb.tell(middle * seconds, message.altitude - before.altitude)
+                self._match(message, self.latest(LocalPosition))
+            case LocalPosition():
+                self._match(self.latest(GlobalPosition), message)
+            case _:
+                pass
+        self._latest[type(message)] = message
+
+    def _move(self, origin: GpsGlobalOrigin) -> None:
+        place = origin[1:4]
+        if (not self.origins or self.origins[-1][1:4] != place) and len(self.origins) < _KEPT_PLACES:
+            self.origins.append(origin)
+
+    def _match(self, there: GlobalPosition | None, here: LocalPosition | None) -> None:
+        if there is not None and here is not None and abs(there.time_boot - here.time_boot) <= _TOGETHER:
+            self.pair = there, here

@@ -1,0 +1,93 @@
+"""Which messages come, and how often: what an escort lives on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from outrider.doctor.case import Case
+from outrider.doctor.finding import Finding, Severity
+
+
+class Need(NamedTuple):
+    """A message. ``wanted``: Hz that ``fly`` asks for; ``least``: what it can live with; ``essential``: there
+    is no escort without it."""
+
+    message_id: int
+    name: str
+    wanted: float
+    least: float
+    essential: bool
+    why: str
+
+
+NEEDS: Final = (
+    Need(32, "LOCAL_POSITION_NED", 50.0, 2.0, True, "Every plan begins where this says that it is."),
+    Need(30, "ATTITUDE", 10.0, 2.0, True, "It says where the nose points when set-points begin."),
+    Need(1, "SYS_STATUS", 1.0, 0.2, True, "It has the pre-arm check and the battery."),
+    Need(245, "EXTENDED_SYS_STATE", 2.0, 0.5, False, "It says whether an armed vehicle stands or flies."),
+    Need(
+        33,
+        "GLOBAL_POSITION_INT",
+        1.0,
+        0.2,
+        False,
+        "Others see by it where this vehicle is, and it checks the local position.",
+    ),
+)
+_NEARLY: Final = 0.85
+_GONE: Final = 5.0
+"""s of silence after which a message that flowed has stopped, at least."""
+_INTERVALS: Final = 10.0
+
+
+def streams(case: Case, asked: dict[int, int]) -> Iterator[Finding]:
+    """``asked``: how often the doctor itself asked for a message, by its id."""
+    for need in NEEDS:
+        yield _judge(case, need, asked.get(need.message_id, 0))
+
+
+def _judge(case: Case, need: Need, asked: int) -> Finding:
+    stream = case.vehicle.streams.get(need.message_id)
+    name = need.name
+    order = f"SET_MESSAGE_INTERVAL {need.message_id} at {1e6 / need.wanted:.0f} µs"
+    if stream is None:
+        return Finding(
+            f"{name} does not come",
+            Severity.BLOCKING if need.essential else Severity.WARNING,
+            f"{need.why} It is missing in the log: nobody asked for it, or the autopilot has none to tell."
+            if case.log
+            else f"{need.why} It was asked for and did not come.",
+            f"Record it: {order}."
+            if case.log
+            else "If GPS and estimator are bad, mend them first; else see that the link carries what is "
+            "asked for.",
+        )
+    if stream.count <= max(asked, 1):
+        return Finding(
+            f"{name} comes only when asked",
+            Severity.NOTE,
+            need.why,
+            f"Nothing: fly asks for {need.wanted:g} Hz ({order}).",
+        )
+    rate = case.vehicle.rate(need.message_id)
+    silence = case.silent_for(need.message_id)
+    if silence > max(_GONE, _INTERVALS / rate if rate else 0.0):
+        return Finding(
+            f"{name} has stopped, {silence:.0f} s ago",
+            Severity.BLOCKING if need.essential and not case.log else Severity.WARNING,
+            need.why,
+            "It ends before the log does." if case.log else "See what happened to GPS, estimator or link.",
+        )
+    what = f"{name} at {rate:.3g} Hz"
+    if rate >= _NEARLY * need.wanted:
+        return Finding(what, Severity.OK, need.why)
+    if rate >= need.least:
+        return Finding(what, Severity.NOTE, need.why, f"Nothing: fly asks for {need.wanted:g} Hz ({order}).")
+    return Finding(
+        what,
+        Severity.WARNING,
+        f"{need.why} Slower than {need.least:g} Hz is taken for lost from time to time.",
+        f"fly asks for {need.wanted:g} Hz ({order}); see that the link has room for it (57 600 baud carry "
+        "5.8 kB/s).",
+    )
