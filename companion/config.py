@@ -17,6 +17,7 @@ from companion.moving import Moving, MovingPost, MovingSphere
 from companion.obstacles import Obstacle, Post, Sphere
 from companion.settings import Positive, Settings, WireStep
 from companion.surfaces import Circle, Surface, SurfaceConfig
+from companion.target_source import GlobalPositionSource, TargetSource
 
 MethodName = Literal["baseline", "swivel", "approach_angle", "tangential"]
 Avoidance = Literal["field", "certified"]
@@ -243,6 +244,7 @@ class CompanionConfig(Settings):
     target: TrackConfig = TrackConfig(
         sigma_position=1.0, sigma_velocity=0.3, sigma_acceleration=1.0, sigma_turn=0.5, jump=8.0
     )
+    target_source: TargetSource = Field(GlobalPositionSource(), description="what tells where the target is")
     target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
     target_d_safe: float | None = Field(None, gt=0.0, le=100.0)
     obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed; the field is about them")

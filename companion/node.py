@@ -87,7 +87,7 @@ class Companion:
         self._sharing = Sharing(config, self._source, fleet)
         self._signing = signing
         self._codecs = {
-            link: Codec(accepts(link, system, target_system), signing, number)
+            link: Codec(accepts(link, system, target_system, config), signing, number)
             for number, link in enumerate(LINKS)
         }
         self.plan: Plan | None = None

@@ -13,10 +13,12 @@ from companion.horizon import Array
 from companion.moving import MovingObstacles
 from companion.neighbours import Neighbours
 from companion.obstacles import FixedObstacles
+from companion.target import Target
 from companion.tracks import State, Track
-from mavlink_bridge.frames import FleetFrame, LocalFrame, ned_to_enu
+from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import (
     Attitude,
+    CameraTrackingGeo,
     GlobalPosition,
     GpsGlobalOrigin,
     LocalPosition,
@@ -55,7 +57,7 @@ class World:
         self._system = system
         self._target_system = target_system
         self._own = Track(config.own)
-        self._target = Track(config.target)
+        self.target = Target(config, system, target_system, fleet)
         self._fixed = FixedObstacles(config.obstacles)
         self._moving = MovingObstacles(config.moving)
         self._reach = reach(config)
@@ -66,7 +68,9 @@ class World:
 
     def hear(self, now: int, link: str, message: Message) -> None:
         """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
-        if link == "autopilot":
+        if link == "target" or isinstance(message, CameraTrackingGeo):
+            self.target.hear(now, link, message)
+        elif link == "autopilot":
             if message.source.system == self._system:
                 self._hear_own(now, message)
         elif link == "swarm":
@@ -74,16 +78,11 @@ class World:
                 self.neighbours.hear_position(now, message)
             elif isinstance(message, Tunnel):
                 self.neighbours.hear_plan(now, message)
-        elif link == "target" and isinstance(message, GlobalPosition):
-            self._hear_target(now, message)
 
     def at(self, now: int) -> View:
         """The view at ``now`` (µs); a target unheard of for too long is none."""
-        target = self._target.at(now)
-        if target is not None and target.age > self.config.guard.target_stale_us:
-            target = None
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
-        return View(self._own.at(now), yaw, target, self._local)
+        return View(self._own.at(now), yaw, self.target.at(now), self._local)
 
     def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
         """Neighbours and what else moves, the target where it is one, and what stands near the own
@@ -133,9 +132,3 @@ class World:
                 self._local = self.fleet.local(*origin)
                 # Where the vehicle was in the old frame must not be flown to in the new one.
                 self._own = Track(self.config.own)
-
-    def _hear_target(self, now: int, message: GlobalPosition) -> None:
-        if message.source.system != self._target_system:
-            return
-        position = self.fleet.to_enu(message.latitude, message.longitude, message.altitude)
-        self._target.measure(now, position, ned_to_enu(message.velocity_ned), message.time_boot)
