@@ -15,9 +15,11 @@ from pydantic import Field, model_validator
 from companion.certified.settings import CertifiedConfig
 from companion.moving import Moving, MovingPost, MovingSphere
 from companion.obstacles import Obstacle, Post, Sphere
+from companion.proximity import ProximityConfig
 from companion.settings import Positive, Settings, WireStep
 from companion.surfaces import Circle, Surface, SurfaceConfig
 from companion.target_source import GlobalPositionSource, TargetSource
+from companion.traffic import TrafficConfig
 
 MethodName = Literal["baseline", "swivel", "approach_angle", "tangential"]
 Avoidance = Literal["field", "certified"]
@@ -250,6 +252,12 @@ class CompanionConfig(Settings):
     obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed; the field is about them")
     moving: tuple[Moving, ...] = Field(
         (), max_length=100, description="who of those heard on the swarm link is an obstacle, and how large"
+    )
+    proximity: ProximityConfig | None = Field(
+        None, description="obstacles from OBSTACLE_DISTANCE; null: not listened to"
+    )
+    traffic: TrafficConfig | None = Field(
+        None, description="obstacles from ADSB_VEHICLE; null: not listened to"
     )
     horizon: HorizonConfig = HorizonConfig()
     cost: CostConfig = CostConfig()

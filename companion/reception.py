@@ -9,6 +9,8 @@ from companion.target_source import CameraSource, message_of, speaker_of
 
 AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1: other components of the vehicle have no say in where it is."""
+_DISTANCES, _TRAFFIC = 330, 246
+"""Sensors of the own system may be on both links; traffic may be told by anybody on the swarm's."""
 _WANTED = {
     "autopilot": {0, 1, 30, 32, 49, 77, 245, 253},
     "swarm": {33, 111, 385},
@@ -23,11 +25,14 @@ def accepts(link: str, system: int, target: int, config: CompanionConfig) -> Cal
     messages wanted there, from whom they may come."""
     wanted = _WANTED.get(link, set())
     source = config.target_source
+    sensors = {_DISTANCES} if config.proximity is not None else set()
+    sensors |= {_TRAFFIC} if config.traffic is not None else set()
     told, speaker = message_of(source), speaker_of(source, system, target)
     if link == "autopilot":
         camera = told if isinstance(source, CameraSource) else None
         return lambda identifier, sender, component: (
             (identifier in wanted and sender == system and component == AUTOPILOT)
+            or (identifier in sensors and sender == system)
             or (identifier == camera and sender == speaker)
         )
     if link == "target":
@@ -35,5 +40,8 @@ def accepts(link: str, system: int, target: int, config: CompanionConfig) -> Cal
             identifier == told and (speaker is None or sender == speaker)
         )
     if link == "swarm":
-        return lambda identifier, sender, _component: identifier in wanted and sender != system
+        wanted = wanted | (sensors & {_TRAFFIC})
+        return lambda identifier, sender, _component: (
+            (identifier in wanted and sender != system) or (identifier in sensors and sender == system)
+        )
     return lambda identifier, _sender, _component: identifier in wanted
