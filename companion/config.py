@@ -20,6 +20,7 @@ from companion.settings import Positive, Settings, WireStep
 from companion.surfaces import Circle, Surface, SurfaceConfig
 from companion.target_source import GlobalPositionSource, TargetSource
 from companion.traffic import TrafficConfig
+from companion.voice import VoiceConfig
 
 MethodName = Literal["baseline", "swivel", "approach_angle", "tangential"]
 Avoidance = Literal["field", "certified"]
@@ -277,6 +278,7 @@ class CompanionConfig(Settings):
     certified: CertifiedConfig = CertifiedConfig()
     guard: GuardConfig = GuardConfig()
     rates: RatesConfig = RatesConfig()
+    voice: VoiceConfig = VoiceConfig()
 
     def surface_of(self, system: int) -> Surface:
         """Where the vehicle of that system id is to be around the target."""

@@ -18,6 +18,7 @@ from companion.reception import AUTOPILOT
 from companion.sensed import Sensed, Stance
 from companion.target import Target
 from companion.tracks import State, Track
+from companion.voice import Voice
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import (
     AdsbVehicle,
@@ -100,6 +101,14 @@ class World:
         """The view at ``now`` (µs); a target unheard of for too long is none."""
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
         return View(self._own.at(now), yaw, self.target.at(now), self._local)
+
+    def say(self, now: int, voice: Voice) -> None:
+        """Let ``voice`` tell who has fallen silent, and who is back."""
+        if self.config.task == "escort" and self.target.age(now) is not None:
+            voice.watch(self.target.at(now) is None, "Target lost", "Target is back")
+        if self.sensed.proximity is not None:
+            silent = self.sensed.proximity.silent(now)
+            voice.watch(silent, "Obstacle sensor silent", "Obstacle sensor is back")
 
     def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
         """Neighbours and what else moves, the target where it is one, and what stands near the own
