@@ -336,9 +336,12 @@ class Companion:
     def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to; None when nobody knows."""
         try:
-            return self._destination(now, view, measured)
+            aim = self._destination(now, view, measured)
         except SurfaceError:
             return None
+        if aim is None or self.config.traffic is None:
+            return aim
+        return aim._replace(destination=self.world.sensed.aside(now, aim.destination, measured.position))
 
     def _destination(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to: the own goal, or the surface around the target where it will be at the end of the

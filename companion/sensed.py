@@ -12,9 +12,12 @@ from companion.forces import Obstacles
 from companion.horizon import Array
 from companion.obstacles import Axes
 from companion.proximity import BODY, Proximity
+from companion.traffic import FIRST_ID as TRAFFIC
 from companion.traffic import Traffic
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import AdsbVehicle, ObstacleDistance
+
+_NEAR = 1e-6
 
 
 class Stance(NamedTuple):
@@ -60,8 +63,27 @@ class Sensed:
         return Axes(sum(ids, ()), np.concatenate(positions), np.concatenate(radii))
 
     def obstacles(self, now: int, prediction: Array, reach: float) -> Obstacles:
-        """The same as the field sees them, (n, 3) the own prediction."""
+        """The same as the field sees them, (n, 3) the own prediction.
+
+        Deep in the room of traffic the field would push with all that the vehicle has, over any limit of
+        speed. So that room ends, for the field, where it pushes gently; ``aside`` leads out of it.
+        """
         ids, positions, radius = self.around(now, prediction, reach)
         field = self._config.field
+        for row, name in enumerate(ids):
+            if name >= TRAFFIC:
+                off = positions[row, 0] - prediction[0]
+                far = max(float(np.sqrt(off @ off)), _NEAR)
+                spare = far - 0.5 * (field.d_min + field.d_safe) - field.margin(1)
+                radius[row] = min(max(spare, 0.0), radius[row])
+                positions[row] += max(-spare, 0.0) / far * off
         radius = radius + field.margin(1)
         return Obstacles(ids, positions, field.d_min + radius, field.d_safe + radius, radius)
+
+    def aside(self, now: int, goal: Array, here: Array) -> Array:
+        """The ``goal`` (3,), or a place nearby where the vehicle, which is ``here`` (3,), is in the way of no
+        traffic."""
+        if self.traffic is None or not len(self.traffic):
+            return goal
+        field = self._config.field
+        return self.traffic.outside(now, goal, here, field.d_safe + field.margin(1))

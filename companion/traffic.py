@@ -29,6 +29,7 @@ _STRAYS = 300.0
 """m; one address that is further off than flying explains is two, and the first one counts."""
 _HEAD_ON = 1.0
 """m; so near to its way it does not say to which side to go, and one goes to its right."""
+_NEAR = 1e-6
 
 _Micros = Annotated[int, Field(ge=0, le=60_000_000)]
 _Address = Annotated[int, Field(ge=0, lt=_ADDRESSES)]
@@ -89,6 +90,17 @@ class Traffic:
                 positions.append(nearest)
         places = np.array(positions).reshape(-1, len(prediction), 3)
         return Axes(tuple(ids), places, np.full(len(ids), self._config.radius))
+
+    def outside(self, now: int, goal: Array, here: Array, clearance: float) -> Array:
+        """The ``goal`` (3,), or a place beside the ways that it lies on, ``clearance`` (m) beyond their room
+        and on the side where the vehicle is: it flies there, and is not pushed."""
+        room = self._config.radius + clearance
+        for there, beside in self.around(now, np.stack([goal, here]), clearance).positions:
+            off, own = goal - there, here - beside
+            if off @ off < room**2:
+                way = own if own @ own < room**2 else off
+                goal = there + way * (room / max(float(np.sqrt(way @ way)), _NEAR))
+        return goal
 
     def _take(self, now: int, message: AdsbVehicle, place: Array, here: Array) -> bool:
         speed, climb = message.speed or 0.0, message.climb or 0.0

@@ -123,11 +123,10 @@ class CertifiedFlight:
         start = keeper.start()
         own = keeper.own()
         others, field = self._surroundings.around(keeper.epoch(now), own, self.ledger, world, view)
-        destination = self._surroundings.outside(keeper.epoch(now), aim.destination, own[0, 0], world)
-        goal = self._stall.turned(start.position_m, destination)
+        goal = self._stall.turned(start.position_m, aim.destination)
         places = goal + self._before_end[:, None] * aim.velocity
         wish = Wish(places, np.broadcast_to(aim.velocity, places.shape), field)
-        return keeper.replan(wish, destination, others)
+        return keeper.replan(wish, aim.destination, others)
 
     def idle(self, now: int) -> bool:
         """Whether there is nothing to make or to tell until something else is due."""

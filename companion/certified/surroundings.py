@@ -16,7 +16,6 @@ from companion.world import View, World
 
 _STEPS_OF_SIGHT = 1.0
 """m beyond what matters for certain, so that nothing comes into sight in the middle of a plan."""
-_NEAR = 1e-6
 
 
 class Surroundings:
@@ -53,18 +52,6 @@ class Surroundings:
             controls[index], distance[index] = centres, radii
         others = Others(controls, distance, np.arange(len(controls)) < count)
         return others, self._strangers.field(seen, own, sensed)
-
-    def outside(self, epoch: int, goal: Array, here: Array, world: World) -> Array:
-        """The ``goal`` (3,), or a place beside what is sensed there, on the side where the vehicle is: planes
-        hold no plan back that lies within already, and a goal within would keep it there."""
-        least = self._config.field.d_min + self._margin
-        sensed = world.sensed.around(epoch, np.stack([goal, here]), least)
-        for (there, beside), radius in zip(sensed.positions, sensed.radius, strict=True):
-            room, off, own = least + radius, goal - there, here - beside
-            if off @ off < room**2:
-                way = own if own @ own < room**2 else off
-                goal = there + way * (room / max(float(np.sqrt(way @ way)), _NEAR))
-        return goal
 
     def _standing(self, own: Array) -> list[tuple[Array, Array]]:
         """Spheres about their centres; posts beside the vehicle, whatever its height: they count as if they

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
+from companion.forces import repulsion
 from companion.reception import accepts
 from companion.traffic import FIRST_ID, Traffic, TrafficConfig
 from companion.world import World
@@ -181,6 +182,7 @@ def flown(avoidance, told):
         else:
             bench.step()
         nearest = min(nearest, float(np.linalg.norm((place - bench.autopilot.position)[:2])))
+        assert np.abs(bench.autopilot.velocity).max() <= max(bench.config.limits.v_max) + 0.1
     bench.fly(25.0)
     return nearest, bench.autopilot.position
 
@@ -194,3 +196,37 @@ def test_a_companion_gives_way_and_comes_back(avoidance):
 
 def test_without_a_receiver_it_stays():
     assert flown("field", told=False)[0] < 4.5
+
+
+@LAWS
+@given(
+    goal=vectors(60.0),
+    own=vectors(60.0),
+    place=vectors(200.0),
+    course=numbers(-3.0, 3.0),
+    clear=numbers(0.5, 5),
+)
+def test_a_goal_is_moved_just_off_its_way_or_not_at_all(goal, own, place, course, clear):
+    traffic = heard(place, course=course)
+    moved, room = traffic.outside(START, goal, own, clear), CONFIG.radius + clear
+
+    def off(point):
+        return np.linalg.norm((point - around(traffic, point[None]).positions[0, 0])[:2])
+
+    assert off(moved) >= min(room, off(goal)) - 1e-6
+    if np.linalg.norm(goal - around(traffic, goal[None]).positions[0, 0]) >= room:
+        np.testing.assert_array_equal(moved, goal)
+
+
+@LAWS
+@given(place=vectors(40.0), course=numbers(-3.0, 3.0))
+def test_deep_in_its_room_the_field_pushes_gently(place, course):
+    """Or it would fling the vehicle out, faster than it may fly."""
+    config = CompanionConfig(traffic=CONFIG)
+    world = World(config, SYSTEM, 1, FLEET)
+    told = message(place=place, course=course, altitude=FLEET.altitude + place[2])
+    world.hear(START, "autopilot", told)
+    seen = world.obstacles(START, world.at(START), HERE)
+    if seen.ids:
+        force = repulsion(HERE, seen, config.field.gain, config.limits.a_total, None, 0.1)
+        assert np.linalg.norm(force, axis=1).max() < max(config.limits.u_max)
