@@ -15,8 +15,12 @@ from pydantic import Field, model_validator
 from companion.certified.settings import CertifiedConfig
 from companion.moving import Moving, MovingPost, MovingSphere
 from companion.obstacles import Obstacle, Post, Sphere
+from companion.proximity import ProximityConfig
 from companion.settings import Positive, Settings, WireStep
 from companion.surfaces import Circle, Surface, SurfaceConfig
+from companion.target_source import GlobalPositionSource, TargetSource
+from companion.traffic import TrafficConfig
+from companion.voice import VoiceConfig
 
 MethodName = Literal["baseline", "swivel", "approach_angle", "tangential"]
 Avoidance = Literal["field", "certified"]
@@ -257,11 +261,18 @@ class CompanionConfig(Settings):
     target: TrackConfig = TrackConfig(
         sigma_position=1.0, sigma_velocity=0.3, sigma_acceleration=1.0, sigma_turn=0.5, jump=8.0
     )
+    target_source: TargetSource = Field(GlobalPositionSource(), description="what tells where the target is")
     target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
     target_d_safe: float | None = Field(None, gt=0.0, le=100.0)
     obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed; the field is about them")
     moving: tuple[Moving, ...] = Field(
         (), max_length=100, description="who of those heard on the swarm link is an obstacle, and how large"
+    )
+    proximity: ProximityConfig | None = Field(
+        None, description="obstacles from OBSTACLE_DISTANCE; null: not listened to"
+    )
+    traffic: TrafficConfig | None = Field(
+        None, description="obstacles from ADSB_VEHICLE; null: not listened to"
     )
     horizon: HorizonConfig = HorizonConfig()
     cost: CostConfig = CostConfig()
@@ -281,6 +292,7 @@ class CompanionConfig(Settings):
     certified: CertifiedConfig = CertifiedConfig()
     guard: GuardConfig = GuardConfig()
     rates: RatesConfig = RatesConfig()
+    voice: VoiceConfig = VoiceConfig()
 
     def surface_of(self, system: int) -> Surface:
         """Where the vehicle of that system id is to be around the target."""

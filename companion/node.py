@@ -12,6 +12,7 @@ from companion.bearings import turned
 from companion.certified.flight import CertifiedFlight
 from companion.certified.keeper import Why
 from companion.config import CompanionConfig
+from companion.dials import Dials
 from companion.errors import CompanionError, SurfaceError
 from companion.forces import Obstacles
 from companion.guard import Guard
@@ -24,6 +25,7 @@ from companion.reception import LINKS, accepts
 from companion.setpoint import setpoint
 from companion.settling import Settling
 from companion.sharing import Sharing
+from companion.voice import Voice
 from companion.watch import Reaction, Situation, Watch
 from companion.world import View, World
 from mavlink_bridge.codec import Codec
@@ -45,6 +47,7 @@ _BACK, _STILL = 0.5, 0.5
 """m and m/s: so near to where it started, and so slow, it is back."""
 _LOOK = 100_000
 """µs between two looks at what may be wrong."""
+_NOTHING: dict[str, list[Message]] = {"autopilot": [], "ground": []}
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
 
@@ -88,9 +91,11 @@ class Companion:
         self.guard = Guard(config)
         self.pilot = Pilot(config, self._source, fleet.altitude)
         self._sharing = Sharing(config, self._source, fleet)
+        self.voice = Voice(config.voice, self._source)
+        self._dials = Dials(config, self._source)
         self._signing = signing
         self._codecs = {
-            link: Codec(accepts(link, system, target_system), signing, number)
+            link: Codec(accepts(link, system, target_system, config), signing, number)
             for number, link in enumerate(LINKS)
         }
         self.plan: Plan | None = None
@@ -116,12 +121,19 @@ class Companion:
     @property
     def tally(self) -> Tally:
         """Counters for the summary."""
-        held, failures, anchored = self.guard.held, self.guard.failures, self.guard.anchored_anew
+        failures, anchored = self.guard.failures, self.guard.anchored_anew
         if self._certified is not None:
             keeper = self._certified.keeper
-            held, failures = sum(keeper.held.values()), keeper.held[Why.UNSOLVED]
-            anchored = keeper.anchored_anew
-        return Tally(self._plans, self._relaxed, failures, held, anchored, self._plan_ns[:], self._plan_at[:])
+            failures, anchored = keeper.held[Why.UNSOLVED], keeper.anchored_anew
+        return Tally(
+            self._plans, self._relaxed, failures, self._kept, anchored, self._plan_ns[:], self._plan_at[:]
+        )
+
+    @property
+    def _kept(self) -> int:
+        """How often an old plan was kept."""
+        certified = self._certified
+        return self.guard.held if certified is None else sum(certified.keeper.held.values())
 
     @property
     def bad_frames(self) -> int:
@@ -148,9 +160,21 @@ class Companion:
         shared = self._sharing.due(now, view, self.guard.horizon if certified is None else None)
         leaving = self.pilot.phase in (Phase.LAND, Phase.DONE)
         told = [] if certified is None else certified.messages(now, farewell=leaving)
+        said = self._said(now)
         return self._encode(
-            autopilot=[*commands, *setpoints, *shared.autopilot], swarm=shared.swarm + told, ground=answers
+            autopilot=[*commands, *setpoints, *shared.autopilot, *said["autopilot"]],
+            swarm=shared.swarm + told,
+            ground=[*answers, *said["ground"]],
         )
+
+    def _said(self, now: int) -> dict[str, list[Message]]:
+        """What the ground is told, by link: events and figures."""
+        if not (self.config.voice.texts or self.config.voice.values):
+            return _NOTHING
+        self.world.say(now, self.voice)
+        said: list[Message] = [*self.voice.due(now)]
+        said += self._dials.due(now, self._plan_ns, self._kept, self.world.target.age(now))
+        return {link: said if link in self.config.voice.links else [] for link in ("autopilot", "ground")}
 
     def _has_to_act(self, now: int) -> bool:
         """Under way there is nothing to do between two deadlines but to listen."""
@@ -318,9 +342,12 @@ class Companion:
     def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to; None when nobody knows."""
         try:
-            return self._destination(now, view, measured)
+            aim = self._destination(now, view, measured)
         except SurfaceError:
             return None
+        if aim is None or self.config.traffic is None:
+            return aim
+        return aim._replace(destination=self.world.sensed.aside(now, aim.destination, measured.position))
 
     def _destination(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to: the own goal, or the surface around the target where it will be at the end of the
@@ -370,6 +397,8 @@ class Companion:
             self.world.clock_steps,
         )
         for concern, begins in self.watch.look(situation):
+            if concern.name != "target":  # of that the world tells
+                self.voice.report(concern.severity, concern.text, begins=begins)
             if begins and concern.reaction is Reaction.RETURN:
                 self.pilot.come_back()
             if begins and concern.reaction is Reaction.LAND:

@@ -4,27 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from companion.config import CompanionConfig
+from companion.target_source import CameraSource, message_of, speaker_of
+
 AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1: other components of the vehicle have no say in where it is."""
+_DISTANCES, _TRAFFIC = 330, 246
+"""Sensors of the own system may be on both links; traffic may be told by anybody on the swarm's."""
 _WANTED = {
     "autopilot": {0, 1, 30, 32, 49, 77, 245, 253},
     "swarm": {33, 111, 385},
-    "target": {33},
     "ground": {75, 76},
 }
-LINKS = tuple(_WANTED)
+LINKS = ("autopilot", "swarm", "target", "ground")
 """The links of a companion."""
 
 
-def accepts(link: str, system: int, target: int) -> Callable[[int, int, int], bool]:
-    """Header filter of a link: the messages wanted there, from whom they may come."""
-    wanted = _WANTED[link]
+def accepts(link: str, system: int, target: int, config: CompanionConfig) -> Callable[[int, int, int], bool]:
+    """Header filter of a link of the companion of ``system``, whose target has the system id ``target``: the
+    messages wanted there, from whom they may come."""
+    wanted = _WANTED.get(link, set())
+    source = config.target_source
+    sensors = {_DISTANCES} if config.proximity is not None else set()
+    sensors |= {_TRAFFIC} if config.traffic is not None else set()
+    told, speaker = message_of(source), speaker_of(source, system, target)
     if link == "autopilot":
+        camera = told if isinstance(source, CameraSource) else None
         return lambda identifier, sender, component: (
-            identifier in wanted and sender == system and component == AUTOPILOT
+            (identifier in wanted and sender == system and component == AUTOPILOT)
+            or (identifier in sensors and sender == system)
+            or (identifier == camera and sender == speaker)
         )
     if link == "target":
-        return lambda identifier, sender, _component: identifier in wanted and sender == target
+        return lambda identifier, sender, _component: (
+            identifier == told and (speaker is None or sender == speaker)
+        )
     if link == "swarm":
-        return lambda identifier, sender, _component: identifier in wanted and sender != system
+        wanted = wanted | (sensors & {_TRAFFIC})
+        return lambda identifier, sender, _component: (
+            (identifier in wanted and sender != system) or (identifier in sensors and sender == system)
+        )
     return lambda identifier, _sender, _component: identifier in wanted

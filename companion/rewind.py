@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 
-from companion.estimator import Belief, Estimator, Six
+from companion.estimator import Belief, Estimator, Measured
 from companion.timing import Dated
 
 
@@ -22,12 +22,12 @@ class Rewind:
         self._window = window
         self._before: Belief | None = None
         self._times: list[int] = []
-        self._measured: list[Six] = []
+        self._measured: list[Measured] = []
         self._beliefs: list[Belief] = []
         self.belief: Belief | None = None
         self.too_late = 0
 
-    def put(self, dated: Dated, z: Six) -> bool:
+    def put(self, dated: Dated, z: Measured) -> bool:
         """Take a measurement ``z``; whether it became part of the belief.
 
         One from before the window is refused and counted. Of several with the same stamp the first counts:
@@ -50,7 +50,7 @@ class Rewind:
             self._forget()
         return before is None or belief.refused == before.refused
 
-    def _between(self, dated: Dated, z: Six) -> bool:
+    def _between(self, dated: Dated, z: Measured) -> bool:
         """Take a late measurement."""
         times, time = self._times, dated.time
         place = bisect_right(times, time)

@@ -68,16 +68,16 @@ class Track:
         """How often the sender's clock was found to be another."""
         return max(0, self._clock.laid - 1)
 
-    def measure(self, received: int, position: Array, velocity: Array, stamp: int = 0) -> bool:
+    def measure(self, received: int, position: Array, velocity: Array | None, stamp: int = 0) -> bool:
         """Take a measurement that arrived at ``received`` (µs) and left with ``stamp`` (µs of the sender's
         clock, 0 for none); whether it was accepted.
 
-        Position (3,) m, velocity (3,) m/s, fleet-local ENU as the message has it: the sign of a sender that
-        counts its vertical speed upwards is put right here. A late one is taken in its place as long as
-        ``rewind_us`` reaches; a duplicate changes nothing.
+        Position (3,) m, velocity (3,) m/s or None, fleet-local ENU as the message has it: the sign of a
+        sender that counts its vertical speed upwards is put right here. A late one is taken in its place as
+        long as ``rewind_us`` reaches; a duplicate changes nothing.
         """
         a, b, c = position.tolist()
-        d, e, f = velocity.tolist()
+        d, e, f = (0.0, 0.0, 0.0) if velocity is None else velocity.tolist()
         if not (a * a + b * b + c * c <= _FAR**2 and d * d + e * e + f * f <= _FAST**2):
             self._absurd += 1
             return False
@@ -85,6 +85,8 @@ class Track:
         if dated is None:
             self._undated += 1
             return False
+        if velocity is None:
+            return self._rewind.put(dated, (a, b, c))
         return self._rewind.put(dated, (a, b, c, d, e, -f if self._config.velocity_up else f))
 
     def when(self, received: int, stamp: int) -> int:

@@ -14,10 +14,8 @@ from companion.config import CompanionConfig
 from companion.guard import Holding
 from companion.pilot import Phase
 from companion.vehicle import CRITICAL, Vehicle
+from companion.voice import Severity
 from companion.world import View
-
-EMERGENCY, ALERT, WARNING, NOTICE, INFO = 0, 1, 4, 5, 6
-"""MAV_SEVERITY."""
 
 
 class Reaction(Enum):
@@ -34,7 +32,7 @@ class Concern(NamedTuple):
     name: str
     text: str
     reaction: Reaction = Reaction.TELL
-    severity: int = WARNING
+    severity: Severity = Severity.WARNING
 
 
 class Situation(NamedTuple):
@@ -132,7 +130,9 @@ class Watch:
         if left is None or left >= guard.battery_low or s.phase in _ON_THE_GROUND:
             return None
         if left < guard.battery_critical:
-            return Concern("battery critical", f"Battery {100 * left:.0f} %: landing", Reaction.LAND, ALERT)
+            return Concern(
+                "battery critical", f"Battery {100 * left:.0f} %: landing", Reaction.LAND, Severity.CRITICAL
+            )
         return Concern("battery low", f"Battery {100 * left:.0f} %: coming back", Reaction.RETURN)
 
     def _autopilot(self, s: Situation) -> Concern | None:
@@ -142,7 +142,9 @@ class Watch:
         if not s.vehicle.alive:
             return Concern("heartbeat", "Autopilot is not heard: no set-points")
         if s.phase is Phase.YIELDED:
-            return Concern("custody", "Vehicle taken over: no set-points until a go", severity=NOTICE)
+            return Concern(
+                "custody", "Vehicle taken over: no set-points until a go", severity=Severity.NOTICE
+            )
         if beat.system_status >= CRITICAL:
             return Concern("failsafe", "Autopilot reports a failsafe")
         return None
@@ -157,7 +159,7 @@ class Watch:
         if not (far or high):
             return None
         which = "too far from the origin" if far else "too high"
-        return Concern("fence", f"Fence: {which}, coming back", Reaction.RETURN, ALERT)
+        return Concern("fence", f"Fence: {which}, coming back", Reaction.RETURN, Severity.CRITICAL)
 
     def _lateness(self, s: Situation) -> Concern | None:
         if s.late > self._config.guard.late_us:

@@ -3,6 +3,7 @@ frame."""
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -13,16 +14,28 @@ from companion.horizon import Array
 from companion.moving import MovingObstacles
 from companion.neighbours import Neighbours
 from companion.obstacles import FixedObstacles
+from companion.reception import AUTOPILOT
+from companion.sensed import Sensed, Stance
+from companion.target import Target
 from companion.tracks import State, Track
-from mavlink_bridge.frames import FleetFrame, LocalFrame, ned_to_enu
+from companion.voice import Voice
+from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import (
+    AdsbVehicle,
     Attitude,
+    CameraTrackingGeo,
     GlobalPosition,
     GpsGlobalOrigin,
     LocalPosition,
     Message,
+    ObstacleDistance,
     Tunnel,
 )
+
+_ORIGIN = np.zeros(3)
+_ORIGIN.flags.writeable = False
+_STEEPEST = 0.1
+"""Cosine of a pitch beyond which a heading means nothing."""
 
 
 class View(NamedTuple):
@@ -55,7 +68,8 @@ class World:
         self._system = system
         self._target_system = target_system
         self._own = Track(config.own)
-        self._target = Track(config.target)
+        self.target = Target(config, system, target_system, fleet)
+        self.sensed = Sensed(config, fleet)
         self._fixed = FixedObstacles(config.obstacles)
         self._moving = MovingObstacles(config.moving)
         self._reach = reach(config)
@@ -63,10 +77,18 @@ class World:
         self._origin: tuple[float, float, float] | None = None
         self._yaw: float | None = None
         self._yaw_time = 0
+        self._yaw_rate = 0.0
 
     def hear(self, now: int, link: str, message: Message) -> None:
         """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
-        if link == "autopilot":
+        if link == "target" or isinstance(message, CameraTrackingGeo):
+            self.target.hear(now, link, message)
+        elif isinstance(message, ObstacleDistance):
+            self._hear_distances(now, message)
+        elif isinstance(message, AdsbVehicle):
+            own = self._own.at(now)
+            self.sensed.hear_traffic(now, message, _ORIGIN if own is None else own.position)
+        elif link == "autopilot":
             if message.source.system == self._system:
                 self._hear_own(now, message)
         elif link == "swarm":
@@ -74,16 +96,19 @@ class World:
                 self.neighbours.hear_position(now, message)
             elif isinstance(message, Tunnel):
                 self.neighbours.hear_plan(now, message)
-        elif link == "target" and isinstance(message, GlobalPosition):
-            self._hear_target(now, message)
 
     def at(self, now: int) -> View:
         """The view at ``now`` (µs); a target unheard of for too long is none."""
-        target = self._target.at(now)
-        if target is not None and target.age > self.config.guard.target_stale_us:
-            target = None
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
-        return View(self._own.at(now), yaw, target, self._local)
+        return View(self._own.at(now), yaw, self.target.at(now), self._local)
+
+    def say(self, now: int, voice: Voice) -> None:
+        """Let ``voice`` tell who has fallen silent, and who is back."""
+        if self.config.task == "escort" and self.target.age(now) is not None:
+            voice.watch(self.target.at(now) is None, "Target lost", "Target is back")
+        if self.sensed.proximity is not None:
+            silent = self.sensed.proximity.silent(now)
+            voice.watch(silent, "Obstacle sensor silent", "Obstacle sensor is back")
 
     @property
     def clock_steps(self) -> int:
@@ -116,7 +141,32 @@ class World:
             obstacles = obstacles.joined(
                 Obstacles(ids, positions, field.d_min + radius, field.d_safe + radius, radius)
             )
+        if config.proximity is not None or config.traffic is not None:
+            obstacles = obstacles.joined(self.sensed.obstacles(now, prediction, self._reach))
         return obstacles
+
+    def _hear_distances(self, now: int, message: ObstacleDistance) -> None:
+        """Of a sensor of the own system, placed where the vehicle was, and looked, when that was true."""
+        config, own, local = self.config, self._own.at(now), self._local
+        if config.proximity is None or message.source.system != self._system:
+            return
+        if own is None or local is None or own.age > config.guard.own_stale_us:
+            return
+        when = now - config.proximity.delay_us
+        if message.source.component == AUTOPILOT:
+            stamped = self._own.when(now, message.time)
+            when = stamped if now - config.proximity.age_us <= stamped <= now else when
+        place = own.position - 1e-6 * (now - when) * own.velocity
+        yaw, since = self._yaw, when - self._yaw_time
+        if yaw is not None and abs(since) <= config.guard.own_stale_us:
+            yaw += 1e-6 * since * self._yaw_rate
+        else:
+            yaw = None
+        most = config.neighbour.extrapolate_us
+        known = np.array(
+            [x + 1e-6 * min(when - time, most) * v for _, time, x, v in self.neighbours.last_heard()]
+        ).reshape(-1, 3)
+        self.sensed.hear_distances(now, message, Stance(when, place, yaw, local.yaw_to_fleet(0.0)), known)
 
     def _hear_own(self, now: int, message: Message) -> None:
         if isinstance(message, LocalPosition):
@@ -131,6 +181,7 @@ class World:
             if self._local is not None:
                 self._yaw = self._local.yaw_to_fleet(message.yaw)
                 self._yaw_time = self._own.when(now, message.time_boot)
+                self._yaw_rate = _turns(message)
         elif isinstance(message, GpsGlobalOrigin):
             origin = (message.latitude, message.longitude, message.altitude)
             if origin != self._origin:
@@ -139,8 +190,9 @@ class World:
                 # Where the vehicle was in the old frame must not be flown to in the new one.
                 self._own = Track(self.config.own)
 
-    def _hear_target(self, now: int, message: GlobalPosition) -> None:
-        if message.source.system != self._target_system:
-            return
-        position = self.fleet.to_enu(message.latitude, message.longitude, message.altitude)
-        self._target.measure(now, position, ned_to_enu(message.velocity_ned), message.time_boot)
+
+def _turns(attitude: Attitude) -> float:
+    """How fast the nose turns, rad/s, counter-clockwise from above."""
+    _, q, r = attitude.body_rates
+    level = max(cos(attitude.pitch), _STEEPEST)
+    return -(q * sin(attitude.roll) + r * cos(attitude.roll)) / level

@@ -22,6 +22,7 @@ from mavlink_bridge.fields import flight as f
 from mavlink_bridge.fields import missions as w
 from mavlink_bridge.fields import services as p
 from mavlink_bridge.fields import status as q
+from mavlink_bridge.fields import surroundings as r
 from mavlink_bridge.fields.units import Fields, unchanged
 
 
@@ -192,8 +193,12 @@ TABLE: tuple[Converter, ...] = (
     _row(m.SetHomePosition, 243, p.set_home, p.home_fields, size_v1=53),
     _row(m.MessageInterval, 244, _plain(m.MessageInterval)),
     _row(m.ExtendedSysState, 245, f.extended_sys_state, unchanged),
+    _row(m.AdsbVehicle, 246, r.adsb, r.adsb_fields),
+    _row(m.NamedValue, 251, r.named_value, r.named_value_fields),
     _row(m.StatusText, 253, f.status_text, f.status_text_fields, size_v1=51),
     _row(m.SetupSigning, 256, p.setup_signing, p.setup_signing_fields),
+    _row(m.CameraTrackingGeo, 276, r.camera_tracking, r.camera_tracking_fields),
+    _row(m.ObstacleDistance, 330, r.obstacle_distance, r.obstacle_distance_fields, finite=True),
     _row(m.Tunnel, 385, f.tunnel, f.tunnel_fields),
 )
 BY_ID: dict[int, Converter] = {row.id: row for row in TABLE}

@@ -17,6 +17,7 @@ from companion.config import CompanionConfig
 from companion.forces import Obstacles, limit, repulsion
 from companion.horizon import Array
 from companion.moving import MovingPost
+from companion.obstacles import Axes
 from companion.world import View, World
 
 _NEAREST_COUNTS = 20.0
@@ -42,7 +43,7 @@ class Strangers:
         own = config.certified
         self._vehicle = between(own, config.field, config.limits)
         away = margin(own, config.field, config.limits)
-        exact = config.field.d_min + away
+        self._exact = exact = config.field.d_min + away
         # Where such a thing says that it is counts as exact.
         self._things = {
             one.system: (exact + one.radius, isinstance(one, MovingPost)) for one in config.moving
@@ -86,21 +87,28 @@ class Strangers:
         middle = 0.5 * (ends[:-1] + ends[1:])
         return [(np.stack([ends[:-1], middle, ends[1:]], axis=1), np.full(self._steps, self._target))]
 
-    def field(self, seen: list[Stranger], own: Array) -> Array:
+    def field(self, seen: list[Stranger], own: Array, sensed: Axes | None = None) -> Array:
         """f (n, 3), m/s², after each step of the committed plan ``own`` (n, 3, 3): eqs. (8) and (9) for those
-        that fly on as they do until they are near."""
+        that fly on as they do until they are near, and for what is ``sensed`` beside its control points."""
         config = self._config
-        if not seen:
+        if sensed is None:
+            sensed = Axes((), np.empty((0, 3 * self._steps, 3)), np.empty(0))
+        if not seen and not sensed.ids:
             return np.zeros((self._steps, 3))
         knots = np.concatenate([own[:, 0], own[-1:, 2]])
-        there = np.stack([one.position + (one.age + self._seconds)[:, None] * one.velocity for one in seen])
-        for place, one in zip(there, seen, strict=True):
-            if one.upright:
-                place[:, 2] = knots[:, 2]
-        least = np.array([one.least for one in seen])
-        _stop_when_near(there, np.linalg.norm(knots - there, axis=-1), least)
+        places = sensed.positions.reshape(-1, self._steps, 3, 3)
+        there = np.concatenate([places[:, :, 0], places[:, -1:, 2]], axis=1)
+        least = self._exact + sensed.radius
+        if seen:
+            fly = np.stack([one.position + (one.age + self._seconds)[:, None] * one.velocity for one in seen])
+            for place, one in zip(fly, seen, strict=True):
+                if one.upright:
+                    place[:, 2] = knots[:, 2]
+            enough = np.array([one.least for one in seen])
+            _stop_when_near(fly, np.linalg.norm(knots - fly, axis=-1), enough)
+            there, least = np.concatenate([fly, there]), np.concatenate([enough, least])
         safe = least + config.field.d_safe - config.field.d_min
-        obstacles = Obstacles(tuple(range(len(seen))), there, least, safe)
+        obstacles = Obstacles(tuple(range(len(there))), there, least, safe)
         clamp, dt = _NEAREST_COUNTS * config.limits.a_total, 1e-6 * config.certified.dt_us
         force = repulsion(knots, obstacles, config.field.gain, clamp, config.field.braking, dt)
         return limit(force, config.limits.a_total)[1:]

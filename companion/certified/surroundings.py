@@ -11,7 +11,7 @@ from companion.certified.reach import between, fastest, margin
 from companion.certified.strangers import Strangers
 from companion.config import CompanionConfig
 from companion.horizon import Array
-from companion.obstacles import FixedObstacles, Post
+from companion.obstacles import Axes, FixedObstacles, Post
 from companion.world import View, World
 
 _STEPS_OF_SIGHT = 1.0
@@ -41,7 +41,8 @@ class Surroundings:
         members = ledger.members.union(ledger.left)
         seen = self._strangers.seen(epoch + self._config.certified.epoch_us, members, world)
         strangers = [*self._strangers.balls(seen, own), *self._strangers.target(view)]
-        alone = [*self._standing(own), *self._gone(own, ledger), *strangers]
+        sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
+        alone = [*self._standing(own), *self._gone(own, ledger), *strangers, *self._seen(sensed)]
         count, n = len(plans), self._steps
         controls = np.empty((count + len(alone), n, 3, 3))
         if plans:
@@ -50,7 +51,7 @@ class Surroundings:
         for index, (centres, radii) in enumerate(alone, count):
             controls[index], distance[index] = centres, radii
         others = Others(controls, distance, np.arange(len(controls)) < count)
-        return others, self._strangers.field(seen, own)
+        return others, self._strangers.field(seen, own, sensed)
 
     def _standing(self, own: Array) -> list[tuple[Array, Array]]:
         """Spheres about their centres; posts beside the vehicle, whatever its height: they count as if they
@@ -68,6 +69,16 @@ class Surroundings:
                 least = self._config.field.d_min + radius + self._margin
                 found.append((centres, np.full(self._steps, least)))
         return found
+
+    def _seen(self, sensed: Axes) -> list[tuple[Array, Array]]:
+        """What sensors see, and the ways of traffic: kept clear of as if it stood. One that comes into sight
+        within the committed plan is only yielded to."""
+        least = self._config.field.d_min + self._margin
+        places = sensed.positions.reshape(-1, self._steps, 3, 3)
+        return [
+            (place, np.full(self._steps, least + radius))
+            for place, radius in zip(places, sensed.radius, strict=True)
+        ]
 
     def _gone(self, own: Array, ledger: Ledger) -> list[tuple[Array, Array]]:
         """Those who said farewell are on the way down, or stand below: nobody flies over them."""

@@ -74,6 +74,12 @@ from mavlink_bridge.messages.status import (
     SimState,
     VfrHud,
 )
+from mavlink_bridge.messages.surroundings import (
+    AdsbVehicle,
+    CameraTrackingGeo,
+    NamedValue,
+    ObstacleDistance,
+)
 
 Message = (
     Heartbeat
@@ -132,14 +138,20 @@ Message = (
     | HighresImu
     | SimState
     | SetupSigning
+    | AdsbVehicle
+    | NamedValue
+    | CameraTrackingGeo
+    | ObstacleDistance
 )
 
 __all__ = [
+    "AdsbVehicle",
     "Altitude",
     "Attitude",
     "AttitudeQuaternion",
     "AutopilotVersion",
     "BatteryStatus",
+    "CameraTrackingGeo",
     "CommandAck",
     "CommandInt",
     "CommandLong",
@@ -170,6 +182,8 @@ __all__ = [
     "MissionRequestList",
     "MissionSetCurrent",
     "MissionWritePartialList",
+    "NamedValue",
+    "ObstacleDistance",
     "ParamRequestList",
     "ParamRequestRead",
     "ParamSet",

@@ -151,3 +151,34 @@ def test_bad_frames_are_counted():
     bench.step(Datagram("target", good[:-1] + bytes([good[-1] ^ 1])), Datagram("target", good))
     assert bench.companion.bad_frames == 1
     assert bench.companion.world.at(bench.now).target is not None
+
+
+@st.composite
+def seeming(draw, kinds):
+    """A frame of one of ``kinds`` whose fields are as likely at their ends as anywhere."""
+    row = draw(st.sampled_from([row for row in TABLE if row.id in kinds]))
+    size = row.struct.size
+    byte = st.sampled_from((0, 1, 2, 7, 12, 0x7F, 0x80, 0xFF)) | st.integers(0, 255)
+    payload = bytes(draw(st.lists(byte, min_size=24, max_size=24)) * (size // 24 + 1))[:size]
+    source = Source(draw(st.sampled_from((AUTOPILOT.system, TARGET, 12))), draw(st.sampled_from((1, 100))))
+    return frame_v2(row.id, row.crc_extra, source, draw(st.integers(0, 255)), payload)
+
+
+SENSED = st.tuples(st.sampled_from(("autopilot", "swarm", "target")), seeming({144, 246, 276, 330}))
+
+
+@pytest.mark.parametrize("kind", ["follow_target", "camera"])
+@QUICK
+@given(told=st.lists(SENSED, min_size=1, max_size=12))
+def test_whatever_sensors_receivers_and_cameras_say_no_set_point_leaves_the_limits(kind, told):
+    bench = Bench(
+        task="escort", target_source={"kind": kind}, proximity={}, traffic={}, voice={"texts": True}
+    ).take_off(5.0)
+    sent = []
+    for link, frame in told:
+        sent += bench.step(Datagram(link, frame))
+    sent += bench.fly(0.3)
+    found = only(SetpointLocal, sent)
+    assert np.isfinite([numbers_of(m) for m in found]).all()
+    assert max(np.abs(m.velocity).max() for m in found) <= max(bench.config.limits.v_max) + 0.1
+    assert bench.phase is Phase.ESCORT

@@ -13,7 +13,7 @@ from companion.tracks import State
 from companion.vehicle import Vehicle
 from companion.watch import Reaction, Situation, Watch
 from companion.world import View
-from mavlink_bridge.messages import CommandLong, Heartbeat, SetpointLocal, SysStatus
+from mavlink_bridge.messages import CommandLong, Heartbeat, SetpointLocal, StatusText, SysStatus
 
 SECOND = 1_000_000
 LOCAL = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
@@ -192,3 +192,14 @@ def test_a_neighbour_that_is_silent_is_said_and_still_kept_away_from(flying):
     flying.fly(6.0)
     assert np.linalg.norm(flying.autopilot.position - [3.0, 0.0, 5.0]) > CONFIG.field.d_min
     assert only(SetpointLocal, flying.fly(0.5), "autopilot")
+
+
+def test_the_ground_is_told_of_what_begins_and_of_what_is_over():
+    bench = Bench(voice={"texts": True}).take_off(5.0)
+    bench.autopilot.battery = 0.15
+    sent = bench.fly(2.0)
+    texts = [m.text for m in only(StatusText, sent, "ground")]
+    assert texts == ["Battery 15 %: coming back"]
+    bench.autopilot.battery = 0.5
+    texts = [m.text for m in only(StatusText, bench.fly(3.0), "ground")]
+    assert texts == ["Over: Battery 15 %"]

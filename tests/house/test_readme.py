@@ -33,8 +33,16 @@ def test_its_surfaces_are_some() -> None:
         CompanionConfig.model_validate({"surface": yaml.safe_load(other)})
 
 
+def test_what_tells_of_the_target_and_of_obstacles_can_be_told() -> None:
+    found = shown("scenario-1", 1).companion
+    assert found.target_source.kind == "follow_target"
+    assert found.proximity is not None
+    assert found.traffic is not None
+    assert found.voice.texts
+
+
 def test_its_rough_world_is_one() -> None:
-    found = shown("antipodal-8", 1)
+    found = shown("antipodal-8", 2)
     assert found.faults
     assert found.weather.wind == (6.0, 0.0, 0.0)
 

@@ -15,6 +15,7 @@ from wire_values import (
     scaled,
     signed,
     source,
+    speed,
     u8,
     u16,
     u32,
@@ -140,4 +141,61 @@ STATUS: Kinds = {
     m.HighresImu: st.builds(m.HighresImu, source, u64, vector(f32), vector(f32), vector(f32), f32, f32, f32),
     m.SimState: st.builds(m.SimState, source, f32, f32, f32, vector(f32), vector(f32), latitude, longitude),
     m.EstimatorStatus: st.builds(m.EstimatorStatus, source, u64, *[f32] * 8, u16),
+}
+
+
+# Composites, for Hypothesis finds strategies that are spelt out at length too long.
+@st.composite
+def traffic(draw: st.DrawFn) -> m.AdsbVehicle:
+    callsign = st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=8)
+    return m.AdsbVehicle(
+        draw(source),
+        draw(u32),
+        draw(latitude),
+        draw(longitude),
+        draw(st.none() | millimetres),
+        draw(st.booleans()),
+        draw(yaw),
+        draw(st.none() | scaled(u16, 1e2)),
+        draw(st.none() | scaled(signed(16), 1e2)),
+        draw(callsign),
+        draw(u8),
+        draw(u8) * 1_000_000,
+    )
+
+
+@st.composite
+def scans(draw: st.DrawFn) -> m.ObstacleDistance:
+    distance, degrees = st.none() | scaled(st.integers(0, 65534), 1e2), st.floats(-360, 360, width=32)
+    # Mostly alike, as those of sensors with few sectors are: 72 of all kinds are slow to draw.
+    some, rest = draw(st.lists(distance, max_size=8)), draw(distance)
+    return m.ObstacleDistance(
+        draw(source),
+        draw(u64),
+        draw(u8),
+        (*some, *[rest] * (72 - len(some))),
+        math.radians(draw(degrees)),
+        draw(u16) / 1e2,
+        draw(u16) / 1e2,
+        math.radians(draw(degrees)),
+        draw(u8),
+    )
+
+
+@st.composite
+def tracked(draw: st.DrawFn) -> m.CameraTrackingGeo:
+    velocity: Any = draw(st.none() | vector(speed))
+    return m.CameraTrackingGeo(draw(source), draw(u8), draw(latitude), draw(longitude), draw(f32), velocity)
+
+
+@st.composite
+def figures(draw: st.DrawFn) -> m.NamedValue:
+    return m.NamedValue(draw(source), draw(boot), draw(name)[:10], draw(f32))
+
+
+SURROUNDINGS: Kinds = {
+    m.AdsbVehicle: traffic(),
+    m.NamedValue: figures(),
+    m.CameraTrackingGeo: tracked(),
+    m.ObstacleDistance: scans(),
 }

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from service_values import MISSIONS, SERVICES, STATUS
+from service_values import MISSIONS, SERVICES, STATUS, SURROUNDINGS
 from wire_values import (
     boot,
     f32,
@@ -103,6 +103,7 @@ KINDS: dict[type[m.Message], st.SearchStrategy[Any]] = {
     **SERVICES,
     **MISSIONS,
     **STATUS,
+    **SURROUNDINGS,
 }
 # What version 1 leaves out reads as zero.
 EXTENSIONS: dict[type[m.Message], dict[str, Any]] = {
@@ -481,3 +482,35 @@ def test_sound_messages_that_are_in_no_table_count_as_filtered() -> None:
     codec = Codec()
     assert codec.feed(frame) == []
     assert codec.counters == (0, 0, 0, 1, 0, 0)
+
+
+def test_sectors_of_whole_degrees_and_sound_distances_alone() -> None:
+    peer = dialect.MAVLink(None, srcSystem=3)
+    distances = [0, 150, 65535, 2001] + [65535] * 68
+    scan = dialect.MAVLink_obstacle_distance_message(7, 0, distances, 5, 20, 2000, 0.0, -10.0, 12)
+    (message,) = Codec().feed(scan.pack(peer))
+    assert isinstance(message, m.ObstacleDistance)
+    assert message.distances[:4] == (0.0, 1.5, None, 20.01)
+    assert math.degrees(message.increment) == pytest.approx(5.0)
+    assert math.degrees(message.offset) == pytest.approx(-10.0)
+    scan.increment_f = math.nan
+    codec = Codec()
+    assert codec.feed(scan.pack(peer)) == []
+    assert codec.counters.bad == 1
+
+
+def test_a_figure_that_is_none_is_neither_sent_nor_heard() -> None:
+    with pytest.raises(EncodeError, match="value = nan"):
+        wire(m.NamedValue(ME, 0, "plan_ms", math.nan))
+    with pytest.raises(EncodeError, match="longer than 10"):
+        wire(m.NamedValue(ME, 0, "much too long", 1.0))
+    peer = dialect.MAVLink(None, srcSystem=3)
+    frame = dialect.MAVLink_named_value_float_message(0, b"plan_ms", math.inf).pack(peer)
+    assert Codec().feed(frame) == []
+
+
+def test_a_tracked_target_of_unknown_velocity_is_one_nevertheless() -> None:
+    peer = dialect.MAVLink(None, srcSystem=3)
+    unknown = (math.nan,) * 9
+    frame = dialect.MAVLink_camera_tracking_geo_status_message(1, 470000000, 80000000, 450.0, *unknown)
+    assert Codec().feed(frame.pack(peer)) == [m.CameraTrackingGeo(m.Source(3, 0), 1, 47.0, 8.0, 450.0, None)]

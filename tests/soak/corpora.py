@@ -63,6 +63,12 @@ def plan(fingerprint: int, epoch: int = NOW) -> Tunnel:
     return Tunnel(NEIGHBOUR, 0, 0, PAYLOAD_TYPE, pack(wire))
 
 
+def scan(boot: int) -> m.ObstacleDistance:
+    """A wall ahead, nothing beside it, and half a circle that is not looked at."""
+    distances = (4.0, 4.1, 4.3, *[20.01] * 30, *[None] * 39)
+    return m.ObstacleDistance(AUTOPILOT, boot, 0, distances, math.radians(5.0), 0.2, 20.0, 0.0, 12)
+
+
 def absurd_plan(random: Random, fingerprint: int, epoch: int) -> Tunnel:
     """A plan that fits the wire and no vehicle: numbers at the ends of their ranges, steps of any length, or
     some of its bytes lost or changed."""
@@ -153,6 +159,12 @@ def messages(fingerprint: int = 0, now: int = NOW) -> tuple[Known, ...]:
         Known("autopilot", EkfStatus(AUTOPILOT, 0x3F)),
         Known("autopilot", ExtendedSysState(AUTOPILOT, 0, 2)),
         Known("autopilot", StatusText(AUTOPILOT, 4, "Arming refused: no position yet")),
+        Known("autopilot", m.NamedValue(COMPANION, boot, "plan_ms", 3.5)),
+        Known("autopilot", m.CameraTrackingGeo(Source(11, 100), 1, *place, (0.0, 1.0, 0.0))),
+        Known("autopilot", scan(boot)),
+        Known(
+            "swarm", m.AdsbVehicle(Source(11, 156), 0x4B1234, *place, True, 1.0, 60.0, 0.0, "HB", 1, 10**6)
+        ),
         Known("swarm", plan(fingerprint, now)),
         *(Known("autopilot", message) for message in services()),
     )
