@@ -18,7 +18,8 @@ _GEOMETRIC = 1
 
 
 def _text(data: bytes) -> str:
-    return data.split(b"\0", 1)[0].decode("ascii", errors="replace")
+    """What is not ASCII is a question mark, as it is on the way out."""
+    return data.split(b"\0", 1)[0].decode("ascii", errors="replace").replace("\ufffd", "?")
 
 
 def _bytes(field: str, text: str, most: int) -> bytes:

@@ -8,6 +8,8 @@ from typing import Final, TypeVar, cast
 from companion.vehicle import INVALID, PREARM_OK, Vehicle
 from mavlink_bridge.framing import Frame
 from mavlink_bridge.messages import (
+    Attitude,
+    AttitudeQuaternion,
     AutopilotVersion,
     EkfStatus,
     EstimatorStatus,
@@ -18,9 +20,11 @@ from mavlink_bridge.messages import (
     LocalPosition,
     Message,
     ParamValue,
+    PositionTarget,
     Source,
     StatusText,
     SysStatus,
+    SystemTime,
 )
 from outrider.doctor.boot_clock import BootClock
 from outrider.doctor.condition import Condition
@@ -59,6 +63,10 @@ class Stream:
     def rate(self) -> float:
         """Per second of the listener; 0 for fewer than two."""
         return (self.count - 1) / ((self.last - self.first) * 1e-6) if self.last > self.first else 0.0
+
+
+_CLOCKED = (Attitude, AttitudeQuaternion, GlobalPosition, LocalPosition, PositionTarget, SystemTime)
+"""Those whose stamp is of the autopilot's one clock; RAW_IMU's, for one, is of a sensor's."""
 
 
 class Speaker:
@@ -130,9 +138,8 @@ class Speaker:
         return self.heartbeat is not None and self.heartbeat.type == GROUND_STATION
 
     def _note(self, now: int, message: Message) -> None:
-        boot = getattr(message, "time_boot", None)
-        if isinstance(boot, int) and boot:
-            self.clock.tell(now, message, boot)
+        if isinstance(message, _CLOCKED) and message.time_boot:
+            self.clock.tell(now, message, message.time_boot)
         guided = self.vehicle.armed and self.vehicle.in_guided_mode
         self.vehicle.hear(message)
         self.vehicle.tick(now)
