@@ -21,7 +21,7 @@ from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
 from companion.plan_log import PlanLog
 from companion.planner import Aim, Plan, Planner, standing
 from companion.reception import LINKS, accepts
-from companion.setpoint import setpoint
+from companion.setpoint import is_finite, setpoint
 from companion.settling import Settling
 from companion.sharing import Sharing
 from companion.watch import Reaction, Situation, Watch
@@ -112,6 +112,8 @@ class Companion:
         self._plan_ns = array("I")
         self._plan_at = array("q")
         self.plan_log = PlanLog()
+        self.not_finite = 0
+        """Set-points that were none, and were not sent."""
 
     @property
     def tally(self) -> Tally:
@@ -405,8 +407,14 @@ class Companion:
         time = now + self.config.setpoint_lead_us
         since_boot = now - (now if self._boot is None else self._boot)
         yaw = self._heading.at(time)
+        message = setpoint(time, since_boot, horizon, yaw, view.local, self._source, profile.setpoint_mask)
+        if not is_finite(message):
+            # Nothing of it may leave: the plan begins anew where the vehicle is measured to be.
+            self.not_finite += 1
+            self.guard.horizon = None
+            return []
         self.pilot.streamed(now)
-        return [setpoint(time, since_boot, horizon, yaw, view.local, self._source, profile.setpoint_mask)]
+        return [message]
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:
         out = []

@@ -63,6 +63,8 @@ class World:
         self._origin: tuple[float, float, float] | None = None
         self._yaw: float | None = None
         self._yaw_time = 0
+        self.stamp = 0
+        """The last time (µs since its boot) that the own autopilot told, 0 before the first."""
 
     def hear(self, now: int, link: str, message: Message) -> None:
         """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
@@ -119,6 +121,8 @@ class World:
         return obstacles
 
     def _hear_own(self, now: int, message: Message) -> None:
+        if isinstance(message, LocalPosition | Attitude):
+            self.stamp = message.time_boot
         if isinstance(message, LocalPosition):
             if self._local is not None:
                 self._own.measure(
