@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from companion.autopilots import is_guided
+from companion.autopilots import Profile
+from companion.autopilots.px4 import PX4
 from companion.calls import ACCEPTED
 from companion.node import COMPONENT
 from companion.reception import AUTOPILOT
@@ -46,7 +47,7 @@ class LastWord:
         )
         self._until: int | None = None
         self._next = 0
-        self._asked = False
+        self._asked = self._fresh = False
 
     @property
     def over(self) -> bool:
@@ -66,21 +67,34 @@ class LastWord:
                     answer = message.result if message.command == DO_SET_MODE and self._asked else answer
                 else:
                     self._vehicle.hear(message)
-        profile, beat = self._vehicle.profile, self._vehicle.heartbeat
-        if self.over:
-            return []
-        if profile is None or beat is None or not self._vehicle.armed or not is_guided(profile, beat):
-            self.said = f"holds ({profile.hold_name})" if self._asked and profile is not None else "not ours"
-            return []
-        if answer == ACCEPTED:
-            self.said = f"holds ({profile.hold_name})"
-            return []
-        if now >= self._until:
-            self.said = f"did not take {profile.hold_name}"
-            return []
-        if now < self._next:
+                    self._fresh = True
+        if not self.over:
+            self.said = self._verdict(now, answer)
+        if self.over or not self._steered or now < self._next:
             return []
         self._next, self._asked = now + _AGAIN, True
-        params = (*profile.hold_params, 0.0, 0.0, 0.0, 0.0)
+        params = (*self._profile.hold_params, 0.0, 0.0, 0.0, 0.0)
         order = CommandLong(self._own, self._own.system, AUTOPILOT, DO_SET_MODE, 0, params)
         return [Datagram("autopilot", self._codec.encode(order))]
+
+    def _verdict(self, now: int, answer: int | None) -> str:
+        """What came of it; empty while that is not known."""
+        if not self._vehicle.armed:
+            return "not armed"
+        if not self._steered:
+            if self._asked:
+                return f"holds ({self._profile.hold_name})"
+            # What the companion heard last may be a moment old.
+            return "not ours" if self._fresh or now >= (self._until or 0) else ""
+        if answer == ACCEPTED:
+            return f"holds ({self._profile.hold_name})"
+        return f"did not take {self._profile.hold_name}" if now >= (self._until or 0) else ""
+
+    @property
+    def _profile(self) -> Profile:
+        return self._vehicle.profile or PX4
+
+    @property
+    def _steered(self) -> bool:
+        """Whether our set-points steer it."""
+        return self._vehicle.armed and self._vehicle.in_guided_mode

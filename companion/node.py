@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from companion.settling import Settling
 from companion.sharing import Sharing
 from companion.watch import Reaction, Situation, Watch
 from companion.world import View, World
-from mavlink_bridge.codec import Codec
+from mavlink_bridge.codec import Codec, Counters
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source, Timesync, Tunnel
 from mavlink_bridge.node import Datagram
@@ -124,6 +124,23 @@ class Companion:
             held, failures = sum(keeper.held.values()), keeper.held[Why.UNSOLVED]
             anchored = keeper.anchored_anew
         return Tally(self._plans, self._relaxed, failures, held, anchored, self._plan_ns[:], self._plan_at[:])
+
+    def shed(self) -> Sequence[int]:
+        """Take the stopwatch's readings (ns) away, and the plan log with them: for who runs for days."""
+        taken, self._plan_ns = self._plan_ns, array("I")
+        self._plan_at = array("q")
+        self.plan_log = PlanLog()
+        return taken
+
+    @property
+    def system(self) -> int:
+        """The vehicle's system id, and its own."""
+        return self._source.system
+
+    @property
+    def counters(self) -> Mapping[str, Counters]:
+        """What became of the bytes of each link."""
+        return {link: codec.counters for link, codec in self._codecs.items()}
 
     @property
     def bad_frames(self) -> int:

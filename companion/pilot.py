@@ -26,6 +26,8 @@ __all__ = ["NAV_LAND", "NAV_TAKEOFF", "Phase", "Pilot"]
 
 NAV_LAND = 21
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
+OPERATORS_GO = "the operator's go"
+"""What it waits for when all else is ready."""
 _NAN = float("nan")
 _FAR = 20_000.0
 """m between the fleet origin and the autopilot's own: beyond, one of the two is wrong."""
@@ -282,7 +284,7 @@ class Pilot:
         if not all(self._calls.answered(*call) for call in _NEEDED):
             return "the autopilot's answers to SET_MESSAGE_INTERVAL"
         if self._height is None:
-            return "the operator's go"
+            return OPERATORS_GO
         return ""
 
     def _prepare(self, now: int, view: View) -> list[Message]:
