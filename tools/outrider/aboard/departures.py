@@ -6,12 +6,13 @@ from collections import Counter
 from struct import Struct
 from typing import Final
 
+from companion.config import LimitsConfig
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.framing import leading_frames
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.runtime import Direction
-from outrider.aboard.gauge import SetpointGauge
+from outrider.aboard.gauge import gauge_for
 
 _COMMAND_LONG, _SETPOINT = 76, 84
 _COMMAND: Final = Struct("<28xH")
@@ -20,10 +21,10 @@ _COMMAND: Final = Struct("<28xH")
 class Departures:
     """``messages`` by link, ``commands`` to the autopilot by their number, and ``setpoints``."""
 
-    def __init__(self) -> None:
+    def __init__(self, limits: LimitsConfig) -> None:
         self.messages: Counter[str] = Counter()
         self.commands: Counter[int] = Counter()
-        self.setpoints = SetpointGauge()
+        self.setpoints = gauge_for(limits)
         self.newest: SetpointLocal | None = None
         self._codec = Codec(lambda identifier, _system, _component: identifier == _SETPOINT)
 

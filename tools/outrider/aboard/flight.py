@@ -70,11 +70,11 @@ class Flight:
     def run(self) -> None:
         """From the first heartbeat to the end; ``ended`` then says why, ``fault`` whether it should not
         have. InputError for an autopilot that is not the own one."""
+        desk, orders = intercom()
+        crew = Crew(Worker(self.asked, self._wiring.ends, orders, self._directory))
         if not self._identify():
             return
         self._wiring.drain()
-        desk, orders = intercom()
-        crew = Crew(Worker(self.asked, self._wiring.ends, orders, self._directory))
         try:
             self.diary.note("process", f"the companion flies in process {crew.start()}")
             orders.release()

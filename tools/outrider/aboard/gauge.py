@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from math import dist, hypot, isfinite
 
+from companion.config import LimitsConfig
 from companion.setpoint import FRAME_LOCAL_NED, is_finite
 from mavlink_bridge.messages import SetpointLocal, Vector
 
@@ -14,12 +15,14 @@ TOGETHER = 100_000
 
 
 class SetpointGauge:
-    """Told each set-point with its time (µs)."""
+    """Told each set-point with its time (µs). None may be faster than ``fastest`` (m/s) and accelerate harder
+    than ``hardest`` (m/s²), nor jump by more than that explains."""
 
-    def __init__(self) -> None:
+    def __init__(self, fastest: float, hardest: float) -> None:
         self.count = self.gaps = 0
         self.finite = True
-        self.step = self.speed = self.acceleration = 0.0
+        self.step = self.speed = self.acceleration = self.jump = 0.0
+        self._fastest, self._hardest = fastest, hardest
         self.masks: Counter[int] = Counter()
         self.frames: Counter[int] = Counter()
         self._last: tuple[int, Vector] | None = None
@@ -39,7 +42,9 @@ class SetpointGauge:
             if now - before > TOGETHER:
                 self.gaps += 1
             else:
-                self.step = max(self.step, dist(place, message.position))
+                step = dist(place, message.position)
+                self.step = max(self.step, step)
+                self.jump = max(self.jump, step - self._fastest * (now - before) * 1e-6)
         self._last = now, message.position
 
     @property
@@ -59,19 +64,22 @@ class SetpointGauge:
             "frames": {str(frame): n for frame, n in sorted(self.frames.items())},
         }
 
-    def faults(self, mask: int, speed: float, acceleration: float) -> list[str]:
-        """What is wrong with them for an autopilot that takes ``mask``; none may be faster than ``speed``
-        (m/s) and accelerate harder than ``acceleration`` (m/s²), nor jump by more than that explains."""
-        step = 0.02 * speed + _CORRECTED
+    def faults(self, mask: int) -> list[str]:
+        """What is wrong with them for an autopilot that takes ``mask``."""
         wrong = {
             "not all are finite": not self.finite,
             f"type masks other than 0x{mask:03X}": bool(set(self.masks) - {mask}),
             f"frames other than {FRAME_LOCAL_NED}": bool(set(self.frames) - {FRAME_LOCAL_NED}),
-            f"faster than {speed:.1f} m/s": self.speed > speed + _ROUNDED,
-            f"more than {acceleration:.1f} m/s²": self.acceleration > acceleration + _ROUNDED,
-            f"steps of more than {step:.2f} m": self.step > step,
+            f"faster than {self._fastest:.1f} m/s": self.speed > self._fastest + _ROUNDED,
+            f"more than {self._hardest:.1f} m/s²": self.acceleration > self._hardest + _ROUNDED,
+            f"a jump of {self.jump:.2f} m": self.jump > _CORRECTED,
         }
         return [what for what, is_so in wrong.items() if is_so]
+
+
+def gauge_for(limits: LimitsConfig) -> SetpointGauge:
+    """For a companion with these limits."""
+    return SetpointGauge(hypot(*limits.v_max), limits.a_total)
 
 
 _ROUNDED = 1e-3

@@ -12,7 +12,7 @@ from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.tlog import read_tlog
-from outrider.aboard.gauge import SetpointGauge
+from outrider.aboard.gauge import gauge_for
 from outrider.aboard.request import Request
 from outrider.errors import InputError
 from outrider.replaying.casting import Cast, survey
@@ -20,6 +20,7 @@ from outrider.replaying.findings import document_of, leave
 from outrider.replaying.rehearsal import rehearse
 from outrider.run_directories import new_directory
 from outrider.saying import say
+from outrider.share_progress import share_progress
 
 _FAR = 20_000.0
 """m from the fleet origin: no flight of this fleet's."""
@@ -43,15 +44,18 @@ def rehearsed(asked: Request, log: Path) -> int:
         mask = _mask(log, config.system)
         target = config.target if config.target in seen.placed else None
         cast = Cast(config.system, None, target)
-        found = rehearse(config.settings, cast, seen, read_tlog(log), fleet=fleet)
+        with share_progress() as watch:
+
+            def told(now: int, _read: int) -> None:
+                watch(log.name, (now - seen.begin) / max(seen.end - seen.begin, 1))
+
+            found = rehearse(config.settings, cast, seen, read_tlog(log), told, fleet)
     except LogError as error:
         raise InputError(f"--autopilot: {error}") from None
-    gauge = SetpointGauge()
+    gauge = gauge_for(config.settings.limits)
     for now, message in found.would:
         gauge.take(now, message)
-    limits = config.settings.limits
-    speed = sum(axis * axis for axis in limits.v_max) ** 0.5
-    faults = gauge.faults(mask, speed, limits.a_total)
+    faults = gauge.faults(mask)
     document = {
         "system": config.system,
         "dry_run": True,

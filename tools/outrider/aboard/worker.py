@@ -83,7 +83,7 @@ class Worker:
         wall = WallClock()
         followed = FollowedClock(wall, wall.now()) if asked.config.clock == "autopilot" else None
         cockpit = Cockpit(node, wall, followed, self._signing)
-        departures = Departures()
+        departures = Departures(node.config.limits)
         news = News(node, departures, followed, self._signing, self._orders.tell)
         recorder = Recorder(self._directory, [asked.system], files)
         links: dict[str, Link | Sequence[Link]] = {
@@ -123,9 +123,8 @@ class Worker:
         node, statistics = self._companion, loop.statistics
         for reading in node.shed():
             news.plan_times.add(reading // 1000)
-        profile, limits = node.pilot.profile, node.config.limits
+        profile = node.pilot.profile
         mask = 0 if profile is None else profile.setpoint_mask
-        speed = sum(axis * axis for axis in limits.v_max) ** 0.5
         self._orders.tell(
             kind="figures",
             plans=node.tally.plans,
@@ -136,7 +135,7 @@ class Worker:
             held_epochs=node.tally.held,
             not_finite=node.not_finite,
             setpoints=departures.setpoints.facts,
-            setpoint_faults=departures.setpoints.faults(mask, speed, limits.a_total),
+            setpoint_faults=departures.setpoints.faults(mask),
             commands={str(command): count for command, count in sorted(departures.commands.items())},
             messages={
                 "sent": dict(departures.messages),
