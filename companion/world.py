@@ -88,6 +88,15 @@ class World:
         return View(self._own.at(now), yaw, target, self._local)
 
     @property
+    def simulated(self) -> bool:
+        """Whether the autopilot's clock is a simulation's, which may stand for a moment."""
+        return self._own.brief
+
+    @simulated.setter
+    def simulated(self, value: bool) -> None:
+        self._own.brief = value
+
+    @property
     def clock_steps(self) -> int:
         """How often the autopilot's clock was found to be another."""
         return self._own.clock_steps
@@ -141,7 +150,8 @@ class World:
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
                 # Where the vehicle was in the old frame must not be flown to in the new one.
-                self._own = Track(self.config.own)
+                simulated, self._own = self.simulated, Track(self.config.own)
+                self.simulated = simulated
 
     def _hear_target(self, now: int, message: GlobalPosition) -> None:
         if message.source.system != self._target_system:

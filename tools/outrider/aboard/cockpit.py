@@ -46,4 +46,5 @@ class Cockpit:
         if self._followed is not None and stamp != self._stamp:
             self._stamp = stamp
             self._followed.observe(wall, stamp)
+            self.companion.world.simulated = self._followed.simulated
         return leaving

@@ -141,6 +141,10 @@ class Flight:
                 self.state = State(**news)
                 self.waiting = self.state.waiting
             elif kind == "event":
+                if news["what"] == "waiting":
+                    self.waiting = news["text"]
+                elif news["what"] == "phase":
+                    self.state, self.waiting = self.state._replace(phase=news["text"]), ""
                 self.diary.note(news["what"], news["text"], news["at"])
             elif kind == "figures":
                 self.figures = news
@@ -162,7 +166,7 @@ class Flight:
                     self._order(word, desk)
             if answer:
                 self.diary.note("answer", answer)
-        ready = self.state.phase == Phase.CONNECT.value and self.state.waiting == OPERATORS_GO
+        ready = self.state.phase == Phase.CONNECT.value and self.waiting == OPERATORS_GO
         if desk is not None and self.asked.go and ready and not self._go_given:
             self._go_given = True
             self._order("go", desk)
@@ -172,7 +176,7 @@ class Flight:
         if self.asked.dry_run:
             return f"{word}: a dry run takes no orders; allowed: {QUIT}"
         on_the_ground = self.state.phase == Phase.CONNECT.value
-        if desk is None or (word == "go" and on_the_ground and self.state.waiting != OPERATORS_GO):
+        if desk is None or (word == "go" and on_the_ground and self.waiting != OPERATORS_GO):
             return f"{word}: not yet: it waits for {self.waiting}"
         return ""
 
