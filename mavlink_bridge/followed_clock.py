@@ -99,6 +99,11 @@ class FollowedClock:
             self._gather(_Seen(wall, stamp))
 
     @property
+    def known(self) -> bool:
+        """Whether its rate is known: since when there were stamps for a second."""
+        return self._known
+
+    @property
     def simulated(self) -> bool:
         """Whether its rate is none of a real clock's."""
         return abs(self.rate - 1.0) > _REAL

@@ -42,6 +42,12 @@ class Dealer:
                 if own:
                     end.put(b"".join(own))
 
+    def forget(self) -> None:
+        """What has arrived at all ends until now."""
+        self.read()
+        for end in self.ends.values():
+            end.clear()
+
     def leave(self) -> None:
         """One end is closed."""
         self._open -= 1
@@ -77,6 +83,11 @@ class DealtLink:
         while self._bytes > ROOM or len(self._waiting) > WAITING:
             self._bytes -= len(self._waiting.popleft())
 
+    def clear(self) -> None:
+        """Forget what waits."""
+        self._waiting.clear()
+        self._bytes = 0
+
     def receive(self) -> list[bytes]:
         """What has been dealt to it."""
         if not self._open:
@@ -97,5 +108,5 @@ class DealtLink:
         """This end."""
         if self._open:
             self._open = False
-            self._waiting.clear()
+            self.clear()
             self._dealer.leave()

@@ -106,8 +106,8 @@ class Flying:
     @property
     def pilot(self) -> int:
         """The process that flies."""
-        (event,) = (event for event in self.events if event["what"] == "process")
-        return int(event["text"].rpartition(" ")[2])
+        last = [event["text"] for event in self.events if event["what"] == "process"][-1]
+        return int(last.rpartition(" ")[2])
 
     def end(self, which: signal.Signals | None = None) -> tuple[int, dict[str, Any]]:
         """Status and summary; with a signal first, or by itself."""

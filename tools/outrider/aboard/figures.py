@@ -23,6 +23,7 @@ def summary(flight: Flight, directory: Path) -> dict[str, object]:
         "signed": asked.key is not None,
         "ended": flight.ended,
         "fault": flight.fault,
+        "restarts": [{"wall_s": lost, "why": why} for lost, why in flight.restarts],
         "last_word": flight.last_word or None,
         "phases": [{"phase": phase, "wall_s": began} for phase, began in diary.phases],
         "concerns": dict(diary.concerns),

@@ -1,5 +1,8 @@
 """One flight, as seen by the process that looks after it: it hears who is there, lets the other fly, hands
-orders on, and has the last word when that ends, whatever the reason."""
+orders on, and has the last word when that ends, whatever the reason.
+
+Where that was no order, another process follows. It flies nothing without a new go, but tells the others
+where the vehicle is that holds its place among them."""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ from mavlink_bridge.signing import Signing
 from outrider.aboard.crew import Crew
 from outrider.aboard.diary import Diary
 from outrider.aboard.identify import Identification
-from outrider.aboard.intercom import Desk, intercom
+from outrider.aboard.intercom import Desk, OrderLink, intercom
 from outrider.aboard.news import State
 from outrider.aboard.orders import QUIT, Orders, understood
 from outrider.aboard.request import Request
@@ -32,6 +35,9 @@ LOOK: Final = 0.05
 """s between two looks."""
 HUNG: Final = 2.0
 """s without news after which the process that flies is taken for hung."""
+MOST: Final = 5
+WITHIN: Final = 60.0
+"""So many processes lost in so many seconds are the end."""
 _LEAVING: Final = 2.0
 """s that it has to stop flying when it is told to."""
 _QUICK: Final = 0.01
@@ -57,6 +63,8 @@ class Flight:
         self.figures: dict[str, Any] = {}
         self.ended = ""
         self.fault = False
+        self.restarts: list[tuple[float, str]] = []
+        """When (s) a process that flew was lost, and why."""
         self.last_word = ""
         self._wiring, self._directory = wiring, directory
         self._typed, self._stops, self._look = typed, stops, look
@@ -66,22 +74,37 @@ class Flight:
         self._began = time.monotonic()
         self._heard = 0.0
         self._left = self._go_given = False
+        self._trouble = ""
 
     def run(self) -> None:
         """From the first heartbeat to the end; ``ended`` then says why, ``fault`` whether it should not
         have. InputError for an autopilot that is not the own one."""
-        desk, orders = intercom()
-        crew = Crew(Worker(self.asked, self._wiring.ends, orders, self._directory))
+        place = self._directory
+        crew, desk, orders = self._crew(place)
         if not self._identify():
-            return
-        self._wiring.drain()
-        try:
-            self.diary.note("process", f"the companion flies in process {crew.start()}")
+            desk.close()
             orders.release()
-            self._heard = time.monotonic()
-            self._look_after(desk, crew)
-        finally:
-            self._finish(desk, crew)
+            return
+        while True:
+            self._wiring.drain()
+            try:
+                self.diary.note("process", f"the companion flies in process {crew.start()}")
+                orders.release()
+                self._left, self._heard = False, time.monotonic()
+                self._look_after(desk, crew)
+            finally:
+                self._finish(desk, crew)
+            if self._over():
+                return
+            place = self._directory / f"restart-{len(self.restarts)}"
+            place.mkdir()
+            self.state = State()
+            crew, desk, orders = self._crew(place)
+
+    def _crew(self, place: Path) -> tuple[Crew, Desk, OrderLink]:
+        """A process that is ready to be forked, and both ends of what joins it; ``place`` gets its log."""
+        desk, orders = intercom()
+        return Crew(Worker(self.asked, self._wiring.ends, orders, place)), desk, orders
 
     @property
     def seconds(self) -> float:
@@ -111,15 +134,15 @@ class Flight:
             self._hear(desk)
             self._obey(desk)
             self._look()
-            if self.ended:
-                return
             if self._left or crew.status is not None:
-                self._fail(f"the companion's process ended with status {crew.status}")
-            elif time.monotonic() - self._heard > HUNG:
+                self._lose(f"its process ended with status {crew.status}")
+                return
+            if time.monotonic() - self._heard > HUNG:
                 crew.kill()
-                self._fail(f"the companion's process has not been heard for {HUNG:g} s")
-            elif self.state.phase == Phase.DONE.value:
-                self.ended = "landed"
+                self._lose(f"its process has not been heard for {HUNG:g} s")
+                return
+            if self.state.phase == Phase.DONE.value:
+                self.ended = self.ended or "landed"
 
     def _over(self) -> bool:
         """Whether it is time to end; ``ended`` says why."""
@@ -129,8 +152,14 @@ class Flight:
             self.ended = "the time is over"
         return bool(self.ended)
 
-    def _fail(self, why: str) -> None:
-        if not self.ended:
+    def _lose(self, why: str) -> None:
+        """The process that flew is gone. Another one follows, unless they go on like that."""
+        why = self._trouble or why
+        self._trouble = ""
+        now = self.seconds
+        self.restarts.append((round(now, 2), why))
+        self.diary.note("lost", f"the companion is gone: {why}")
+        if len(self.restarts) >= MOST and now - self.restarts[-MOST][0] < WITHIN and not self.ended:
             self.ended, self.fault = why, True
 
     def _hear(self, desk: Desk) -> None:
@@ -149,7 +178,7 @@ class Flight:
             elif kind == "figures":
                 self.figures = news
             elif kind == "fault":
-                self._fail(news["text"])
+                self._trouble = news["text"]
             elif kind == "left":
                 self._left = True
 

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from companion.dry_run import DryRun
-from companion.node import Companion
-from companion.pilot import Phase
+from companion.pilot import OPERATORS_GO, Phase
 from companion.vehicle import Vehicle
 from companion.watch import Concern
 from mavlink_bridge.followed_clock import FollowedClock
@@ -16,6 +15,7 @@ from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.histogram import Histogram
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.signing import Signing
+from outrider.aboard.cockpit import Cockpit
 from outrider.aboard.departures import Departures
 from outrider.hangar.modes import mode_name
 
@@ -63,13 +63,13 @@ class News:
 
     def __init__(
         self,
-        companion: Companion,
+        cockpit: Cockpit,
         departures: Departures,
         followed: FollowedClock | None,
         signing: Signing | None,
         tell: Callable[..., None],
     ) -> None:
-        self._companion, self._departures = companion, departures
+        self._cockpit, self._companion, self._departures = cockpit, cockpit.companion, departures
         self._followed, self._signing = followed, signing
         self._tell = tell
         self.plan_times = Histogram()
@@ -170,6 +170,8 @@ class News:
         pilot = self._companion.pilot
         if isinstance(self._companion, DryRun):
             return self._companion.pilot.lacking
+        if pilot.waiting_for == OPERATORS_GO and not self._cockpit.settled:
+            return "the rate of the autopilot's clock"
         return pilot.waiting_for if pilot.phase in _WAITING else ""
 
     def _would(self) -> str:

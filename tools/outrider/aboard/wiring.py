@@ -33,8 +33,8 @@ class Wiring(NamedTuple):
 
     def drain(self) -> None:
         """Forget what has arrived: what was said before nobody listened counts no more."""
-        for end in self.ends.values():
-            end.receive()
+        for dealer in self.dealers:
+            dealer.forget()
 
     def close(self) -> None:
         """All of them."""

@@ -84,7 +84,7 @@ class Worker:
         followed = FollowedClock(wall, wall.now()) if asked.config.clock == "autopilot" else None
         cockpit = Cockpit(node, wall, followed, self._signing)
         departures = Departures(node.config.limits)
-        news = News(node, departures, followed, self._signing, self._orders.tell)
+        news = News(cockpit, departures, followed, self._signing, self._orders.tell)
         recorder = Recorder(self._directory, [asked.system], files)
         links: dict[str, Link | Sequence[Link]] = {
             **self._links,
@@ -151,4 +151,5 @@ class Worker:
                 name: round(value * 1e-3 / rate, 3) for name, value in statistics.lateness._asdict().items()
             },
             clock_rate=round(rate, 4),
+            cpu_s=round(time.process_time(), 2),
         )
