@@ -15,6 +15,7 @@ from companion.config import CompanionConfig
 from companion.forces import Obstacles
 from companion.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.plan_clock import PlanClock
+from companion.reception import AUTOPILOT
 from companion.tracks import Track
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
@@ -23,6 +24,8 @@ from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
 
 _MOST = 255
 """System ids that there are."""
+_VOICE = 1_000_000
+"""µs for which a vehicle's autopilot is not listened to where its companion speaks, too."""
 _STRAYED = 1.0
 """A neighbour further than this (m) from its own plan is not where it says: its track counts."""
 
@@ -65,20 +68,32 @@ class Neighbours:
         self._d_min: Array = np.full(_MOST, config.field.d_min + margin)
         self._d_safe: Array = np.full(_MOST, config.field.d_safe + margin)
         self.refused_plans = 0
+        # When (µs) a vehicle's companion last said where it is; whether its track is of its autopilot's word.
+        self._spoken: dict[int, int] = {}
+        self._by_autopilot: dict[int, bool] = {}
 
     def hear_position(self, now: int, message: GlobalPosition) -> None:
         """A neighbour's GLOBAL_POSITION_INT; the own echo is ignored."""
-        system = message.source.system
+        system, component = message.source
         if system == self._system:
             return
+        by_autopilot = component == AUTOPILOT
+        if not by_autopilot:
+            self._spoken[system] = now
+        elif now - self._spoken.get(system, now - _VOICE) < _VOICE:
+            # Its companion says it already, by another clock.
+            return
         position, velocity = _placed(self._fleet, message)
-        track = self._tracks.get(system) or Track(self._config.neighbour)
+        track = self._tracks.get(system)
+        if track is None or self._by_autopilot[system] != by_autopilot:
+            track = Track(self._config.neighbour)
         track.measure(now, position, velocity, message.time_boot)
         time = track.time
         if time is None:
             return
-        if system not in self._tracks:
-            self._tracks[system] = track
+        known = system in self._tracks
+        self._tracks[system], self._by_autopilot[system] = track, by_autopilot
+        if not known:
             self._ids = tuple(self._tracks)
             self._states = np.vstack([self._states, np.zeros(6)])
             self._times = np.append(self._times, now)

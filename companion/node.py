@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,13 +22,13 @@ from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
 from companion.plan_log import PlanLog
 from companion.planner import Aim, Plan, Planner, standing
 from companion.reception import LINKS, accepts
-from companion.setpoint import setpoint
+from companion.setpoint import is_finite, setpoint
 from companion.settling import Settling
 from companion.sharing import Sharing
 from companion.voice import Voice
 from companion.watch import Reaction, Situation, Watch
 from companion.world import View, World
-from mavlink_bridge.codec import Codec
+from mavlink_bridge.codec import Codec, Counters
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source, Timesync, Tunnel
 from mavlink_bridge.node import Datagram
@@ -117,6 +117,8 @@ class Companion:
         self._plan_ns = array("I")
         self._plan_at = array("q")
         self.plan_log = PlanLog()
+        self.not_finite = 0
+        """Set-points that were none, and were not sent."""
 
     @property
     def tally(self) -> Tally:
@@ -134,6 +136,23 @@ class Companion:
         """How often an old plan was kept."""
         certified = self._certified
         return self.guard.held if certified is None else sum(certified.keeper.held.values())
+
+    def shed(self) -> Sequence[int]:
+        """Take the stopwatch's readings (ns) away, and the plan log with them: for who runs for days."""
+        taken, self._plan_ns = self._plan_ns, array("I")
+        self._plan_at = array("q")
+        self.plan_log = PlanLog()
+        return taken
+
+    @property
+    def system(self) -> int:
+        """The vehicle's system id, and its own."""
+        return self._source.system
+
+    @property
+    def counters(self) -> Mapping[str, Counters]:
+        """What became of the bytes of each link."""
+        return {link: codec.counters for link, codec in self._codecs.items()}
 
     @property
     def bad_frames(self) -> int:
@@ -434,8 +453,14 @@ class Companion:
         time = now + self.config.setpoint_lead_us
         since_boot = now - (now if self._boot is None else self._boot)
         yaw = self._heading.at(time)
+        message = setpoint(time, since_boot, horizon, yaw, view.local, self._source, profile.setpoint_mask)
+        if not is_finite(message):
+            # Nothing of it may leave: the plan begins anew where the vehicle is measured to be.
+            self.not_finite += 1
+            self.guard.horizon = None
+            return []
         self.pilot.streamed(now)
-        return [setpoint(time, since_boot, horizon, yaw, view.local, self._source, profile.setpoint_mask)]
+        return [message]
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:
         out = []

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from enum import Enum
 
+import numpy as np
+
 from companion.autopilots import Profile, Step
 from companion.calls import Calls
 from companion.config import CompanionConfig
@@ -24,7 +26,11 @@ __all__ = ["NAV_LAND", "NAV_TAKEOFF", "Phase", "Pilot"]
 
 NAV_LAND = 21
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
+OPERATORS_GO = "the operator's go"
+"""What it waits for when all else is ready."""
 _NAN = float("nan")
+_FAR = 20_000.0
+"""m between the fleet origin and the autopilot's own: beyond, one of the two is wrong."""
 _NEEDED = tuple(
     (SET_MESSAGE_INTERVAL, (identifier, interval, 0.0, 0.0, 0.0, 0.0, 0.0))
     for identifier, interval in ((32.0, 20_000.0), (30.0, 100_000.0), (1.0, 1_000_000.0), (245.0, 500_000.0))
@@ -229,9 +235,9 @@ class Pilot:
         if blind or now - since > self._config.guard.settle_us:
             self.phase = Phase.LAND
 
-    def _connect(self, now: int, view: View) -> list[Message]:
+    def _requests(self, now: int, view: View) -> list[Message]:
+        """For the messages that are needed; they change nothing of what the vehicle does."""
         calls: list[Message] = []
-        self.waiting_for = self._missing(view)
         if self.vehicle.heartbeat is not None:
             for command, params in sorted(_NEEDED, key=lambda call: self._calls.sent_at(*call)):
                 calls += self._calls.call(now, command, params)
@@ -239,6 +245,11 @@ class Pilot:
                 calls += self._calls.call(
                     now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                 )
+        return calls
+
+    def _connect(self, now: int, view: View) -> list[Message]:
+        self.waiting_for = self._missing(view)
+        calls = self._requests(now, view)
         if not self.waiting_for and view.own is not None and view.local is not None:
             self._takeoff.begin(view.own)
             self.phase = Phase.PREPARE
@@ -254,6 +265,9 @@ class Pilot:
             return f"an autopilot that is known (ArduPilot 3, PX4 12; this is {kind})"
         if view.local is None:
             return "GPS_GLOBAL_ORIGIN"
+        far = float(np.linalg.norm(view.local.origin_fleet))
+        if not far < _FAR:
+            return f"a fleet origin that is not {far / 1000.0:.0f} km away from the vehicle's"
         if view.own is None or view.own.age > self._config.guard.own_stale_us:
             return "LOCAL_POSITION_NED"
         return "" if view.yaw is not None else "ATTITUDE"
@@ -270,7 +284,7 @@ class Pilot:
         if not all(self._calls.answered(*call) for call in _NEEDED):
             return "the autopilot's answers to SET_MESSAGE_INTERVAL"
         if self._height is None:
-            return "the operator's go"
+            return OPERATORS_GO
         return ""
 
     def _prepare(self, now: int, view: View) -> list[Message]:

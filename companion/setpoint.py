@@ -8,6 +8,8 @@ paper's choice.
 
 from __future__ import annotations
 
+from math import isfinite
+
 from companion.heading import Yaw
 from companion.horizon import Array, Horizon
 from mavlink_bridge.frames import LocalFrame
@@ -35,6 +37,17 @@ def setpoint(
         local.yaw_to_local(yaw.yaw),
         # NED yaw turns clockwise: the rate changes sign with the frame.
         -yaw.rate,
+    )
+
+
+def is_finite(message: SetpointLocal) -> bool:
+    """Whether nothing in it is a NaN or infinite: one NaN in a used field has crashed an autopilot."""
+    return isfinite(
+        sum(message.position)
+        + sum(message.velocity)
+        + sum(message.acceleration)
+        + message.yaw
+        + message.yaw_rate
     )
 
 

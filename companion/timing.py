@@ -47,6 +47,8 @@ _WITNESSES = 3
 """Successive messages off the line that agree with each other before it is laid through them."""
 _LIVE = 0.75
 """So much of their stamps' span must the arrivals of witnesses take; a queue that drains takes less."""
+_FEW = 8
+"""Messages of a brief line."""
 _REPEATS = 4
 """The same stamp so often in succession, and for a second, is no duplicate: this clock stands."""
 
@@ -86,12 +88,16 @@ class SenderClock:
     ``delay``: the least age of a message at its arrival. ``latest``: by how much others may overtake one that
     is still dated, two seconds at least. ``skew``: the companion's time minus the track's own, as known at
     the last message. ``heard``: messages that the line stands on; ``laid``: how often there was a new one.
+    ``brief``: the line is that of the last few messages alone. It is for a simulation's clock, which stands
+    whenever its machine is busy; a delay that grows is then not seen.
     """
 
     def __init__(self, delay: int, latest: int) -> None:
         self.skew = 0
         self.heard = 0
         self.laid = 0
+        self.brief = False
+        self._lately: deque[int] = deque(maxlen=_FEW)
         self._delay = delay
         self._tolerance = max(latest, _STEP)
         # Track time minus stamp; None before the first stamp, and while they are of no use.
@@ -189,6 +195,10 @@ class SenderClock:
 
     def _follow(self, received: int, lag: int, expected: float) -> None:
         """Keep the line at or below the lags; with every piece, see whether it may be laid higher."""
+        if self.brief:
+            self._lately.append(lag)
+            self._received, self._line, self._rate = received, float(min(self._lately)), 0.0
+            return
         self._received = received = max(received, self._received)
         self._line = line = min(float(lag), expected)
         least = self._least

@@ -51,6 +51,15 @@ class Track:
         self._absurd = self._undated = 0
 
     @property
+    def brief(self) -> bool:
+        """Whether its sender's clock is a simulation's, see ``SenderClock``."""
+        return self._clock.brief
+
+    @brief.setter
+    def brief(self, value: bool) -> None:
+        self._clock.brief = value
+
+    @property
     def time(self) -> int | None:
         """When the last accepted measurement was true, µs; None before the first."""
         belief = self._rewind.belief

@@ -17,13 +17,15 @@ from companion.world import View
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, SetpointLocal, Source
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
 
 _ALWAYS_ANEW = 1e-6
 """m: a plan that the vehicle is further from than that begins anew at the vehicle."""
 
 
-class _Onlooker(Pilot):
-    """A pilot that is ready as soon as it knows enough to plan, whoever steers the vehicle."""
+class Onlooker(Pilot):
+    """A pilot that is ready as soon as it knows enough to plan, whoever steers the vehicle; it takes no
+    orders."""
 
     @property
     def guided(self) -> bool:
@@ -32,6 +34,18 @@ class _Onlooker(Pilot):
     @property
     def streaming(self) -> bool:
         return self.phase is Phase.ESCORT
+
+    def go(self, height: float) -> bool:
+        return False
+
+    def hold(self) -> bool:
+        return False
+
+    def come_back(self) -> bool:
+        return False
+
+    def land(self) -> bool:
+        return False
 
     def step(self, now: int, view: View) -> list[Message]:
         """No commands, ever."""
@@ -56,13 +70,14 @@ class Understudy(Companion):
         target_system: int,
         fleet: FleetFrame,
         stopwatch: Callable[[], int],
+        signing: Signing | None = None,
     ) -> None:
         if config.avoidance == "certified":
             raise CompanionError("committed plans cannot be rehearsed; allowed: avoidance 'field'")
         guard = config.guard.model_copy(update={"tube": _ALWAYS_ANEW})
         config = config.model_copy(update={"guard": guard})
-        super().__init__(config, system, target_system, fleet, stopwatch)
-        self.pilot = _Onlooker(config, Source(system, COMPONENT), fleet.altitude)
+        super().__init__(config, system, target_system, fleet, stopwatch, signing)
+        self.pilot = Onlooker(config, Source(system, COMPONENT), fleet.altitude)
         self.would: list[SetpointLocal] = []
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 from companion.autopilots import Profile, is_guided
 from companion.autopilots.known import profile_of
 from mavlink_bridge.messages import ExtendedSysState, Heartbeat, Message, StatusText, SysStatus
@@ -15,6 +17,7 @@ CRITICAL = 5
 """MAV_STATE; it and what follows tell of a failsafe."""
 HEARTBEAT_LOST = 3_000_000
 """µs without a heartbeat after which the autopilot's mode is not known."""
+_TEXTS = 16
 
 
 class Vehicle:
@@ -25,6 +28,9 @@ class Vehicle:
         self.profile: Profile | None = None
         self.said = ""
         """The last warning: usually why it refuses."""
+        self.texts: deque[StatusText] = deque(maxlen=_TEXTS)
+        """What it said last, of any severity; ``told`` counts all of it."""
+        self.told = 0
         self.status: SysStatus | None = None
         self._extended: ExtendedSysState | None = None
         self._beaten: Heartbeat | None = None
@@ -41,8 +47,11 @@ class Vehicle:
             self.status = message
         elif isinstance(message, ExtendedSysState):
             self._extended = message
-        elif isinstance(message, StatusText) and message.severity <= WARNING:
-            self.said = message.text
+        elif isinstance(message, StatusText):
+            self.texts.append(message)
+            self.told += 1
+            if message.severity <= WARNING:
+                self.said = message.text
 
     def tick(self, now: int) -> None:
         """It is ``now`` (µs)."""

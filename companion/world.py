@@ -78,6 +78,8 @@ class World:
         self._yaw: float | None = None
         self._yaw_time = 0
         self._yaw_rate = 0.0
+        self.stamp = 0
+        """The last time (µs since its boot) that the own autopilot told, 0 before the first."""
 
     def hear(self, now: int, link: str, message: Message) -> None:
         """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
@@ -109,6 +111,15 @@ class World:
         if self.sensed.proximity is not None:
             silent = self.sensed.proximity.silent(now)
             voice.watch(silent, "Obstacle sensor silent", "Obstacle sensor is back")
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the autopilot's clock is a simulation's, which may stand for a moment."""
+        return self._own.brief
+
+    @simulated.setter
+    def simulated(self, value: bool) -> None:
+        self._own.brief = value
 
     @property
     def clock_steps(self) -> int:
@@ -169,6 +180,8 @@ class World:
         self.sensed.hear_distances(now, message, Stance(when, place, yaw, local.yaw_to_fleet(0.0)), known)
 
     def _hear_own(self, now: int, message: Message) -> None:
+        if isinstance(message, LocalPosition | Attitude):
+            self.stamp = message.time_boot
         if isinstance(message, LocalPosition):
             if self._local is not None:
                 self._own.measure(
@@ -188,7 +201,8 @@ class World:
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
                 # Where the vehicle was in the old frame must not be flown to in the new one.
-                self._own = Track(self.config.own)
+                simulated, self._own = self.simulated, Track(self.config.own)
+                self.simulated = simulated
 
 
 def _turns(attitude: Attitude) -> float:

@@ -5,6 +5,9 @@ A message shows what its sender's clock said when it left; it arrives later by a
 plane of arrival and stamp all messages lie on or below the line of those that took no time. That line is laid
 along the upper edge of what the last seconds brought, piece by piece (Moon, Skelly and Towsley, "Estimation
 and removal of clock skew from network delay measurements", 1999), and the clock runs along it.
+
+A simulation is told by its rate. On a busy machine it stands for a moment and never makes up for that: then
+the clock goes on as if nothing were, and follows the stamps from there.
 """
 
 from __future__ import annotations
@@ -25,6 +28,12 @@ _ENOUGH: Final = 4
 """Pieces that a rate is learnt from."""
 _STEP: Final = 500_000
 """µs of the wall: a stamp off the line by more tells of a clock that was set, stopped or began anew."""
+_STALL: Final = 50_000
+"""The same of a simulation, whose clock stands whenever its machine has something else to do."""
+_REAL: Final = 0.02
+"""A clock whose rate is off by more is a simulation's."""
+_SLEW: Final = 0.5
+"""A clock that is ahead goes on at this share of its rate: it never stands."""
 _WITNESSES: Final = 5
 SLOWEST, FASTEST = 0.02, 100.0
 """Rates beyond are none of a simulator's."""
@@ -41,8 +50,8 @@ class FollowedClock:
     """A ``Clock`` that shows what the stamps do, from ``begin`` (µs) on; it never goes back.
 
     Before the first stamp it runs as ``clock`` does. Where stamps jump, by more than half a second of the
-    wall, it goes on as before and follows them from there: ``steps`` counts that. ``rate``: of it against
-    ``clock``. May be fed by one thread and read by others.
+    wall, it goes on as before and follows them from there: ``steps`` counts that. So it does where a
+    simulation has lost time. ``rate``: of it against ``clock``. May be fed by one thread and read by others.
     """
 
     def __init__(self, clock: Clock, begin: int = 0) -> None:
@@ -55,6 +64,7 @@ class FollowedClock:
         self._best: _Seen | None = None
         self._begun = 0
         self._strayed = 0
+        self._surplus = 0.0
         self._known = False
         self.rate = 1.0
         self.steps = 0
@@ -78,28 +88,44 @@ class FollowedClock:
                 self._lay(wall, stamp)
                 return
             ahead = stamp + self._base - self._line(wall)
-            if self._known and abs(ahead) > _STEP * max(1.0, self.rate):
+            stall = (_STALL if self.simulated else _STEP) * max(1.0, self.rate)
+            if self._known and abs(ahead) > stall:
                 self._strayed += 1
                 if self._strayed >= _WITNESSES:
-                    self.steps += 1
+                    self.steps += abs(ahead) > _STEP * max(1.0, self.rate)
                     self._lay(wall, stamp)
                 return
             self._strayed = 0
             self._gather(_Seen(wall, stamp))
+
+    @property
+    def known(self) -> bool:
+        """Whether its rate is known: since when there were stamps for a second."""
+        return self._known
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its rate is none of a real clock's."""
+        return abs(self.rate - 1.0) > _REAL
 
     # Own, under the lock
 
     def _line(self, wall: int) -> float:
         return self._shown + self.rate * (wall - self._wall)
 
+    def _slewed(self, wall: int) -> float:
+        """The line, and what of a surplus is not worked off yet."""
+        since = max(wall - self._wall, 0)
+        return self._line(wall) + max(0.0, self._surplus - (1.0 - _SLEW) * self.rate * since)
+
     def _read(self, wall: int) -> int:
-        self._latest = max(self._latest, int(self._line(wall)))
+        self._latest = max(self._latest, int(self._slewed(wall)))
         return self._latest
 
     def _lay(self, wall: int, stamp: int) -> None:
         """Go on from what it shows, with the stamps from ``stamp`` on."""
         shown = float(self._read(wall))
-        self._wall, self._shown = wall, shown
+        self._wall, self._shown, self._surplus = wall, shown, 0.0
         self._base = shown - stamp
         self._strayed = 0
         self._known = False
@@ -129,7 +155,9 @@ class FollowedClock:
             # Nobody has relied on the rate yet: go on without a jump.
             base = self._base = self._read(wall) - height
             self._known = True
+        shown = float(self._read(wall))
         self._wall, self._shown, self.rate = wall, height + base, rate
+        self._surplus = max(0.0, shown - self._shown)
 
 
 def _slope_above(pieces: Sequence[_Seen]) -> float:

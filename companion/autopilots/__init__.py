@@ -23,8 +23,9 @@ class Profile(NamedTuple):
 
     ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer. ``streams_first``: set-points must
     flow before the mode is granted. ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level,
-    not above home. ``loss_modes``: what custom_mode may be when set-points were
-    missing for too long, and nobody chose it.
+    not above home. ``hold_params``: p1…p3 of DO_SET_MODE for the mode, ``hold_name``, in which it stays where
+    it is by itself. ``loss_modes``: what custom_mode may be when set-points were missing for too long, and
+    nobody chose it.
     """
 
     name: str
@@ -35,6 +36,8 @@ class Profile(NamedTuple):
     setpoint_mask: int
     streams_first: bool
     takeoff_absolute: bool
+    hold_params: tuple[float, float, float]
+    hold_name: str
     loss_modes: frozenset[int] = frozenset()
 
 

@@ -14,4 +14,6 @@ ARDUPILOT = Profile(
     setpoint_mask=0,
     streams_first=False,
     takeoff_absolute=False,
+    hold_params=(1.0, 17.0, 0.0),
+    hold_name="BRAKE",
 )

@@ -7,9 +7,10 @@ from companion.autopilots.ardupilot import ARDUPILOT
 from companion.autopilots.px4 import PX4
 from mavlink_bridge.messages import Heartbeat
 
-_BY_NUMBER = {profile.autopilot: profile for profile in (ARDUPILOT, PX4)}
+KNOWN = {profile.autopilot: profile for profile in (ARDUPILOT, PX4)}
+"""By MAV_AUTOPILOT."""
 
 
 def profile_of(heartbeat: Heartbeat) -> Profile | None:
     """What the sender of ``heartbeat`` wants; None for one that is not known."""
-    return _BY_NUMBER.get(heartbeat.autopilot)
+    return KNOWN.get(heartbeat.autopilot)

@@ -13,6 +13,8 @@ PX4 = Profile(
     setpoint_mask=0,
     streams_first=True,
     takeoff_absolute=True,
+    hold_params=(1.0, 4.0, 3.0),
+    hold_name="HOLD",
     # COM_OBL_RC_ACT: position (or descend), hold, return, land.
     loss_modes=frozenset((3 << 16, 4 << 16 | 3 << 24, 4 << 16 | 5 << 24, 4 << 16 | 6 << 24)),
 )

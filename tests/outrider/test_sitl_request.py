@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from mavlink_bridge.links.endpoints import Multicast, TcpIn, UdpIn, UdpOut, parse_endpoint
 from outrider.errors import InputError
-from outrider.hangar.addresses import addresses, exposed, extra
+from outrider.exposure import exposed
+from outrider.hangar.addresses import addresses, extra
 from outrider.hangar.crew import squads
 from outrider.hangar.request import MOST_ID, Options, Request, checked
 from outrider.hangar.worker import PERIOD, period

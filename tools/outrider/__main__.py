@@ -173,6 +173,58 @@ def doctor(
 
 
 @app.command()
+def fly(
+    autopilot: Annotated[
+        str,
+        typer.Option(help="udpin:HOST:PORT, tcp:HOST:PORT, /dev/…,BAUD, …; tlog:PATH to rehearse."),
+    ],
+    config: Annotated[str, typer.Option(help="A file, or ardupilot, px4.")],
+    swarm: Annotated[Optional[str], typer.Option(help="Endpoint of the other companions.")] = None,  # noqa: UP045
+    target: Annotated[Optional[str], typer.Option(help="Endpoint of the target; the swarm's.")] = None,  # noqa: UP045
+    ground: Annotated[Optional[str], typer.Option(help="Endpoint of orders; the autopilot's.")] = None,  # noqa: UP045
+    system: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(min=1, max=250, help="In place of the file's system id."),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Plan and say what would be sent; steer and arm nothing.")
+    ] = False,
+    realtime: Annotated[bool, typer.Option("--realtime", help="Ask for real-time priority.")] = False,
+    signing_key: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Only what is signed with it counts; see outrider key."),
+    ] = None,
+    out: Annotated[Optional[Path], typer.Option(help="Run directory; new or empty.")] = None,  # noqa: UP045
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    seconds: Annotated[Optional[float], typer.Option(min=0.0, help="Hold and end after that.")] = None,  # noqa: UP045
+    go: Annotated[
+        bool, typer.Option("--go", help="The operator's go, given as soon as all is ready: it takes off.")
+    ] = False,
+) -> None:
+    """Fly one vehicle as part of a swarm: a companion on a real or emulated autopilot, until it has landed
+    or Ctrl-C, which leaves it holding its place. Orders are typed: go, hold, return, land (docs/fly.md)."""
+    from outrider.aboard.command import run
+    from outrider.aboard.request import Options, checked
+
+    options = Options(
+        autopilot,
+        config,
+        swarm,
+        target,
+        ground,
+        system,
+        dry_run,
+        realtime,
+        signing_key,
+        out,
+        seconds,
+        go,
+        as_json,
+    )
+    raise typer.Exit(run(checked(options)))
+
+
+@app.command()
 def sweep(
     name: Annotated[str, typer.Argument(help="A file, or the name of a shipped sweep.")],
     runs: Annotated[Optional[int], typer.Option(min=1, max=1_000_000, help="Seeds per cell.")] = None,  # noqa: UP045

@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from outrider.conductor import Stage
+from outrider.share_progress import share_progress as share_progress
 from outrider.summary import Value
 
 _REFRESH_S = 0.1
@@ -85,20 +86,6 @@ def show(summary: Mapping[str, Value]) -> None:
             continue
         table.add_row(words, _text(value))
     Console().print(table)
-
-
-@contextmanager
-def share_progress() -> Iterator[Callable[[str, float], None]]:
-    """A bar for what is no flight; the callable takes what is done now and the share that is done."""
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def watch(what: str, share: float) -> None:
-            bar.update(task, description=what, completed=share)
-
-        yield watch
 
 
 def show_bench(figures: Mapping[str, object]) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from outrider.aboard.fly_config import FlyConfig
 from outrider.scenario import Scenario
 from outrider.sweeps.grid import Sweep
 from outrider.sweeps.scenes import Scene
@@ -20,6 +21,7 @@ from sitl.config import VehicleConfig
 
 SCHEMAS: list[tuple[str, type[BaseModel]]] = [
     ("scenario", Scenario),
+    ("companion", FlyConfig),
     ("vehicle", VehicleConfig),
     ("sweep", Sweep),
     ("scene", Scene),

@@ -7,18 +7,15 @@ binds 18570 + i and speaks to 14550, the ground station.
 
 from __future__ import annotations
 
-from ipaddress import ip_address
 from typing import Final, NamedTuple
 
 from mavlink_bridge.links.endpoints import (
     Endpoint,
-    Multicast,
     Replay,
     Serial,
     TcpIn,
     TcpOut,
     UdpIn,
-    UdpOut,
     parse_endpoint,
 )
 from outrider.errors import InputError
@@ -71,23 +68,6 @@ def extra(text: str, count: int) -> Endpoint:
             "or mcast:"
         )
     return endpoint
-
-
-def exposed(endpoint: Endpoint) -> bool:
-    """Whether others than this machine can come by it, or hear it. A name is taken for another machine."""
-    match endpoint:
-        case UdpIn() | TcpIn() | UdpOut() | TcpOut():
-            return not _loopback(endpoint.host)
-        case Multicast():
-            return endpoint.interface is None or not _loopback(endpoint.interface)
-    return False
-
-
-def _loopback(host: str) -> bool:
-    try:
-        return ip_address(host.partition("%")[0]).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def _ardupilot(base: int, index: int, host: str, more: tuple[Endpoint, ...]) -> Address:

@@ -7,22 +7,22 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Final, NamedTuple
 
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.errors import EndpointError
 from outrider.errors import InputError
-from outrider.hangar.addresses import Address, addresses, exposed, extra
+from outrider.exposure import exposed
+from outrider.hangar.addresses import Address, addresses, extra
 from outrider.hangar.cabinet import prepare
 from outrider.hangar.crew import Crew
 from outrider.hangar.figures import Value, ready, summary
 from outrider.hangar.request import Request
 from outrider.hangar.watch import announce, watching
 from outrider.hangar.wiring import wire
+from outrider.interruption import noted
 
 _LOOK: Final = 0.1
 """s between two looks at the board."""
@@ -46,7 +46,7 @@ def run(asked: Request, terms: Terms) -> int:
     prepare(terms.state, asked.flavour, asked.systems)
     places = _addresses(asked, terms)
     crew = Crew(asked, wire(places, WallClock()), terms.state)
-    with _stopping() as stopped:
+    with noted((signal.SIGINT, signal.SIGTERM)) as stopped:
         try:
             announce(asked)
             crew.start()
@@ -79,22 +79,6 @@ def _addresses(asked: Request, terms: Terms) -> list[Address]:
             "who can send there: --signing-key FILE is against that\n"
         )
     return places
-
-
-@contextmanager
-def _stopping() -> Iterator[list[int]]:
-    """The signals that have come and would otherwise have ended the process."""
-    came: list[int] = []
-
-    def note(which: int, _frame: FrameType | None) -> None:
-        came.append(which)
-
-    before = {which: signal.signal(which, note) for which in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield came
-    finally:
-        for which, handler in before.items():
-            signal.signal(which, handler)
 
 
 def _wait(crew: Crew, stopped: Sequence[int], count: int) -> None:

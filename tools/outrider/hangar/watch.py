@@ -3,7 +3,6 @@ then one for each event. All of it on standard error."""
 
 from __future__ import annotations
 
-import select
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,12 +14,13 @@ from outrider.hangar.board import Board
 from outrider.hangar.chronicle import Chronicle
 from outrider.hangar.request import Request
 from outrider.hangar.screen import Screen
+from outrider.saying import say
 
 
 def announce(asked: Request) -> None:
     """On a terminal, that they are being started: the first start on a machine compiles for some seconds."""
     if sys.stderr.isatty():
-        _write(f"starting {asked.count} × {asked.vehicle.name}, {asked.flavour} …")
+        say(f"starting {asked.count} × {asked.vehicle.name}, {asked.flavour} …")
 
 
 @contextmanager
@@ -34,22 +34,11 @@ def watching(asked: Request, places: Sequence[Address], board: Board) -> Iterato
         return
     for system, place in zip(asked.systems, places, strict=True):
         ends = " ".join(map(str, place.endpoints))
-        _write(f"vehicle {system} ({asked.flavour}, {asked.vehicle.name}): {ends}")
+        say(f"vehicle {system} ({asked.flavour}, {asked.vehicle.name}): {ends}")
     chronicle = Chronicle(asked, board)
 
     def look() -> None:
         for line in chronicle.look():
-            _write(line)
+            say(line)
 
     yield look
-
-
-def _write(line: str) -> None:
-    """Unless nobody reads: who only starts vehicles shall not hold them up by a pipe that is full."""
-    try:
-        room = select.select([], [sys.stderr], [], 0)[1]
-    except (OSError, ValueError):
-        room = [sys.stderr]  # no file of the system's
-    if room:
-        sys.stderr.write(f"{line}\n")
-        sys.stderr.flush()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -20,19 +18,13 @@ from outrider.console import progress, share_progress
 from outrider.errors import InputError
 from outrider.replaying.casting import Cast, check, survey
 from outrider.replaying.chase import prepared, setpoints
-from outrider.replaying.picture import draw
+from outrider.replaying.findings import document_of, leave
 from outrider.replaying.rehearsal import Rehearsed, rehearse
-from outrider.replaying.setpoints import apart, course, facts
 from outrider.resources import find
+from outrider.run_directories import new_directory
 from outrider.scenario import FIRST_SYSTEM, Scenario
-from outrider.swarm import fly, new_directory
+from outrider.swarm import fly
 from outrider.yaml_file import load
-
-_COLUMNS = (
-    *("who", "time_us", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s"),
-    *("a_north_m_s2", "a_east_m_s2", "a_down_m_s2", "yaw_rad", "mask", "frame"),
-)
-
 
 Pacing = Callable[[Iterable[Record]], Iterable[Record]]
 """Lets records through, when it is their time."""
@@ -81,27 +73,11 @@ def chasing(log: Path, target: int, like: str, out: Path | None, as_json: bool) 
 
 def _tell(title: str, found: Rehearsed, directory: Path, as_json: bool) -> None:
     document = document_of(found)
-    _leave(directory, title, found, document)
+    leave(directory, title, found, document)
     if as_json:
         sys.stdout.write(json.dumps(document) + "\n")
     else:
         _show(title, document, directory)
-
-
-def document_of(found: Rehearsed) -> dict[str, object]:
-    """What a script reads: of the set-points that would have been sent, and under ``sent`` of those that
-    were; ``apart_m`` between the two."""
-    would, sent = facts(found.would), facts(found.sent)
-    off = apart(course(found.would), course(found.sent))
-    document: dict[str, object] = dict(would._asdict())
-    document["holds"] = found.holds
-    document["reasons"] = dict(found.reasons)
-    document["records"] = found.records
-    document["sent"] = sent._asdict()
-    document["apart_m"] = {
-        f"p{q}": round(float(np.percentile(off, q)), 3) if len(off) else None for q in (50, 95)
-    }
-    return document
 
 
 def _directory(out: Path | None, stem: str) -> Path:
@@ -111,19 +87,6 @@ def _directory(out: Path | None, stem: str) -> Path:
 
 def _stem(log: Path) -> str:
     return log.name.split(".")[0]
-
-
-def _leave(directory: Path, name: str, found: Rehearsed, document: dict[str, object]) -> None:
-    (directory / "replay.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-    with (directory / "setpoints.csv").open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow(_COLUMNS)
-        for who, told in (("would", found.would), ("sent", found.sent)):
-            rows.writerows(
-                (who, t, *m.position, *m.velocity, *m.acceleration, m.yaw, m.type_mask, m.frame)
-                for t, m in told
-            )
-    draw(name, found, directory / "replay.png")
 
 
 _ROWS = {

@@ -54,11 +54,12 @@ def rehearse(
     seen: Survey,
     records: Iterable[Record],
     on_step: Callable[[int, int], None] = lambda _now, _records: None,
+    fleet: FleetFrame | None = None,
 ) -> Rehearsed:
     """Step an understudy every 10 ms of the log's time with what was recorded until then. Without a target in
     ``cast`` it is a point that stands where the own vehicle was first. ``on_step`` hears the time (µs) and
-    how many records have been read."""
-    fleet = seen.fleet
+    how many records have been read. The ``fleet`` frame is the log's own unless there is another."""
+    fleet = seen.fleet if fleet is None else fleet
     system = next(n for n in (TARGET_SYSTEM, 1, 2, 3) if n not in seen.systems and n != cast.own)
     target = system if cast.target is None else cast.target
     companion = Understudy(config, cast.own, target, fleet, lambda: 0)

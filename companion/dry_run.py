@@ -1,0 +1,62 @@
+"""An understudy on a live link: it asks for the messages that it needs, and orders nothing.
+
+What leaves it: heartbeats, requests for messages, answers to orders (which it does not take), and texts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from companion.config import CompanionConfig
+from companion.node import COMPONENT, Companion
+from companion.pilot import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
+from companion.understudy import Onlooker, Understudy
+from companion.world import View
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, Message, Source, StatusText
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
+
+REQUESTS = (SET_MESSAGE_INTERVAL, REQUEST_MESSAGE)
+"""Commands that change nothing of what a vehicle does."""
+
+
+class _Asking(Onlooker):
+    """``lacking``: what a flight would wait for before it takes off."""
+
+    lacking = ""
+
+    def step(self, now: int, view: View) -> list[Message]:
+        """Requests for messages alone."""
+        super().step(now, view)
+        self.lacking = self._missing(view)
+        return self._requests(now, view)
+
+
+class DryRun(Understudy):
+    """As ``Companion``; nothing leaves it that would change what the vehicle or anybody else does."""
+
+    pilot: _Asking
+
+    def __init__(
+        self,
+        config: CompanionConfig,
+        system: int,
+        target_system: int,
+        fleet: FleetFrame,
+        stopwatch: Callable[[], int],
+        signing: Signing | None = None,
+    ) -> None:
+        super().__init__(config, system, target_system, fleet, stopwatch, signing)
+        self.pilot = _Asking(config, Source(system, COMPONENT), fleet.altitude)
+
+    def _encode(self, **links: list[Message]) -> list[Datagram]:
+        super()._encode(**links)
+        told = {link: [m for m in messages if _changes_nothing(m)] for link, messages in links.items()}
+        return Companion._encode(self, **told)
+
+
+def _changes_nothing(message: Message) -> bool:
+    if isinstance(message, CommandLong):
+        return message.command in REQUESTS
+    return isinstance(message, Heartbeat | CommandAck | StatusText)

@@ -1,0 +1,112 @@
+"""One physical link that several links of a node share, as behind a MAVLink router: frames are dealt out by
+their headers, and what is sent at any end goes the same way."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from mavlink_bridge.framing import Framer
+from mavlink_bridge.header import Header
+from mavlink_bridge.links.link import BURST, WAITING, Link, LinkCounters
+
+Wants = Callable[[Header], bool]
+ROOM: Final = 1 << 20
+"""Bytes that wait at an end at most."""
+
+
+class Dealer:
+    """``ends``: a link for each name of ``deal``, which says which headers it gets; a frame goes to every end
+    that wants it, and to none if nobody does. Checksums are looked at, signatures are not.
+
+    Its ends are read by one thread at a time. The physical link is closed with the last of them.
+    """
+
+    def __init__(self, link: Link, deal: Mapping[str, Wants]) -> None:
+        self.link = link
+        self.ends = {name: DealtLink(self, first=number == 0) for number, name in enumerate(deal)}
+        self._deal = [(self.ends[name], wants) for name, wants in deal.items()]
+        self._framer = Framer()
+        self._open = len(self.ends)
+
+    def read(self) -> None:
+        """Deal out what has arrived."""
+        for datagram in self.link.receive():
+            frames = [
+                (Header(frame.system, frame.component, frame.message_id), frame.data)
+                for frame in self._framer.feed(datagram, whole=True)
+            ]
+            for end, wants in self._deal:
+                own = [data for header, data in frames if wants(header)]
+                if own:
+                    end.put(b"".join(own))
+
+    def forget(self) -> None:
+        """What has arrived at all ends until now."""
+        self.read()
+        for end in self.ends.values():
+            end.clear()
+
+    def leave(self) -> None:
+        """One end is closed."""
+        self._open -= 1
+        if not self._open:
+            self.link.close()
+
+
+class DealtLink:
+    """One end of a ``Dealer``: a ``Link``. If nobody takes what waits, the oldest gives way."""
+
+    def __init__(self, dealer: Dealer, *, first: bool) -> None:
+        self._dealer, self._first = dealer, first
+        self._waiting: deque[bytes] = deque()
+        self._bytes = 0
+        self._received = self._sent = 0
+        self._open = True
+
+    @property
+    def counters(self) -> LinkCounters:
+        """Its own; ``dropped`` is that of the physical link, for all its ends."""
+        return LinkCounters(self._received, self._sent, self._dealer.link.counters.dropped)
+
+    def fileno(self) -> int | None:
+        """That of the physical link, for one of its ends."""
+        return self._dealer.link.fileno() if self._first else None
+
+    def put(self, data: bytes) -> None:
+        """Some frames for this end."""
+        if not self._open:
+            return
+        self._waiting.append(data)
+        self._bytes += len(data)
+        while self._bytes > ROOM or len(self._waiting) > WAITING:
+            self._bytes -= len(self._waiting.popleft())
+
+    def clear(self) -> None:
+        """Forget what waits."""
+        self._waiting.clear()
+        self._bytes = 0
+
+    def receive(self) -> list[bytes]:
+        """What has been dealt to it."""
+        if not self._open:
+            return []
+        self._dealer.read()
+        found = [self._waiting.popleft() for _ in range(min(len(self._waiting), BURST))]
+        self._bytes -= sum(map(len, found))
+        self._received += len(found)
+        return found
+
+    def send(self, data: bytes) -> None:
+        """By the physical link."""
+        if self._open:
+            self._sent += 1
+            self._dealer.link.send(data)
+
+    def close(self) -> None:
+        """This end."""
+        if self._open:
+            self._open = False
+            self.clear()
+            self._dealer.leave()

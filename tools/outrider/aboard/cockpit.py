@@ -1,0 +1,63 @@
+"""The companion as the loop runs it: its clock follows the autopilot's, and if it is told to give up, the
+last word is what it says.
+
+Until it is known how fast that clock runs, a second after its first stamp, nothing is heard or told of
+others: what they say is dated by their clocks against the own one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from companion.last_word import LastWord
+from companion.node import Companion
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.followed_clock import FollowedClock
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
+
+_OTHERS = ("swarm", "target")
+
+
+class Cockpit:
+    """A ``Node``. ``followed``: shown the autopilot's stamps, as far as the companion believes them; None for
+    a companion that lives by the wall's time. ``signing``: the companion's."""
+
+    def __init__(
+        self, companion: Companion, wall: Clock, followed: FollowedClock | None, signing: Signing | None
+    ) -> None:
+        self.companion = companion
+        self.last: LastWord | None = None
+        self._wall, self._followed, self._signing = wall, followed, signing
+        self._stamp = 0
+        self.settled = followed is None
+        """Whether the own clock's rate is known."""
+
+    @property
+    def name(self) -> str:
+        """The companion's."""
+        return self.companion.name
+
+    def give_up(self) -> None:
+        """Nobody looks after this process any more: no set-points from now on, but the last word."""
+        if self.last is None:
+            heard = self.companion.pilot.vehicle.heartbeat
+            self.last = LastWord(self.companion.system, heard, self._signing)
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """As the companion's."""
+        wall = self._wall.now()
+        if self.last is not None:
+            return self.last.step(wall, [datagram for datagram in inbox if datagram.link == "autopilot"])
+        if not self.settled:
+            inbox = [datagram for datagram in inbox if datagram.link not in _OTHERS]
+        leaving = self.companion.step(now, inbox)
+        stamp = self.companion.world.stamp
+        if self._followed is not None and stamp != self._stamp:
+            self._stamp = stamp
+            self._followed.observe(wall, stamp)
+            self.companion.world.simulated = self._followed.simulated
+        if not self.settled and self._followed is not None:
+            self.settled = self._followed.known
+            leaving = [datagram for datagram in leaving if datagram.link not in _OTHERS]
+        return leaving

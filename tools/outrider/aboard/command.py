@@ -1,0 +1,90 @@
+"""``outrider fly``: opens the links, looks after one flight, and says how it was."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+import yaml
+from rich.console import Console
+
+from mavlink_bridge.clock import WallClock
+from outrider.aboard.diary import Diary
+from outrider.aboard.figures import summary
+from outrider.aboard.flight import Flight
+from outrider.aboard.request import Request
+from outrider.aboard.screen import Screen
+from outrider.aboard.typed import typing
+from outrider.aboard.wiring import Wiring, wire
+from outrider.interruption import noted
+from outrider.run_directories import new_directory
+from outrider.saying import say
+
+FAULT: Final = 3
+CONFIGURATION, SUMMARY = "configuration.yaml", "summary.json"
+_STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def run(asked: Request) -> int:
+    """Until it has landed, Ctrl-C, SIGTERM, or the time is over; the exit status. InputError for what cannot
+    be opened, and for an autopilot that is not the own one."""
+    if asked.log is not None:
+        from outrider.aboard.log_run import rehearsed
+
+        return rehearsed(asked, asked.log)
+    config, began = asked.config, time.monotonic()
+    wiring = wire(asked.endpoints, config.system, config.target, WallClock())
+    with closing(wiring), noted(_STOPS) as stops, _never_stopped():
+        directory = new_directory(asked.out, f"fly-{config.system}")
+        document = config.model_dump(mode="json")
+        (directory / CONFIGURATION).write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+        with closing(Diary(directory, lambda: time.monotonic() - began)) as diary:
+            flight = _flown(asked, directory, diary, stops, wiring)
+    found = summary(flight, directory)
+    (directory / SUMMARY).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    with suppress(OSError):
+        if asked.as_json:
+            sys.stdout.write(json.dumps(found) + "\n")
+            sys.stdout.flush()
+        say(f"{'fault: ' if flight.fault else ''}{flight.ended}; {directory}")
+    return FAULT if flight.fault else 0
+
+
+def _flown(asked: Request, directory: Path, diary: Diary, stops: list[int], wiring: Wiring) -> Flight:
+    """On a terminal with a picture; elsewhere with a line for each event."""
+    console = Console(stderr=True)
+    with typing(console.is_terminal) as typed:
+        if not console.is_terminal:
+            diary.tell = say
+            flight = Flight(asked, wiring, directory, diary, typed, stops, lambda: None)
+            flight.run()
+            return flight
+        screen = Screen(console)
+        diary.tell = screen.tell
+
+        def look() -> None:
+            screen.pending = typed.pending
+            # A terminal that is gone must not end a flight.
+            with suppress(OSError):
+                screen.look()
+
+        flight = screen.flight = Flight(asked, wiring, directory, diary, typed, stops, look)
+        with screen.live:
+            flight.run()
+        return flight
+
+
+@contextmanager
+def _never_stopped() -> Iterator[None]:
+    """Ctrl-Z would leave a vehicle to its last set-point."""
+    before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTSTP, before)

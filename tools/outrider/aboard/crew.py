@@ -1,0 +1,46 @@
+"""The process that flies, as the one that looks after it has it."""
+
+from __future__ import annotations
+
+import multiprocessing
+from multiprocessing.process import BaseProcess
+from typing import Final
+
+from outrider.aboard.worker import Worker
+
+_FAREWELL: Final = 10.0
+"""s that it has to leave its files."""
+
+
+class Crew:
+    """Forks ``worker``."""
+
+    def __init__(self, worker: Worker) -> None:
+        fork = multiprocessing.get_context("fork")
+        self._process: BaseProcess = fork.Process(target=worker.main, name="companion")
+
+    def start(self) -> int:
+        """Its process id."""
+        self._process.start()
+        return self._process.pid or 0
+
+    @property
+    def sentinel(self) -> int:
+        """Readable: it has ended."""
+        return self._process.sentinel
+
+    @property
+    def status(self) -> int | None:
+        """Its exit status, negative for a signal; None while it runs."""
+        return self._process.exitcode
+
+    def kill(self) -> None:
+        """At once."""
+        self._process.kill()
+
+    def join(self) -> None:
+        """Wait until it has ended, by force if it takes too long."""
+        self._process.join(_FAREWELL)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()

@@ -1,0 +1,81 @@
+"""What one companion on a vehicle is told by its file: whose it is, where its fleet's frame is, and how it
+flies."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from companion.config import CompanionConfig
+from companion.settings import Settings
+from mavlink_bridge.frames import FleetFrame
+
+System = Annotated[int, Field(ge=1, le=250)]
+"""System ids above are ground stations'."""
+
+
+class FleetOrigin(Settings):
+    """Where the fleet-local frame has its zero: the same for all companions, and told by nobody else."""
+
+    latitude: float = Field(ge=-89.0, le=89.0, description="degrees")
+    longitude: float = Field(ge=-180.0, le=180.0, description="degrees")
+    altitude: float = Field(ge=-500.0, le=9000.0, description="m above mean sea level, of the ground there")
+
+    @property
+    def frame(self) -> FleetFrame:
+        """ENU there."""
+        return FleetFrame(self.latitude, self.longitude, self.altitude)
+
+
+class Radio(Settings):
+    """What the swarm link has to carry: periods, and for how long a plan is used, µs."""
+
+    state_us: int
+    plan_us: int
+    plan_stale_us: int
+
+
+RADIOS = {57600: Radio(state_us=200_000, plan_us=500_000, plan_stale_us=1_100_000)}
+"""By the baud that eight vehicles share. Who misses one plan still has the one before, of 1.6 s."""
+
+
+class FlyConfig(Settings):
+    """One companion. Its ``system`` id is its vehicle's."""
+
+    system: System = Field(description="system id of the own autopilot; also given by --system")
+    target: int = Field(ge=1, le=255, description="system id of the target")
+    origin: FleetOrigin
+    takeoff_height: float = Field(5.0, ge=0.5, le=120.0, description="m above the ground, at the go")
+    radio: Literal[57600] | None = Field(
+        None, description="baud of a radio that eight vehicles share as the swarm link; null: a network"
+    )
+    clock: Literal["autopilot", "wall"] = Field(
+        "autopilot", description="whose time it lives by: a simulation's may run ten times as fast"
+    )
+    period_us: int = Field(
+        10_000, ge=1_000, le=100_000, multiple_of=4, description="of its steps, µs of that clock"
+    )
+    companion: CompanionConfig = CompanionConfig()
+
+    @property
+    def settings(self) -> CompanionConfig:
+        """The companion's, with the rates of the radio."""
+        if self.radio is None:
+            return self.companion
+        radio, companion = RADIOS[self.radio], self.companion
+        rates = companion.rates.model_copy(update={"state_us": radio.state_us, "plan_us": radio.plan_us})
+        guard = companion.guard.model_copy(update={"plan_stale_us": radio.plan_stale_us})
+        return companion.model_copy(update={"rates": rates, "guard": guard})
+
+    @model_validator(mode="after")
+    def _possible(self) -> FlyConfig:
+        if self.target == self.system:
+            raise ValueError(f"target: {self.target} is the own system id; allowed: another's")
+        if self.companion.avoidance == "certified":
+            # Committed plans need one time for all, within milliseconds, and a helm.
+            raise ValueError("companion.avoidance 'certified' is not for real vehicles yet; allowed: 'field'")
+        if self.period_us > self.companion.rates.setpoint_us:
+            longest = self.companion.rates.setpoint_us
+            raise ValueError(f"period_us must not exceed companion.rates.setpoint_us = {longest}")
+        return self

@@ -1,0 +1,87 @@
+"""What a row of set-points is like, while it goes by: the figures of ``replaying.setpoints``, in little
+memory, and how they stand against the limits."""
+
+from __future__ import annotations
+
+from collections import Counter
+from math import dist, hypot, isfinite
+
+from companion.config import LimitsConfig
+from companion.setpoint import FRAME_LOCAL_NED, is_finite
+from mavlink_bridge.messages import SetpointLocal, Vector
+
+TOGETHER = 100_000
+"""µs. What is further apart is no step but a gap."""
+
+
+class SetpointGauge:
+    """Told each set-point with its time (µs). None may be faster than ``fastest`` (m/s) and accelerate harder
+    than ``hardest`` (m/s²), nor jump by more than that explains."""
+
+    def __init__(self, fastest: float, hardest: float) -> None:
+        self.count = self.gaps = 0
+        self.finite = True
+        self.step = self.speed = self.acceleration = self.jump = 0.0
+        self._fastest, self._hardest = fastest, hardest
+        self.masks: Counter[int] = Counter()
+        self.frames: Counter[int] = Counter()
+        self._last: tuple[int, Vector] | None = None
+
+    def take(self, now: int, message: SetpointLocal) -> None:
+        """One that leaves, or would, at ``now``."""
+        self.count += 1
+        self.masks[message.type_mask] += 1
+        self.frames[message.frame] += 1
+        if not is_finite(message):
+            self.finite = False
+            return
+        self.speed = max(self.speed, hypot(*message.velocity))
+        self.acceleration = max(self.acceleration, hypot(*message.acceleration))
+        if self._last is not None:
+            before, place = self._last
+            if now - before > TOGETHER:
+                self.gaps += 1
+            else:
+                step = dist(place, message.position)
+                self.step = max(self.step, step)
+                self.jump = max(self.jump, step - self._fastest * (now - before) * 1e-6)
+        self._last = now, message.position
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """For the summary."""
+        largest = {
+            "max_step_m": self.step,
+            "max_speed_m_s": self.speed,
+            "max_acceleration_m_s2": self.acceleration,
+        }
+        return {
+            "count": self.count,
+            "finite": self.finite,
+            **{name: round(value, 4) if isfinite(value) else None for name, value in largest.items()},
+            "gaps": self.gaps,
+            "mask_counts": {f"0x{mask:03X}": n for mask, n in sorted(self.masks.items())},
+            "frames": {str(frame): n for frame, n in sorted(self.frames.items())},
+        }
+
+    def faults(self, mask: int) -> list[str]:
+        """What is wrong with them for an autopilot that takes ``mask``."""
+        wrong = {
+            "not all are finite": not self.finite,
+            f"type masks other than 0x{mask:03X}": bool(set(self.masks) - {mask}),
+            f"frames other than {FRAME_LOCAL_NED}": bool(set(self.frames) - {FRAME_LOCAL_NED}),
+            f"faster than {self._fastest:.1f} m/s": self.speed > self._fastest + _ROUNDED,
+            f"more than {self._hardest:.1f} m/s²": self.acceleration > self._hardest + _ROUNDED,
+            f"a jump of {self.jump:.2f} m": self.jump > _CORRECTED,
+        }
+        return [what for what, is_so in wrong.items() if is_so]
+
+
+def gauge_for(limits: LimitsConfig) -> SetpointGauge:
+    """For a companion with these limits."""
+    return SetpointGauge(hypot(*limits.v_max), limits.a_total)
+
+
+_ROUNDED = 1e-3
+_CORRECTED = 0.15
+"""m by which the estimate of the own position may be corrected from one set-point to the next."""

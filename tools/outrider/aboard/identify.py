@@ -1,0 +1,86 @@
+"""Who is on the autopilot's link: the own vehicle, another one, or nobody yet."""
+
+from __future__ import annotations
+
+from companion.autopilots import Profile
+from companion.autopilots.known import KNOWN, profile_of
+from companion.node import COMPONENT
+from companion.reception import AUTOPILOT
+from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.messages import Heartbeat, Source
+from mavlink_bridge.signing import Signing
+from outrider.errors import InputError
+
+_BEAT = 1_000_000
+_PATIENCE = 5_000_000
+"""µs for which others may be heard before the own vehicle is; heartbeats come once a second."""
+_HEARTBEAT = 0
+
+
+class Identification:
+    """Asked again and again until it answers. ``link``: the physical one, on which all are heard."""
+
+    def __init__(self, link: Link, endpoint: str, system: int, signing: Signing | None) -> None:
+        self._link, self._endpoint, self._system = link, endpoint, system
+        self._signing = signing
+        self._codec = Codec(
+            lambda identifier, _system, component: identifier == _HEARTBEAT and component == AUTOPILOT,
+            signing,
+        )
+        self._others: dict[int, Heartbeat] = {}
+        self._since: int | None = None
+        self._next = 0
+
+    def look(self, now: int) -> Heartbeat | None:
+        """The own vehicle's heartbeat, None before it is heard; ``now``: µs of the wall. InputError where
+        there are only others, or an autopilot that is not known."""
+        if self._signing is not None:
+            self._signing.present(now)
+        if now >= self._next:
+            # Routers and autopilots that wait to be spoken to learn by it that somebody is here.
+            self._next = now + _BEAT
+            own = Source(self._system, COMPONENT)
+            beat = Heartbeat(own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+            self._link.send(self._codec.encode(beat))
+        for data in self._link.receive():
+            for message in self._codec.feed(data, whole=True):
+                if isinstance(message, Heartbeat) and message.autopilot != AUTOPILOT_INVALID:
+                    if message.source.system == self._system:
+                        return self._known(message)
+                    self._others[message.source.system] = message
+                    self._since = now if self._since is None else self._since
+        if self._since is not None and now - self._since > _PATIENCE:
+            raise InputError(self._mismatch())
+        return None
+
+    @property
+    def waiting(self) -> str:
+        """What it waits for."""
+        refused = self._codec.counters.refused
+        unsigned = f"; {refused} heartbeats there are not signed with the key" if refused else ""
+        others = f"; heard there: {', '.join(map(str, sorted(self._others)))}" if self._others else ""
+        return f"a heartbeat of vehicle {self._system} on {self._endpoint}{others}{unsigned}"
+
+    def _known(self, beat: Heartbeat) -> Heartbeat:
+        if profile_of(beat) is None:
+            allowed = ", ".join(f"{profile.name} {number}" for number, profile in sorted(KNOWN.items()))
+            raise InputError(
+                f"--autopilot {self._endpoint}: vehicle {self._system} has an autopilot of kind "
+                f"{beat.autopilot}; allowed: {allowed}"
+            )
+        return beat
+
+    def _mismatch(self) -> str:
+        heard = ", ".join(
+            f"{system} ({_name(profile_of(beat), beat)})" for system, beat in sorted(self._others.items())
+        )
+        return (
+            f"system {self._system} is not on {self._endpoint}; heard there: {heard}; allowed: one of "
+            "these as system in the file, or with --system"
+        )
+
+
+def _name(profile: Profile | None, beat: Heartbeat) -> str:
+    return f"autopilot {beat.autopilot}" if profile is None else profile.name

@@ -1,0 +1,113 @@
+"""What joins the process that flies and the one that looks after it: orders there, news back. It never waits,
+and what one cannot take is lost to it."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Iterator
+from typing import Any, Final
+
+from mavlink_bridge.links.link import LinkCounters
+
+_MOST: Final = 65536
+_STOP: Final = b"stop"
+_BUFFER: Final = 1 << 20
+
+
+def intercom() -> tuple[Desk, OrderLink]:
+    """The parent's end, and the child's."""
+    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    for end in (there, here):
+        end.setblocking(False)
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
+    return Desk(there), OrderLink(here)
+
+
+class Desk:
+    """The parent's end."""
+
+    def __init__(self, end: socket.socket) -> None:
+        self._end = end
+
+    def fileno(self) -> int:
+        """Readable: there is news."""
+        return self._end.fileno()
+
+    def order(self, frame: bytes) -> None:
+        """A MAVLink frame for the companion, as if from its ground link."""
+        self._put(frame)
+
+    def stop(self) -> None:
+        """The child shall end."""
+        self._put(_STOP)
+
+    def news(self) -> Iterator[dict[str, Any]]:
+        """What the child has said since the last time."""
+        while (data := _taken(self._end)) is not None:
+            yield json.loads(data)
+
+    def close(self) -> None:
+        """This end."""
+        self._end.close()
+
+    def _put(self, data: bytes) -> None:
+        _given(self._end, data)
+
+
+class OrderLink:
+    """The child's end: to the loop a ``Link`` like the others, by which orders arrive. ``stop``: whether it
+    has been told to end."""
+
+    def __init__(self, end: socket.socket) -> None:
+        self._end = end
+        self._received = 0
+        self.stop = False
+
+    @property
+    def counters(self) -> LinkCounters:
+        """Orders."""
+        return LinkCounters(self._received, 0, 0)
+
+    def fileno(self) -> int:
+        """Readable: there are orders."""
+        return self._end.fileno()
+
+    def receive(self) -> list[bytes]:
+        """Orders."""
+        found = []
+        while (data := _taken(self._end)) is not None:
+            if data == _STOP:
+                self.stop = True
+            else:
+                found.append(data)
+        self._received += len(found)
+        return found
+
+    def send(self, data: bytes) -> None:
+        """Answers to orders are news, which ``tell`` has; nothing goes this way."""
+
+    def tell(self, **news: object) -> None:
+        """Say something to the parent."""
+        _given(self._end, json.dumps(news).encode())
+
+    def close(self) -> None:
+        """It stays open until the process ends: the last news comes after the loop."""
+
+    def release(self) -> None:
+        """Close this end in the process that does not fly."""
+        self._end.close()
+
+
+def _taken(end: socket.socket) -> bytes | None:
+    try:
+        return end.recv(_MOST) or None
+    except OSError:
+        return None
+
+
+def _given(end: socket.socket, data: bytes) -> None:
+    try:
+        end.send(data)
+    except OSError:
+        return

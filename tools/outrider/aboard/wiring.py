@@ -1,0 +1,84 @@
+"""The links of a companion, opened: each physical link once, however many of the companion's lead over it."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import NamedTuple
+
+from companion.node import COMPONENT
+from companion.reception import AUTOPILOT
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.errors import LinkError, LogError
+from mavlink_bridge.header import Header
+from mavlink_bridge.links.dealt import Dealer, DealtLink, Wants
+from mavlink_bridge.links.endpoints import Endpoint
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.opening import open_link
+from outrider.errors import InputError
+
+LAST_VEHICLE = 250
+"""System ids above are ground stations'."""
+_COMMANDS = (75, 76)
+
+
+class Wiring(NamedTuple):
+    """``ends`` by the companion's name for a link; ``dealers`` are the physical links."""
+
+    ends: dict[str, DealtLink]
+    dealers: list[Dealer]
+
+    def physical(self, name: str) -> Link:
+        """The link below the end of that ``name``."""
+        return next(dealer.link for dealer in self.dealers if name in dealer.ends)
+
+    def drain(self) -> None:
+        """Forget what has arrived: what was said before nobody listened counts no more."""
+        for dealer in self.dealers:
+            dealer.forget()
+
+    def close(self) -> None:
+        """All of them."""
+        for end in self.ends.values():
+            end.close()
+
+
+def wants(name: str, system: int, target: int) -> Wants:
+    """Which frames of a physical link belong to the companion's link of that ``name``. What it said itself,
+    and comes back, belongs to none."""
+
+    def autopilot(header: Header) -> bool:
+        return header.system == system and header.component != COMPONENT
+
+    def swarm(header: Header) -> bool:
+        return header.system not in (system, target) and header.system <= LAST_VEHICLE
+
+    def ground(header: Header) -> bool:
+        if header.system != system:
+            return True
+        return header.message_id in _COMMANDS and header.component not in (AUTOPILOT, COMPONENT)
+
+    rules: dict[str, Wants] = {
+        "autopilot": autopilot,
+        "swarm": swarm,
+        "target": lambda header: header.system == target,
+        "ground": ground,
+    }
+    return rules[name]
+
+
+def wire(endpoints: dict[str, Endpoint], system: int, target: int, clock: Clock) -> Wiring:
+    """Open them. InputError if one cannot be; then none stays open."""
+    with ExitStack() as opened:
+        dealers = []
+        ends: dict[str, DealtLink] = {}
+        for endpoint in dict.fromkeys(endpoints.values()):
+            names = [name for name, other in endpoints.items() if other == endpoint]
+            try:
+                link = open_link(endpoint, clock)
+            except (LinkError, LogError) as error:
+                raise InputError(f"--{names[0]}: {error}") from None
+            opened.callback(link.close)
+            dealers.append(Dealer(link, {name: wants(name, system, target) for name in names}))
+            ends |= dealers[-1].ends
+        opened.pop_all()
+    return Wiring(ends, dealers)

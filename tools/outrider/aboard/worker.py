@@ -1,0 +1,155 @@
+"""The process that flies: the companion under its clock over its links, until it is told to end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final
+
+from companion.dry_run import DryRun
+from companion.node import Companion
+from mavlink_bridge.clock import WallClock
+from mavlink_bridge.followed_clock import FollowedClock
+from mavlink_bridge.garbage import IdleCollector
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.priority import ask_for_priority, sharpen_timers
+from mavlink_bridge.realtime import RealTime
+from mavlink_bridge.runtime import Scheduled
+from mavlink_bridge.signing import Signing
+from outrider.aboard.cockpit import Cockpit
+from outrider.aboard.departures import Departures
+from outrider.aboard.harmless import HarmlessLink
+from outrider.aboard.intercom import OrderLink
+from outrider.aboard.news import News
+from outrider.aboard.request import Request
+from outrider.recorder import Recorder
+
+_IGNORED: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
+"""The parent alone is told by signals when to end; a terminal that is closed or stopped ends no flight."""
+
+
+class Worker:
+    """``links`` by the companion's names; ``directory`` gets the log."""
+
+    def __init__(self, asked: Request, links: Mapping[str, Link], orders: OrderLink, directory: Path) -> None:
+        self._asked, self._orders, self._directory = asked, orders, directory
+        self._doors = [HarmlessLink(link) for link in links.values()] if asked.dry_run else []
+        self._links = dict(zip(links, self._doors or links.values(), strict=True))
+        self._parent = os.getpid()
+        self._signing = None if asked.key is None else Signing(asked.key)
+        kind = DryRun if asked.dry_run else Companion
+        config = asked.config
+        self._companion = kind(
+            config.settings,
+            config.system,
+            config.target,
+            config.origin.frame,
+            time.thread_time_ns,
+            self._signing,
+        )
+
+    def main(self) -> None:
+        """The process, from fork to exit."""
+        for which in _IGNORED:
+            signal.signal(which, signal.SIG_IGN)
+        if self._asked.realtime:
+            self._orders.tell(kind="event", at=0.0, what="priority", text=ask_for_priority().told)
+        else:
+            sharpen_timers()
+        with ExitStack() as files:
+            status = self._flown(files)
+            # The parent has the last word from here on; files take their time.
+            self._orders.tell(kind="left")
+        sys.exit(status)
+
+    def _flown(self, files: ExitStack) -> int:
+        try:
+            self._fly(files)
+        except Exception as error:
+            if os.environ.get("OUTRIDER_TRACEBACK"):
+                traceback.print_exc()
+            self._orders.tell(kind="fault", text=f"{type(error).__name__}: {error}")
+            return 3
+        return 0
+
+    def _fly(self, files: ExitStack) -> None:
+        asked, node = self._asked, self._companion
+        wall = WallClock()
+        followed = FollowedClock(wall, wall.now()) if asked.config.clock == "autopilot" else None
+        cockpit = Cockpit(node, wall, followed, self._signing)
+        departures = Departures(node.config.limits)
+        news = News(cockpit, departures, followed, self._signing, self._orders.tell)
+        recorder = Recorder(self._directory, [asked.system], files)
+        links: dict[str, Link | Sequence[Link]] = {
+            **self._links,
+            "ground": (self._links["ground"], self._orders),
+        }
+
+        def stepped(now: int) -> bool:
+            if os.getppid() != self._parent:
+                cockpit.give_up()
+            if isinstance(node, DryRun):
+                for message in node.would:
+                    departures.take(now, message)
+                node.would.clear()
+            news.look(now, wall.now())
+            return cockpit.last is not None and cockpit.last.over
+
+        with IdleCollector() as garbage:
+
+            def idle(free: int) -> None:
+                garbage.idle(free if followed is None else int(free / followed.rate))
+
+            loop = RealTime(
+                Scheduled(cockpit, asked.config.period_us),
+                links,
+                wall if followed is None else followed,
+                taps=(recorder, departures),
+                on_idle=idle,
+            )
+            try:
+                loop.run(lambda: self._orders.stop, stepped)
+            finally:
+                self._leave(loop, news, departures, 1.0 if followed is None else followed.rate)
+
+    def _leave(self, loop: RealTime, news: News, departures: Departures, rate: float) -> None:
+        """What the summary needs."""
+        node, statistics = self._companion, loop.statistics
+        for reading in node.shed():
+            news.plan_times.add(reading // 1000)
+        profile = node.pilot.profile
+        mask = 0 if profile is None else profile.setpoint_mask
+        self._orders.tell(
+            kind="figures",
+            plans=node.tally.plans,
+            plan_ms={
+                name: round(value * 1e-3, 3) for name, value in news.plan_times.spread._asdict().items()
+            },
+            solver_failures=node.tally.solver_failures,
+            held_epochs=node.tally.held,
+            not_finite=node.not_finite,
+            setpoints=departures.setpoints.facts,
+            setpoint_faults=departures.setpoints.faults(mask),
+            commands={str(command): count for command, count in sorted(departures.commands.items())},
+            messages={
+                "sent": dict(departures.messages),
+                "received": {link: counters.good for link, counters in node.counters.items()},
+                "bad": node.bad_frames,
+                "refused": sum(counters.refused for counters in node.counters.values()),
+                "overruns": statistics.overruns,
+                "kept_back": sum(door.kept for door in self._doors),
+            },
+            deadline_steps=statistics.steps + statistics.skipped,
+            deadline_misses=statistics.misses + statistics.skipped,
+            lateness_ms={
+                name: round(value * 1e-3 / rate, 3) for name, value in statistics.lateness._asdict().items()
+            },
+            clock_rate=round(rate, 4),
+            cpu_s=round(time.process_time(), 2),
+        )

@@ -1,0 +1,23 @@
+"""A bar on standard error for what is no flight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+
+@contextmanager
+def share_progress() -> Iterator[Callable[[str, float], None]]:
+    """A bar for what is no flight; the callable takes what is done now and the share that is done."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def watch(what: str, share: float) -> None:
+            bar.update(task, description=what, completed=share)
+
+        yield watch
