@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mavlink_bridge import priority
-from mavlink_bridge.garbage import IdleCollector
+from mavlink_bridge.garbage import IdleCollector, seldom_collected
 from mavlink_bridge.histogram import Histogram, Spread
 from mavlink_bridge.priority import LEVEL, Priority, ask_for_priority
 
@@ -112,6 +112,19 @@ def test_a_collector_that_was_off_stays_off() -> None:
         assert not gc.isenabled()
     finally:
         gc.enable()
+
+
+def test_seldom_is_not_never_and_ends() -> None:
+    before = gc.get_threshold()
+    with seldom_collected():
+        ring = litter(2_000)
+        assert ring() is not None
+        # Containers that stay: so much that is new calls for a look.
+        kept = [[number] for number in range(200_000)]
+        assert ring() is None
+        assert len(kept) == 200_000
+    assert gc.get_threshold() == before
+    assert gc.get_freeze_count() == 0
 
 
 # Priority

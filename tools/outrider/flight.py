@@ -14,6 +14,7 @@ from companion.node import Tally
 from companion.obstacles import FixedObstacles
 from companion.pilot import Phase
 from mavlink_bridge.ether import Ether
+from mavlink_bridge.garbage import seldom_collected
 from mavlink_bridge.runtime import LockStep, Scheduled
 from outrider import names
 from outrider.conductor import Conductor, Sight, Stage
@@ -77,7 +78,7 @@ class Flight:
 
     def run(self) -> None:
         """Fly to the end; ``outcome`` then says how it was."""
-        with ExitStack() as files:
+        with ExitStack() as files, seldom_collected():
             taps = []
             if self._directory is not None:
                 taps.append(Recorder(self._directory, self.systems, files))
