@@ -9,6 +9,7 @@ the very plan that the farewell goes with: an older one may end elsewhere.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 from companion.certified.committed import carried_on, controls, rests
@@ -26,6 +27,16 @@ class Filed(NamedTuple):
 
     plan: WirePlan
     controls: Array
+
+
+@lru_cache(maxsize=512)
+def _read(payload: bytes) -> tuple[Filed, bool]:
+    """A plan on the wire, and whether it ends at rest. Where many companions share a process each is read
+    once. Raises PlanWireError."""
+    plan = unpack(payload)
+    points = controls(plan)
+    points.flags.writeable = False
+    return Filed(plan, points), rests(plan)
 
 
 class Ledger:
@@ -59,17 +70,18 @@ class Ledger:
         if system == self._own or self._last.get(system) == payload:
             return
         try:
-            plan = unpack(payload)
+            read, at_rest = _read(payload)
         except PlanWireError:
             self.refused += 1
             return
+        plan = read.plan
         fits = (
-            plan.origin == self._origin
+            at_rest
+            and plan.origin == self._origin
             and plan.dt == self._dt
             and len(plan.accelerations) == self._steps
             and plan.epoch % self._epoch == 0
             and abs(plan.epoch - now) <= _KEPT * self._epoch
-            and rests(plan)
         )
         filed = self._plans.setdefault(system, {}) if fits else {}
         known = filed.get(plan.epoch)
@@ -80,7 +92,7 @@ class Ledger:
         if not filed:
             self._members = None
         if known is None:
-            filed[plan.epoch] = Filed(plan, controls(plan))
+            filed[plan.epoch] = read
             for epoch in sorted(filed)[:-_KEPT]:
                 del filed[epoch]
 
