@@ -18,7 +18,7 @@ from companion.forces import Obstacles
 from companion.guard import Guard
 from companion.heading import Heading
 from companion.horizon import Array, Motion
-from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
+from companion.pilot import NAV_LAND, NAV_TAKEOFF, STEERED, Phase, Pilot
 from companion.plan_log import PlanLog
 from companion.planner import Aim, Plan, Planner, standing
 from companion.reception import LINKS, accepts
@@ -103,6 +103,7 @@ class Companion:
         self._goal: Array | None = None
         self._held: Array | None = None
         self.watch = Watch(config)
+        self._owed: dict[str, Reaction] = {}
         self._next_look = self._looked_late = 0
         self._settling = Settling(config)
         self._certified = (
@@ -418,10 +419,17 @@ class Companion:
         for concern, begins in self.watch.look(situation):
             if concern.name != "target":  # of that the world tells
                 self.voice.report(concern.severity, concern.text, begins=begins)
-            if begins and concern.reaction is Reaction.RETURN:
-                self.pilot.come_back()
-            if begins and concern.reaction is Reaction.LAND:
+            if begins and concern.reaction is not Reaction.TELL:
+                self._owed[concern.name] = concern.reaction
+            elif not begins:
+                self._owed.pop(concern.name, None)
+        if self._owed and self.pilot.phase in STEERED:
+            # What began on the way up, or while somebody else had the vehicle, follows now.
+            if Reaction.LAND in self._owed.values():
                 self.pilot.alight()
+            else:
+                self.pilot.come_back()
+            self._owed.clear()
 
     def _place_to_hold(self, measured: Motion) -> Array:
         """Where it was when it was told to stay or to come back, or when the target was lost."""

@@ -351,7 +351,9 @@ def test_taken_over_by_its_mode_switch_it_is_silent_and_then_starts_where_it_is(
     flying.fly(1.0)
     here = autopilot.position.copy()
     autopilot.mode = profile.guided_custom_mode
-    first = setpoints(flying.fly(0.2))[0]
+    assert setpoints(flying.fly(1.0)) == []
+    flying.order(TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
+    first = setpoints(flying.fly(2.0))[0]
     np.testing.assert_allclose(place(first), here, atol=0.02)
     assert math.remainder(math.pi / 2 - first.yaw - 2.5, math.tau) == pytest.approx(0.0, abs=0.02)
 

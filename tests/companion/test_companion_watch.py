@@ -164,6 +164,19 @@ def test_with_a_critical_battery_it_lands_where_it_is(flying):
     assert np.linalg.norm(flying.autopilot.position[:2] - here[:2]) < 1.0
 
 
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+@pytest.mark.parametrize("left", [0.15, 0.05])
+def test_what_begins_on_the_way_up_is_not_forgotten_at_the_top(flavour, left):
+    bench = Bench(flavour)
+    bench.fly(1.0)
+    bench.order(TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
+    while bench.phase is not Phase.PREPARE or not bench.autopilot.armed:
+        bench.step()
+    bench.autopilot.battery = left
+    sent = bench.fly(15.0)
+    assert LAND in commands(sent)
+
+
 def test_an_operator_may_go_on_in_spite_of_a_low_battery(flying):
     flying.go_to([6.0, 3.0, 6.0])
     flying.fly(5.0)
