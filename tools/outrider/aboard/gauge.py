@@ -12,6 +12,8 @@ from mavlink_bridge.messages import SetpointLocal, Vector
 
 TOGETHER = 100_000
 """µs. What is further apart is no step but a gap."""
+_IN_A_ROW = 35_000
+"""µs. After any pause the yaw begins anew where the vehicle's nose points."""
 
 
 class SetpointGauge:
@@ -45,8 +47,9 @@ class SetpointGauge:
                 step = dist(place, message.position)
                 self.step = max(self.step, step)
                 self.jump = max(self.jump, step - self._fastest * (now - before) * 1e-6)
-                swing = abs((message.yaw - yaw + pi) % (2.0 * pi) - pi)
-                self.swing = max(self.swing, swing - self._turning * (now - before) * 1e-6)
+                if now - before <= _IN_A_ROW:
+                    swing = abs((message.yaw - yaw + pi) % (2.0 * pi) - pi)
+                    self.swing = max(self.swing, swing - self._turning * (now - before) * 1e-6)
         self.spin = max(self.spin, abs(message.yaw_rate))
         self._last = now, message.position, message.yaw
 
@@ -76,7 +79,7 @@ class SetpointGauge:
             f"faster than {self._fastest:.1f} m/s": self.speed > self._fastest + _ROUNDED,
             f"more than {self._hardest:.1f} m/s²": self.acceleration > self._hardest + _ROUNDED,
             f"a jump of {self.jump:.2f} m": self.jump > _CORRECTED,
-            f"a jump of {self.swing:.2f} rad": self.swing > _ROUNDED,
+            f"a jump of {self.swing:.2f} rad": self.swing > _TURNED,
             f"turning faster than {self._turning:.1f} rad/s": self.spin > self._turning + _ROUNDED,
         }
         return [what for what, is_so in wrong.items() if is_so]
@@ -89,5 +92,7 @@ def gauge_for(limits: LimitsConfig, heading: HeadingConfig | None = None) -> Set
 
 
 _ROUNDED = 1e-3
+_TURNED = 0.02
+"""rad: the own clock may run a hundredth beside the log's."""
 _CORRECTED = 0.15
 """m by which the estimate of the own position may be corrected from one set-point to the next."""
