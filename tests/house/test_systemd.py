@@ -1,4 +1,5 @@
-"""The units in config/systemd are what systemd takes, call the command as it is, and fly nothing by themselves."""
+"""The units in config/systemd are what systemd takes, call the command as it is, and fly nothing by
+themselves."""
 
 from __future__ import annotations
 
@@ -35,9 +36,8 @@ def said(unit: str, key: str) -> list[str]:
 def words(environment: dict[str, str]) -> list[str]:
     """The command as systemd calls it: ``$NAME`` as words, ``${NAME}`` as one."""
     (line,) = said(SERVICE, "ExecStart")
-    line = line.replace("/etc/outrider/%i.yaml", str(config_root() / "companions" / "px4.yaml")).replace(
-        "%i", "3"
-    )
+    file = config_root() / "companions" / "px4.yaml"
+    line = line.replace("/etc/outrider/%i.yaml", str(file)).replace("%i", "3")
     found = []
     for word in line.split():
         if word.startswith("${"):
