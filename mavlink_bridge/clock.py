@@ -62,7 +62,8 @@ class WallClock:
 
 
 class Account(Protocol):
-    """Where simulated time is booked that is given up: ``lost``, µs. One for all who live in the same time."""
+    """Where simulated time is booked that is given up: ``lost``, µs. One for all who live in the same
+    time."""
 
     lost: int
 

@@ -5,17 +5,21 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from outrider.errors import OutriderError
+from outrider.run_directories import new_directory
 from outrider.saying import say
 from trials.plan import FLAVOURS, Plan
+from trials.progress import Progress
 from trials.stage import Stage
 from trials.story import play
 from trials.verdict import verdict
+
+SLOWEST, FASTEST = 0.2, 20.0
 
 
 def main() -> int:
@@ -25,33 +29,39 @@ def main() -> int:
     parser.add_argument("--speed", type=float, default=10.0, help="of time, 1 to 10")
     parser.add_argument("--out", type=Path, help="a new directory for all files")
     asked = parser.parse_args()
-    directory = asked.out or Path(tempfile.mkdtemp(prefix="trial-"))
-    directory.mkdir(parents=True, exist_ok=True)
-    found = trial(Plan(asked.flavour, asked.speed), directory)
+    if not SLOWEST <= asked.speed <= FASTEST:
+        parser.error(f"--speed {asked.speed:g}: allowed is {SLOWEST:g} to {FASTEST:g}")
+    try:
+        directory = new_directory(asked.out, f"trial-{asked.flavour}")
+    except OutriderError as error:
+        parser.error(str(error))
+    try:
+        found = trial(Plan(asked.flavour, asked.speed), directory)
+    except KeyboardInterrupt:
+        say("stopped")
+        return 130
+    except OutriderError as error:
+        say(str(error))
+        return 3
     print(json.dumps(found, indent=1))  # noqa: T201
     return 1 if found["faults"] else 0
 
 
-def trial(plan: Plan, directory: Path) -> dict[str, object]:
-    """What came of it; progress on standard error."""
+def trial(plan: Plan, directory: Path) -> dict[str, Any]:
+    """What came of it; a line for each act on standard error, and on a terminal the time."""
     trouble = None
-    stage: Stage | None = None
-
-    def tell(line: str) -> None:
-        at = "" if stage is None else f"{stage.now:7.1f} s  "
-        say(f"{plan.flavour} ×{plan.speed:g}  {at}{line}")
-
-    stage = Stage(plan, directory, tell)
-    try:
-        play(stage)
-    except OutriderError as error:
-        trouble = str(error)
-    finally:
-        stage.close()
+    with Progress(plan) as progress:
+        stage = Stage(plan, directory, progress)
+        try:
+            play(stage)
+        except OutriderError as error:
+            trouble = str(error)
+        finally:
+            stage.close()
     found = verdict(stage, trouble)
     _keep(stage, directory)
     (directory / "trial.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    tell(f"{'passed' if not found['faults'] else 'not passed'}; {directory}")
+    say(f"{'not passed' if found['faults'] else 'passed'}; {directory}")
     return found
 
 

@@ -1,5 +1,5 @@
-"""Where the vehicles truly are, by what the SITL tells of them on a port of its own, in the one time that they
-all have."""
+"""Where the vehicles truly are, by what the SITL tells of them on a port of its own, in the one time that
+they all have."""
 
 from __future__ import annotations
 

@@ -37,7 +37,9 @@ class Plan:
 
     def settings(self) -> dict[str, Any]:
         """The shipped file of the flavour, with a companion that speaks to the ground."""
-        document: dict[str, Any] = yaml.safe_load(find("companions", self.flavour).read_text(encoding="utf-8"))
+        document: dict[str, Any] = yaml.safe_load(
+            find("companions", self.flavour).read_text(encoding="utf-8")
+        )
         document["target"] = TARGET
         companion = document["companion"]
         companion["voice"] = {"texts": True, "values": True}

@@ -16,6 +16,7 @@ from outrider.errors import OutriderError
 from trials.hub import Hub
 from trials.observer import Observer
 from trials.plan import TARGET, Plan
+from trials.progress import Progress
 from trials.separation import Nearest, Track, longest_gap, nearest
 from trials.station import Station, listener
 from trials.vehicles import Vehicles
@@ -31,10 +32,11 @@ PATIENCE = 60.0
 
 
 class Stage:
-    """For ``plan``, with all files in ``directory``. ``tell`` gets a line for each act."""
+    """For ``plan``, with all files in ``directory``."""
 
-    def __init__(self, plan: Plan, directory: Path, tell: Callable[[str], None]) -> None:
-        self.plan, self.directory, self.tell = plan, directory, tell
+    def __init__(self, plan: Plan, directory: Path, progress: Progress) -> None:
+        self.plan, self.directory = plan, directory
+        self._progress = progress
         self._began = time.monotonic()
         self._looked = 0.0
         self._target: list[tuple[float, float, float, float]] = []
@@ -50,7 +52,7 @@ class Stage:
             files.callback(self.station.link.close)
             self.swarm = Hub(plan.systems)
             files.callback(self.swarm.close)
-            self.walker = Walker(self._fleet, plan.systems)
+            self.walker = Walker(self._fleet)
             files.callback(self.walker.close)
             config = plan.write(directory)
             self.wingmen: dict[int, Wingman] = {}
@@ -58,7 +60,7 @@ class Stage:
                 options = {
                     "autopilot": self.vehicles.endpoint(system),
                     "swarm": self.swarm.endpoint(system),
-                    "target": self.walker.endpoints[system],
+                    "target": self.walker.endpoint,
                     "ground": self.station.endpoint,
                     "config": str(config),
                 }
@@ -72,6 +74,10 @@ class Stage:
     def now(self) -> float:
         """s of the simulation, since the first vehicle booted."""
         return self.observer.latest
+
+    def tell(self, act: str) -> None:
+        """An act begins."""
+        self._progress.tell(self.now, act)
 
     def until(self, is_so: Callable[[], object], what: str) -> None:
         """Turn until then. OutriderError if it does not come."""
@@ -89,8 +95,8 @@ class Stage:
 
     def turn(self) -> None:
         """One round."""
-        doors = [*self.swarm.sockets, self.observer.link, self.station.link]
-        select.select(doors, [], [], _TURN)
+        # What the companions say to each other is passed on at once; the rest may wait until the next round.
+        select.select(self.swarm.sockets, [], [], _TURN)
         self.swarm.turn()
         self.observer.turn()
         self.station.turn()
@@ -100,6 +106,7 @@ class Stage:
             self._looked = wall
             for wingman in self.wingmen.values():
                 wingman.look(self.now)
+            self._progress.look(self.now)
 
     def _walk(self) -> None:
         if not self.observer.ready:

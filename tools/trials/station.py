@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.codec import Codec
+from mavlink_bridge.links.endpoints import UdpIn
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.links.udp import UdpListener
 from mavlink_bridge.messages import StatusText
 from trials.plan import HOST
 
@@ -20,7 +21,9 @@ class Station:
     def __init__(self, systems: Sequence[int]) -> None:
         self.link, self.endpoint = listener()
         self.texts: dict[int, list[str]] = {system: [] for system in systems}
-        self._codec = Codec(lambda identifier, system, _component: identifier == _TEXT and system in self.texts)
+        self._codec = Codec(
+            lambda identifier, system, _component: identifier == _TEXT and system in self.texts
+        )
 
     def turn(self) -> None:
         """Hear what has come."""
@@ -32,8 +35,5 @@ class Station:
 
 def listener() -> tuple[Link, str]:
     """A UDP port, and the endpoint for who speaks to it."""
-    from mavlink_bridge.links.endpoints import UdpIn
-    from mavlink_bridge.links.udp import UdpListener
-
     link = UdpListener(UdpIn(HOST, 0), WallClock())
     return link, f"udpout:{HOST}:{link.address[1]}"

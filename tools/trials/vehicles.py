@@ -20,8 +20,8 @@ _FAREWELL = 20.0
 
 
 class Vehicles:
-    """Those of ``plan``, which also tell everything to ``ear``, an endpoint. OutriderError if they do not come
-    up."""
+    """Those of ``plan``, which also tell everything to ``ear``, an endpoint. OutriderError if they do not
+    come up."""
 
     def __init__(self, plan: Plan, ear: str, directory: Path) -> None:
         base = _free_base(plan.flavour)
@@ -40,9 +40,7 @@ class Vehicles:
 
     def endpoint(self, system: int) -> str:
         """For that vehicle's companion."""
-        return next(
-            str(one["pymavlink"]) for one in self._ready["vehicles"] if one["system_id"] == system
-        )
+        return next(str(one["pymavlink"]) for one in self._ready["vehicles"] if one["system_id"] == system)
 
     def close(self) -> None:
         """End them; ``summary`` is what they said."""

@@ -41,9 +41,7 @@ def verdict(stage: Stage, trouble: str | None) -> dict[str, Any]:
         "d_min_m": d_min,
         "target_d_min_m": target_d_min,
         "longest_gap_s": round(gap, 3),
-        "events": {
-            str(system): len(wingman.events) for system, wingman in stage.wingmen.items()
-        },
+        "events": {str(system): len(wingman.events) for system, wingman in stage.wingmen.items()},
         "texts": {str(system): len(texts) for system, texts in stage.station.texts.items()},
         "setpoints": sum(said.get("setpoints", {}).get("count", 0) for said in sums),
         "plan_ms": {

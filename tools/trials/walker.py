@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import socket
-from collections.abc import Sequence
+import random
 
 import numpy as np
 
@@ -21,13 +20,14 @@ _MIDDLE = np.array([3.0, 1.5, 0.0])
 
 
 class Walker:
-    """Asked where it is at a time (µs), and to say so then. Each of ``systems`` hears it at ``endpoints``."""
+    """Asked where it is at a time (µs), and to say so then, to all who listen at ``endpoint``."""
 
-    def __init__(self, fleet: FleetFrame, systems: Sequence[int]) -> None:
+    def __init__(self, fleet: FleetFrame) -> None:
         self.silent = False
-        ports = {system: _free_port() for system in systems}
-        self.endpoints = {system: f"udpin:{HOST}:{port}" for system, port in ports.items()}
-        self._links = [open_link(f"udpout:{HOST}:{port}", WallClock()) for port in ports.values()]
+        # A group of its own: several trials may go on at a time.
+        group = f"239.255.{random.randrange(1, 250)}.{random.randrange(1, 250)}"
+        self.endpoint = f"mcast:{group}:{random.randrange(16_000, 28_000)},{HOST}"
+        self._link = open_link(self.endpoint, WallClock())
         self._stopped: int | None = None
         self._beacon = Beacon(TARGET, "target", _RATE, fleet)
 
@@ -47,16 +47,8 @@ class Walker:
         """Say what is due at ``now``."""
         if self._beacon.due(now) and not self.silent:
             for datagram in self._beacon.say(now, self.motion(now)):
-                for link in self._links:
-                    link.send(datagram.data)
+                self._link.send(datagram.data)
 
     def close(self) -> None:
-        """Its links."""
-        for link in self._links:
-            link.close()
-
-
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind((HOST, 0))
-        return int(probe.getsockname()[1])
+        """Its link."""
+        self._link.close()

@@ -35,9 +35,7 @@ class Seat:
 def boot_times(indices: Sequence[int], speed: float, period: int) -> dict[int, int]:
     """When (µs) each of the vehicles of one squad boots, by index: at steps of that ``period`` (µs)."""
     spread = round(SPREAD * min(speed, 1.0))
-    return {
-        index: spread * number // len(indices) // period * period for number, index in enumerate(indices)
-    }
+    return {index: spread * number // len(indices) // period * period for number, index in enumerate(indices)}
 
 
 class Squad:
@@ -55,9 +53,7 @@ class Squad:
     ) -> None:
         """``vehicles`` by their index among all, which is their row on the ``board``, and when they boot
         (µs); ``first_id``: the system id of index 0; ``speed`` of time."""
-        self.seats = [
-            Seat(index, node, first_id + index, boots[index]) for index, node in vehicles.items()
-        ]
+        self.seats = [Seat(index, node, first_id + index, boots[index]) for index, node in vehicles.items()]
         self._board = board
         self._shown = round(SHOWN * 1e6 * speed)
 
