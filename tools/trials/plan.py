@@ -14,7 +14,7 @@ HOST: Final = "127.0.0.1"
 TARGET: Final = 100
 VEHICLES: Final = 5
 FLAVOURS: Final = ("ardupilot", "px4")
-_PLAN_US, _SETPOINT_US = 10_000, 50_000
+_PLAN_US, _SETPOINT_US = 5_000, 50_000
 """µs: of the wall between two plans at least, and of the simulation between two set-points at most."""
 
 
