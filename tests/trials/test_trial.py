@@ -14,11 +14,11 @@ from trials.plan import FLAVOURS, Plan
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_trial_five_times_as_fast(tmp_path: Path, flavour: str) -> None:
-    assert trial(Plan(flavour, 5.0), tmp_path / "run")["faults"] == []
+    assert trial(Plan(flavour, 5.0), tmp_path)["faults"] == []
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("speed", [1.0, 10.0])
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_trial_at_another_speed(tmp_path: Path, flavour: str, speed: float) -> None:
-    assert trial(Plan(flavour, speed), tmp_path / "run")["faults"] == []
+    assert trial(Plan(flavour, speed), tmp_path)["faults"] == []
