@@ -30,7 +30,8 @@ def verdict(stage: Stage, trouble: str | None) -> dict[str, Any]:
         for system, said in summaries.items():
             faults += _wrong_with(system, said)
             heard = stage.station.texts[system]
-            faults += [f"{system} did not tell the ground {text!r}" for text in _SAID if text not in heard]
+            wanted = _SAID if system == ENDED else (*_SAID, f"Neighbour {ENDED} is not heard")
+            faults += [f"{system} did not tell the ground {text!r}" for text in wanted if text not in heard]
     sums = [said for said in summaries.values() if said is not None]
     return {
         "flavour": stage.plan.flavour,
@@ -77,6 +78,3 @@ def _wrong_with(system: int, said: dict[str, Any] | None) -> list[str]:
     if len(said["restarts"]) != (system == KILLED):
         wrong.append(f"{system} was restarted {len(said['restarts'])} times")
     return wrong
-
-
-__all__ = ["ENDED", "verdict"]
