@@ -6,7 +6,7 @@ BIN = .venv/bin
 SCRIPTS = tools/bootstrap.py tools/client_environments.py tools/extract_log.py
 CLIENTS = tests/clients/requirements
 
-.PHONY: fly test soak lint bench schemas requirements clean
+.PHONY: fly test trial soak lint bench schemas requirements clean
 .DEFAULT_GOAL := fly
 
 fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--method tangential …"
@@ -14,6 +14,9 @@ fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--met
 
 test: .venv/.made .venv/clients/.made  ## everything; one test with ARGS="-k name"
 	@$(BIN)/pytest -n $(JOBS) --dist loadfile $(ARGS) </dev/null
+
+trial: .venv/.made  ## five companions on five vehicles through all that may happen; ARGS="--speed 1 --flavour px4"
+	@$(BIN)/python -m trials $(ARGS)
 
 soak: .venv/.made  ## what is too long for CI, about half an hour; part of it with ARGS="-k yaml"
 	@$(BIN)/pytest --soak -vv -n $(JOBS) --dist worksteal $(ARGS) </dev/null

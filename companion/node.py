@@ -365,9 +365,24 @@ class Companion:
             aim = self._destination(now, view, measured)
         except SurfaceError:
             return None
+        if aim is not None and self.watch.blinkered:
+            aim = self._cautious(aim, measured)
         if aim is None or self.config.traffic is None:
             return aim
         return aim._replace(destination=self.world.sensed.aside(now, aim.destination, measured.position))
+
+    def _cautious(self, aim: Aim, measured: Motion) -> Aim:
+        """The same way, but no further in a horizon than ``guard.cautious_speed`` goes."""
+        speed = self.config.guard.cautious_speed
+        if speed is None:
+            return aim
+        drift = aim.target_end - aim.target
+        way = aim.destination - drift - measured.position
+        far = float(np.linalg.norm(way))
+        most = speed * 1e-6 * self.config.horizon.dt_us * (self.config.horizon.steps + 1)
+        if far <= most:
+            return aim
+        return aim._replace(destination=measured.position + drift + most / far * way)
 
     def _destination(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to: the own goal, or the surface around the target where it will be at the end of the
