@@ -249,7 +249,8 @@ class Craft:
 
 class Airfield:
     """``count`` vehicles of both flavours on their pads. ``sent``: told each set-point: vehicle, time, message.
-    ``key``: everybody's. ``guests``: other nodes, with their channels' names and the links there."""
+    ``key``: everybody's. ``guests``: other nodes; their ``places`` are the names of their channels, and of the links there.
+    Nodes that are ``deaf`` do not hear them."""
 
     def __init__(
         self,
@@ -259,12 +260,13 @@ class Airfield:
         key: Key | None = None,
         config: CompanionConfig = CONFIG,
         guests: Sequence[Any] = (),
+        deaf: Sequence[str] = (),
     ) -> None:
         self.config, self.seed, self._key = config, seed, key
         self.target = Wanderer(self._signing())
         self.tower = Tower(self._signing())
         self.crafts = [self._craft(k, count, sent) for k in range(count)]
-        self.ether = Ether(self._channels(guests), seed, TICK // 2)
+        self.ether = Ether(self._channels(guests, deaf), seed, TICK // 2)
         nodes = [Scheduled(craft.radio, TICK, EPOCH) for craft in self.crafts]
         for k, craft in enumerate(self.crafts):
             clock = NodeClock(250 * (k - 1) * 4, 15.0 * (k - 1), EPOCH)
@@ -303,7 +305,7 @@ class Airfield:
         )
         return Craft(system, flavour, radio, seat, pad)
 
-    def _channels(self, guests: Sequence[Any]) -> list[Channel]:
+    def _channels(self, guests: Sequence[Any], deaf: Sequence[str]) -> list[Channel]:
         radio, lan = Faults(delay=20_000, jitter=10_000, loss=0.05), Faults(delay=5_000)
         members: dict[str, dict[str, str]] = {"swarm": {}, "target": {self.target.name: "target"}}
         for craft in self.crafts:
@@ -315,7 +317,13 @@ class Airfield:
         for guest in guests:
             for channel, link in guest.places.items():
                 members[channel][guest.name] = link
+        nothing = {(guest.name, node): Faults(loss=1.0) for guest in guests for node in deaf}
         return [
-            Channel(name, nodes, radio if name in ("swarm", "target") else lan)
+            Channel(
+                name,
+                nodes,
+                radio if name in ("swarm", "target") else lan,
+                {pair: faults for pair, faults in nothing.items() if {*pair} <= nodes.keys()},
+            )
             for name, nodes in members.items()
         ]
