@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -113,6 +114,7 @@ class Companion:
         self._heading = Heading(config.heading, config.horizon)
         self._boot: int | None = None
         self._next_plan = self._next_setpoint = 0
+        self._fastest = hypot(*config.limits.v_max)
         self._plans = self._relaxed = 0
         self._plan_ns = array("I")
         self._plan_at = array("q")
@@ -265,7 +267,7 @@ class Companion:
             self.guard.horizon = None
             return
         stale = view.own.age > self.config.guard.own_stale_us
-        measured = Motion(view.own.position, view.own.velocity, _ZERO)
+        measured = Motion(view.own.position, self._bounded(view.own.velocity), _ZERO)
         if self.guard.horizon is None:
             if stale or view.yaw is None:
                 return
@@ -290,6 +292,12 @@ class Companion:
             self.guard.start(now, measured)
             return
         self._plan(now, view, measured)
+
+    def _bounded(self, velocity: Array) -> Array:
+        """A measured ``velocity`` (3,) as a plan may begin with it: whatever the own autopilot, or who speaks in
+        its name, says of its speed, nothing faster than the limits is asked for."""
+        speed = float(np.sqrt(velocity @ velocity))
+        return velocity if speed <= self._fastest else velocity * (self._fastest / speed)
 
     def _fly_certified(
         self, now: int, view: View, measured: Motion, flight: CertifiedFlight, *, stale: bool

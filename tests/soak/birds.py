@@ -1,0 +1,494 @@
+"""``outrider fly`` on ``outrider sitl`` as processes, each vehicle with its own, a switch in between that carries the
+swarm link and may cut it, and lives of trouble: a row of mishaps, each with what has to follow.
+
+A life is a generator. It yields what it waits for, and goes on when that is so; so several are led at once, and
+nothing depends on how fast the machine is.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Generator
+from pathlib import Path
+from random import Random
+from struct import pack
+from typing import Any, Final
+
+import numpy as np
+from fly_process import FLEET, GUIDED, HELD, HOST
+from test_sitl_command import free_base
+
+from mavlink_bridge.clock import WallClock
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.messages import CommandLong, GlobalPosition, Heartbeat, Message, ParamSet, SetMode, Source
+from outrider.beacon import Beacon
+from outrider.paths import Motion
+
+PATIENCE: Final = 120.0
+"""s until a test gives up; what is waited for comes within seconds, on a machine that has nothing else to do."""
+GROUND: Final = Source(255, 190)
+INJECT, GPS_UNIT, OFF, OK = 420, 4, 1, 0
+LOST = "its process"
+D_MIN = 0.5
+
+Wait = Callable[[], object]
+Life = Generator[tuple[str, Wait], None, None]
+
+
+def resident(process: int) -> int | None:
+    """Bytes in memory; None where nobody tells."""
+    try:
+        pages = Path(f"/proc/{process}/statm").read_text()
+    except (OSError, ValueError):
+        return None
+    return int(pages.split()[1]) * resource.getpagesize()
+
+
+class Switch:
+    """The swarm's links in one place: what a companion says goes to all others, and the target's words to all.
+    ``cut``: systems that nothing passes to or from; ``silent``: whether the target is."""
+
+    def __init__(self) -> None:
+        self._ends: dict[int, socket.socket] = {}
+        self._peers: dict[int, Any] = {}
+        self._beacon = Beacon(100, "target", 5.0, FLEET)
+        self._began = time.monotonic()
+        self.cut: set[int] = set()
+        self.silent = False
+        self.noise: dict[int, Callable[[], bytes]] = {}
+
+    def port(self, system: int) -> int:
+        """Where the companion of ``system`` speaks to."""
+        end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        end.bind((HOST, 0))
+        end.setblocking(False)
+        self._ends[system] = end
+        return int(end.getsockname()[1])
+
+    def pump(self) -> None:
+        """Carry on what has come; say what is due."""
+        for system, end in self._ends.items():
+            while True:
+                try:
+                    data, self._peers[system] = end.recvfrom(65536)
+                except OSError:
+                    break
+                if system not in self.cut:
+                    for other in self._ends.keys() - self.cut - {system}:
+                        self._say(other, data)
+        now = round(1e6 * (time.monotonic() - self._began))
+        if self._beacon.due(now):
+            angle = 0.1e-6 * now
+            place = 6.0 * np.array([math.cos(angle), math.sin(angle), 0.0])
+            velocity = 0.6 * np.array([-math.sin(angle), math.cos(angle), 0.0])
+            for datagram in self._beacon.say(now, Motion(place, velocity)):
+                for system in self._ends.keys() - self.cut if not self.silent else ():
+                    self._say(system, datagram.data)
+        for system, noise in self.noise.items():
+            self._say(system, noise())
+
+    def _say(self, system: int, data: bytes) -> None:
+        if system in self._peers:
+            try:
+                self._ends[system].sendto(data, self._peers[system])
+            except OSError:
+                # Nobody listens at present.
+                return
+
+    def close(self) -> None:
+        for end in self._ends.values():
+            end.close()
+
+
+class Bird:
+    """A vehicle, its companion's process, and an ear at another of the vehicle's ports. ``steady``: its process is
+    left alone, so that its memory can be looked at for long."""
+
+    def __init__(self, system: int, flavour: str, switch: Switch, directory: Path, *, steady: bool) -> None:
+        self.system, self.flavour, self.switch, self.steady = system, flavour, switch, steady
+        self.directory = directory
+        self._port = switch.port(system)
+        self._base = free_base(flavour, 1)
+        self._codec = Codec()
+        self.summaries: list[dict[str, Any]] = []
+        self.lives = 0
+        self.provoked = 0
+        self.mode: int | None = None
+        self.beats = 0
+        self.place: tuple[float, np.ndarray] | None = None
+        self.memory: dict[int, list[tuple[float, int]]] = {}
+        self.flights = 0
+        self._sitl: subprocess.Popen[str] | None = None
+        self._fly: subprocess.Popen[str] | None = None
+
+    # Processes
+
+    def power_up(self) -> None:
+        """A vehicle with a full battery on its pad."""
+        directory = self.directory / f"sitl-{self.system}"
+        directory.mkdir(exist_ok=True)
+        origin = FLEET.to_geodetic(np.array([12.0 * self.system - 24.0, -14.0, 0.0]))
+        self._sitl = self._start(
+            directory,
+            "sitl",
+            "--json",
+            f"--flavour={self.flavour}",
+            f"--first-id={self.system}",
+            f"--port-base={self._base}",
+            f"--origin={origin[0]:.7f},{origin[1]:.7f},{FLEET.altitude}",
+        )
+        other = self._base + (2 if self.flavour == "ardupilot" else 10)
+        kind = "tcp" if self.flavour == "ardupilot" else "udpin"
+        self._ear = open_link(f"{kind}:{HOST}:{other}", WallClock())
+        self.mode, self.beats, self.place = None, 0, None
+
+    def take_seat(self) -> None:
+        """Start ``outrider fly``."""
+        self.lives += 1
+        kind = "tcp" if self.flavour == "ardupilot" else "udpin"
+        home = self.directory / f"fly-{self.system}-{self.lives}"
+        home.mkdir()
+        self.run = home / "run"
+        self._read, self.events = 0, []
+        self._fly = self._start(
+            home,
+            "fly",
+            "--json",
+            f"--out={home}",
+            f"--autopilot={kind}:{HOST}:{self._base}",
+            f"--swarm=udpout:{HOST}:{self._port}",
+            f"--config={self.directory / 'companion.yaml'}",
+            f"--system={self.system}",
+        )
+
+    def _start(self, directory: Path, *options: str) -> subprocess.Popen[str]:
+        name = f"{options[0]}-{time.monotonic_ns()}"
+        with (directory / f"{name}.out").open("w") as out, (directory / f"{name}.err").open("w") as err:
+            return subprocess.Popen(
+                [sys.executable, "-m", "outrider", *options],
+                stdin=subprocess.PIPE,
+                stdout=out,
+                stderr=err,
+                text=True,
+                start_new_session=True,
+            )
+
+    @property
+    def parent(self) -> subprocess.Popen[str]:
+        assert self._fly is not None
+        return self._fly
+
+    @property
+    def pilot(self) -> int:
+        """The process that flies."""
+        last = [event["text"] for event in self.events if event["what"] == "process" and "in process" in event["text"]]
+        return int(last[-1].rpartition(" ")[2])
+
+    def signal_sitl(self, which: signal.Signals) -> None:
+        """To all its processes."""
+        assert self._sitl is not None
+        os.killpg(self._sitl.pid, which)
+
+    def end(self) -> None:
+        """Whatever still runs."""
+        for process in (self._fly, self._sitl):
+            if process is not None and process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.communicate()
+        self._ear.close()
+
+    # What is seen and said
+
+    def pump(self) -> None:
+        """Hear the vehicle, read what its companion notes."""
+        for data in self._ear.receive():
+            for message in self._codec.feed(data, whole=True):
+                if isinstance(message, Heartbeat) and message.autopilot != 8:
+                    self.mode, self.beats = message.custom_mode, self.beats + 1
+                elif isinstance(message, GlobalPosition):
+                    place = FLEET.to_enu(message.latitude, message.longitude, message.altitude)
+                    self.place = time.monotonic(), place
+        path = self.run / "events.jsonl" if self._fly is not None else None
+        if path is not None and path.exists():
+            with path.open(encoding="utf-8") as file:
+                file.seek(self._read)
+                for line in iter(file.readline, ""):
+                    if line.endswith("\n"):
+                        self.events.append(json.loads(line))
+                        self._read = file.tell()
+
+    def say(self, message: Message) -> None:
+        """As a ground station."""
+        self._ear.send(self._codec.encode(message))
+
+    def order(self, word: str) -> None:
+        """As typed."""
+        assert self.parent.stdin is not None
+        self.parent.stdin.write(f"{word}\n")
+        self.parent.stdin.flush()
+
+    def sees(self, what: str, text: str, since: int) -> bool:
+        """Whether there is such an event after the first ``since``."""
+        return any(event["what"] == what and text in event["text"] for event in self.events[since:])
+
+    @property
+    def phase(self) -> str:
+        phases = [event["text"] for event in self.events if event["what"] in ("phase", "lost")]
+        return phases[-1] if phases else ""
+
+    @property
+    def waiting(self) -> str:
+        waits = [event["text"] for event in self.events if event["what"] == "waiting"]
+        return waits[-1] if waits else ""
+
+    def weigh(self, seconds: float) -> None:
+        """Note the memory of both processes."""
+        if self._fly is None or self.parent.poll() is not None or not self.events:
+            return
+        for process in (self.parent.pid, self.pilot):
+            size = resident(process)
+            if size is not None:
+                self.memory.setdefault(process, []).append((seconds, size))
+
+
+class Trouble:
+    """Leads the life of one bird. ``begun`` counts mishaps. ``over``: whether it is time to come home."""
+
+    def __init__(self, bird: Bird, others: list[Bird], random: Random, over: Wait) -> None:
+        self.bird, self.others, self._random, self._over = bird, others, random, over
+        self.begun: Counter[str] = Counter()
+
+    def life(self) -> Life:
+        """From power-up to the end."""
+        bird = self.bird
+        bird.power_up()
+        yield from self._is("a heartbeat of the SITL", lambda: bird.beats > 0)
+        yield from self._fly()
+        mishaps = {
+            "told to hold": self._hold,
+            "taken over": self._taken,
+            "swarm link cut": self._cut,
+            "autopilot stands still": self._pause,
+            "noise": self._noise,
+        }
+        if bird.flavour == "px4":
+            mishaps["GPS lost"] = self._gps
+        if not bird.steady:
+            mishaps |= {
+                "companion killed": self._kill,
+                "companion hangs": self._freeze,
+                "stopped by SIGTERM": self._terminate,
+                "told to land": self._land,
+                "told to return": self._return,
+            }
+        names: list[str] = []
+        while not self._over():
+            if not names:
+                # All of them, again and again, each time in another order.
+                names = self._random.sample(list(mishaps), len(mishaps))
+            name = names.pop()
+            self.begun[name] += 1
+            yield from mishaps[name]()
+            yield from self._escorts()
+            yield from self._pause_of(self._random.uniform(1.0, 5.0))
+        yield from self._stop(signal.SIGINT)
+
+    # Waiting
+
+    def _is(self, what: str, so: Wait) -> Life:
+        yield what, so
+
+    def _sees(self, what: str, text: str, since: int) -> Life:
+        bird = self.bird
+        yield f"{what} {text!r}", lambda: bird.sees(what, text, since)
+
+    def _pause_of(self, seconds: float) -> Life:
+        until = time.monotonic() + seconds
+        yield "time", lambda: time.monotonic() >= until
+
+    def _mode(self, table: dict[str, int]) -> Life:
+        bird = self.bird
+        yield f"mode {table[bird.flavour]}", lambda: bird.mode == table[bird.flavour]
+
+    def _fly(self) -> Life:
+        """A new companion on a vehicle, wherever that is."""
+        self.bird.flights += 1
+        self.bird.take_seat()
+        yield from self._up()
+
+    def _up(self) -> Life:
+        bird = self.bird
+        yield "waiting for a go", lambda: bird.waiting == "the operator's go"
+        yield from self._pause_of(0.5)
+        bird.order("go")
+        yield from self._escorts()
+
+    def _escorts(self) -> Life:
+        """In the air and ours; what its battery or its autopilot has ended is begun anew."""
+        bird = self.bird
+
+        def settled() -> bool:
+            return bird.phase == "escort" or bird.parent.poll() is not None or self._asks()
+
+        while True:
+            yield "the escort", settled
+            if bird.parent.poll() is not None:
+                yield from self._ended("landed")
+                bird.signal_sitl(signal.SIGTERM)
+                assert bird._sitl is not None
+                process = bird._sitl
+                yield "the end of the SITL", lambda: process.poll() is not None
+                bird._ear.close()
+                bird.power_up()
+                yield "a heartbeat of the SITL", lambda: bird.beats > 0
+                bird.flights += 1
+                bird.take_seat()
+                yield "a first event", lambda: bool(bird.events)
+            elif bird.phase != "escort":
+                bird.order("go")
+                since = len(bird.events)
+                yield "an answer to go", lambda: len(bird.events) > since
+                yield from self._pause_of(1.5)
+            else:
+                return
+
+    def _asks(self) -> bool:
+        bird = self.bird
+        return bird.phase in ("connect", "yielded") and (
+            bird.waiting == "the operator's go" or bird.phase == "yielded"
+        )
+
+    def _ended(self, why: str) -> Life:
+        bird = self.bird
+        yield f"the end: {why}", lambda: bird.parent.poll() is not None
+        out = sorted(bird.run.parent.glob("fly-*.out"))[-1].read_text()
+        err = sorted(bird.run.parent.glob("fly-*.err"))[-1].read_text()
+        assert bird.parent.returncode == 0, (bird.system, out, err)
+        assert "Traceback" not in err, err
+        summary = json.loads(out)
+        assert why in summary["ended"], summary
+        bird.summaries.append(summary)
+
+    # Mishaps
+
+    def _hold(self) -> Life:
+        since = len(self.bird.events)
+        self.bird.order("hold")
+        yield from self._sees("phase", "hold", since)
+        yield from self._pause_of(2.0)
+        self.bird.order("go")
+        yield from self._sees("phase", "escort", since)
+
+    def _return(self) -> Life:
+        """It lands at home, and its companion ends."""
+        since = len(self.bird.events)
+        self.bird.order("return")
+        yield from self._sees("phase", "return", since)
+        yield from self._sees("phase", "done", since)
+
+    def _land(self) -> Life:
+        since = len(self.bird.events)
+        self.bird.order("land")
+        yield from self._sees("phase", "settle", since)
+        yield from self._sees("phase", "done", since)
+
+    def _taken(self) -> Life:
+        """By a ground station; nothing is asked back."""
+        bird, since = self.bird, len(self.bird.events)
+        bird.say(SetMode(GROUND, HELD[bird.flavour], bird.system, 1))
+        yield from self._sees("concern", "Vehicle taken over", since)
+        yield from self._sees("phase", "yielded", since)
+        yield from self._pause_of(3.0)
+        assert bird.mode == HELD[bird.flavour]
+        bird.order("go")
+        yield from self._sees("phase", "escort", since)
+        yield from self._mode(GUIDED)
+
+    def _cut(self) -> Life:
+        bird, since = self.bird, len(self.bird.events)
+        deaf = [other for other in self.others if other.phase == "escort"]
+        heard = {other.system: len(other.events) for other in deaf}
+        lives = {other.system: other.lives for other in deaf}
+        bird.switch.cut.add(bird.system)
+        yield from self._sees("concern", "is not heard", since)
+        yield from self._sees("concern", "Target lost", since)
+        words = f"Neighbour {bird.system} is not heard"
+        yield (
+            f"others say {words}",
+            lambda: all(
+                other.lives != lives[other.system] or other.sees("concern", words, heard[other.system])
+                for other in deaf
+            ),
+        )
+        bird.switch.cut.discard(bird.system)
+        yield from self._sees("over", "Target lost", since)
+
+    def _pause(self) -> Life:
+        """A simulation that stands still for a moment is no failure of anything."""
+        bird, since = self.bird, len(self.bird.events)
+        bird.signal_sitl(signal.SIGSTOP)
+        yield from self._pause_of(self._random.uniform(0.5, 3.0))
+        bird.signal_sitl(signal.SIGCONT)
+        yield from self._pause_of(2.0)
+        assert not bird.sees("lost", "", since), bird.events[since:]
+
+    def _noise(self) -> Life:
+        """Broken frames by the swarm link are nobody's words."""
+        bird, since, random = self.bird, len(self.bird.events), self._random
+        bird.switch.noise[bird.system] = lambda: pack("<B", 0xFD) + random.randbytes(random.randrange(1, 600))
+        yield from self._pause_of(3.0)
+        bird.switch.noise.pop(bird.system)
+        assert not bird.sees("lost", "", since)
+
+    def _gps(self) -> Life:
+        """Lost for long: the autopilot lands by itself, and that is left to it."""
+        bird, since = self.bird, len(self.bird.events)
+        bird.say(ParamSet(GROUND, pack("<i", 1), bird.system, 1, "SYS_FAILURE_EN", 6))
+        yield from self._pause_of(0.5)
+        bird.say(CommandLong(GROUND, bird.system, 1, INJECT, 0, (GPS_UNIT, OFF, 0.0, 0.0, 0.0, 0.0, 0.0)))
+        long = self._random.random() < 0.5
+        if long:
+            yield from self._sees("phase", "yielded", since)
+        else:
+            yield from self._pause_of(2.0)
+        bird.say(CommandLong(GROUND, bird.system, 1, INJECT, 0, (GPS_UNIT, OK, 0.0, 0.0, 0.0, 0.0, 0.0)))
+        yield from self._pause_of(1.0)
+
+    def _kill(self) -> Life:
+        os.kill(self.bird.pilot, signal.SIGKILL)
+        yield from self._is_followed()
+
+    def _freeze(self) -> Life:
+        os.kill(self.bird.pilot, signal.SIGSTOP)
+        yield from self._is_followed()
+
+    def _is_followed(self) -> Life:
+        """Its vehicle holds, and another companion waits for a go."""
+        bird, since = self.bird, len(self.bird.events)
+        bird.provoked += 1
+        yield from self._sees("lost", "the companion is gone", since)
+        yield from self._sees("last word", "holds", since)
+        yield from self._mode(HELD)
+        yield from self._sees("waiting", "the operator's go", since)
+        assert bird.mode == HELD[bird.flavour]
+        yield from self._up()
+
+    def _terminate(self) -> Life:
+        yield from self._stop(signal.SIGTERM)
+        yield from self._mode(HELD)
+        yield from self._fly()
+
+    def _stop(self, which: signal.Signals) -> Life:
+        self.bird.parent.send_signal(which)
+        yield from self._ended(which.name)
+        assert self.bird.summaries[-1]["last_word"].startswith(("holds", "not armed", "not ours"))
