@@ -115,6 +115,7 @@ class Companion:
         self._boot: int | None = None
         self._next_plan = self._next_setpoint = 0
         self._fastest = hypot(*config.limits.v_max)
+        self._flown = 0
         self._plans = self._relaxed = 0
         self._plan_ns = array("I")
         self._plan_at = array("q")
@@ -263,6 +264,10 @@ class Companion:
         if view.local is not self._frame:
             # Where the vehicle was in the old frame must not be flown to in the new one.
             self._frame, self.guard.horizon = view.local, None
+        if self._certified is None and now - self._flown > self.config.guard.hold_us:
+            # It hung, and the autopilot did as it saw fit: the old plan leads from where nobody is any more.
+            self.guard.horizon = None
+        self._flown = now
         if not self.pilot.streaming or view.own is None or view.local is None:
             self.guard.horizon = None
             return
