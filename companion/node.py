@@ -299,8 +299,8 @@ class Companion:
         self._plan(now, view, measured)
 
     def _bounded(self, velocity: Array) -> Array:
-        """A measured ``velocity`` (3,) as a plan may begin with it: whatever the own autopilot, or who speaks in
-        its name, says of its speed, nothing faster than the limits is asked for."""
+        """A measured ``velocity`` (3,) as a plan may begin with it: whatever the own autopilot, or who speaks
+        in its name, says of its speed, nothing faster than the limits is asked for."""
         speed = float(np.sqrt(velocity @ velocity))
         return velocity if speed <= self._fastest else velocity * (self._fastest / speed)
 

@@ -1,8 +1,8 @@
-"""Companions on autopilots of our SITL in lock-step, sortie after sortie: who has landed is carried back to its
-pad, gets a fresh battery and goes up again. What happens on the way is up to ``mishaps``.
+"""Companions on autopilots of our SITL in lock-step, sortie after sortie: who has landed is carried back to
+its pad, gets a fresh battery and goes up again. What happens on the way is up to ``mishaps``.
 
-A ``Seat`` is where a companion runs, and may be started anew; a ``Radio`` is what its autopilot says and hears
-by, and may change both.
+A ``Seat`` is where a companion runs, and may be started anew; a ``Radio`` is what its autopilot says and
+hears by, and may change both.
 """
 
 from __future__ import annotations
@@ -106,9 +106,7 @@ class Radio:
     def _edited(self, codec: Codec, data: bytes, edits: dict[str, Edit]) -> bytes:
         passing: list[Message | bytes] = [*codec.feed(data, whole=True)]
         for edit in list(edits.values()):
-            passing = [
-                new for one in passing for new in ((one,) if isinstance(one, bytes) else edit(one))
-            ]
+            passing = [new for one in passing for new in ((one,) if isinstance(one, bytes) else edit(one))]
         return b"".join(one if isinstance(one, bytes) else codec.encode(one) for one in passing)
 
 
@@ -248,9 +246,9 @@ class Craft:
 
 
 class Airfield:
-    """``count`` vehicles of both flavours on their pads. ``sent``: told each set-point: vehicle, time, message.
-    ``key``: everybody's. ``guests``: other nodes; their ``places`` are the names of their channels, and of the links there.
-    Nodes that are ``deaf`` do not hear them."""
+    """``count`` vehicles of both flavours on their pads. ``sent``: told each set-point: vehicle, time,
+    message. ``key``: everybody's. ``guests``: other nodes; their ``places`` are the names of their channels,
+    and of the links there. Nodes that are ``deaf`` do not hear them."""
 
     def __init__(
         self,

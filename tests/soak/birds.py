@@ -1,8 +1,8 @@
-"""``outrider fly`` on ``outrider sitl`` as processes, each vehicle with its own, a switch in between that carries the
-swarm link and may cut it, and lives of trouble: a row of mishaps, each with what has to follow.
+"""``outrider fly`` on ``outrider sitl`` as processes, each vehicle with its own, a switch in between that
+carries the swarm link and may cut it, and lives of trouble: a row of mishaps, each with what has to follow.
 
-A life is a generator. It yields what it waits for, and goes on when that is so; so several are led at once, and
-nothing depends on how fast the machine is.
+A life is a generator. It yields what it waits for, and goes on when that is so; so several are led at once,
+and nothing depends on how fast the machine is.
 """
 
 from __future__ import annotations
@@ -35,11 +35,15 @@ from outrider.beacon import Beacon
 from outrider.paths import Motion
 
 PATIENCE: Final = 120.0
-"""s until a test gives up; what is waited for comes within seconds, on a machine that has nothing else to do."""
+"""s until a test gives up; what is waited for comes within seconds, on a machine that has nothing else to
+do."""
 GROUND: Final = Source(255, 190)
 INJECT, GPS_UNIT, OFF, OK = 420, 4, 1, 0
 LOST = "its process"
 D_MIN = 0.5
+_STEERED = ("escort", "hold", "return", "settle")
+_TOUCH = 5.0
+"""s after which whoever was alone is heard by all, hears all, and has made way."""
 
 Wait = Callable[[], object]
 Life = Generator[tuple[str, Wait], None, None]
@@ -55,8 +59,8 @@ def resident(process: int) -> int | None:
 
 
 class Switch:
-    """The swarm's links in one place: what a companion says goes to all others, and the target's words to all.
-    ``cut``: systems that nothing passes to or from; ``silent``: whether the target is."""
+    """The swarm's links in one place: what a companion says goes to all others, and the target's words to
+    all. ``cut``: systems that nothing passes to or from; ``silent``: whether the target is."""
 
     def __init__(self) -> None:
         self._ends: dict[int, socket.socket] = {}
@@ -111,8 +115,8 @@ class Switch:
 
 
 class Bird:
-    """A vehicle, its companion's process, and an ear at another of the vehicle's ports. ``steady``: its process is
-    left alone, so that its memory can be looked at for long."""
+    """A vehicle, its companion's process, and an ear at another of the vehicle's ports. ``steady``: its
+    process is left alone, so that its memory can be looked at for long."""
 
     def __init__(self, system: int, flavour: str, switch: Switch, directory: Path, *, steady: bool) -> None:
         self.system, self.flavour, self.switch, self.steady = system, flavour, switch, steady
@@ -128,6 +132,7 @@ class Bird:
         self.place: tuple[float, np.ndarray] | None = None
         self.memory: dict[int, list[tuple[float, int]]] = {}
         self.flights = 0
+        self.alone_until = 0.0
         self.events: list[dict[str, Any]] = []
         self._read = 0
         self._sitl: subprocess.Popen[str] | None = None
@@ -200,13 +205,25 @@ class Bird:
     @property
     def pilot(self) -> int:
         """The process that flies."""
-        last = [event["text"] for event in self.events if event["what"] == "process" and "in process" in event["text"]]
+        last = [
+            event["text"]
+            for event in self.events
+            if event["what"] == "process" and "in process" in event["text"]
+        ]
         return int(last[-1].rpartition(" ")[2])
 
     def signal_sitl(self, which: signal.Signals) -> None:
         """To all its processes."""
         assert self._sitl is not None
         os.killpg(self._sitl.pid, which)
+
+    def is_off(self) -> bool:
+        """Whether the SITL has ended; then its ear is deaf."""
+        assert self._sitl is not None
+        if self._sitl.poll() is None:
+            return False
+        self._ear.close()
+        return True
 
     def end(self) -> None:
         """Whatever still runs."""
@@ -354,10 +371,7 @@ class Trouble:
             if bird.parent.poll() is not None:
                 yield from self._ended("landed")
                 bird.signal_sitl(signal.SIGTERM)
-                assert bird._sitl is not None
-                process = bird._sitl
-                yield "the end of the SITL", lambda: process.poll() is not None
-                bird._ear.close()
+                yield "the end of the SITL", bird.is_off
                 bird.power_up()
                 yield "a heartbeat of the SITL", lambda: bird.beats > 0
                 bird.flights += 1
@@ -365,9 +379,7 @@ class Trouble:
                 yield "a first event", lambda: bool(bird.events)
             elif bird.phase != "escort":
                 bird.order("go")
-                since = len(bird.events)
-                yield "an answer to go", lambda: len(bird.events) > since
-                yield from self._pause_of(1.5)
+                yield from self._pause_of(2.0)
             else:
                 return
 
@@ -443,12 +455,14 @@ class Trouble:
         yield from self._sees("over", "Target lost", since)
 
     def _pause(self) -> Life:
-        """A simulation that stands still for a moment is no failure of anything."""
+        """One way alone, a clock that stood cannot be told from a link that became slow: it hovers until, a
+        minute later, that is believed."""
         bird, since = self.bird, len(self.bird.events)
         bird.signal_sitl(signal.SIGSTOP)
-        yield from self._pause_of(self._random.uniform(0.5, 3.0))
+        yield from self._pause_of(self._random.uniform(1.0, 3.0))
         bird.signal_sitl(signal.SIGCONT)
-        yield from self._pause_of(2.0)
+        yield from self._sees("concern", "Own position is old", since)
+        yield from self._sees("over", "Own position is old", since)
         assert not bird.sees("lost", "", since), bird.events[since:]
 
     def _noise(self) -> Life:
@@ -486,7 +500,8 @@ class Trouble:
         bird, since = self.bird, len(self.bird.events)
         bird.provoked += 1
         yield from self._sees("lost", "the companion is gone", since)
-        yield from self._sees("last word", "holds", since)
+        # One that was silent for long has been left by PX4 for its HOLD already.
+        yield from self._sees("last word", "the vehicle: ", since)
         yield from self._mode(HELD)
         yield from self._sees("waiting", "the operator's go", since)
         assert bird.mode == HELD[bird.flavour]
@@ -522,7 +537,9 @@ class Flock:
         self._began = time.monotonic()
         self._seconds, self._progress = seconds, progress
         self.troubles = [
-            Trouble(bird, [b for b in self.birds if b is not bird], Random(f"{seed} {bird.system}"), self._is_over)
+            Trouble(
+                bird, [b for b in self.birds if b is not bird], Random(f"{seed} {bird.system}"), self._is_over
+            )
             for bird in self.birds
         ]
         self._random = Random(f"{seed} target")
@@ -549,6 +566,7 @@ class Flock:
                 for bird in self.birds:
                     bird.pump()
                     assert not bird.broken, self._story(bird.system, f"a process that ended: {bird.broken}")
+                self._touch()
                 self._separation()
                 for system in list(lives):
                     what, so, since = waits[system]
@@ -572,7 +590,9 @@ class Flock:
 
     def _story(self, system: int, what: str) -> str:
         bird = next(bird for bird in self.birds if bird.system == system)
-        lines = "\n".join(f"{event['wall_s']} {event['what']}: {event['text']}" for event in bird.events[-40:])
+        lines = "\n".join(
+            f"{event['wall_s']} {event['what']}: {event['text']}" for event in bird.events[-40:]
+        )
         return f"vehicle {system} waits for {what} in mode {bird.mode}, {bird.phase}:\n{lines}"
 
     def _target(self) -> None:
@@ -584,6 +604,12 @@ class Flock:
             begin = self.seconds + self._random.uniform(15.0, 40.0)
             self._silence = begin, begin + self._random.uniform(4.0, 8.0)
 
+    def _touch(self) -> None:
+        now = time.monotonic()
+        for bird in self.birds:
+            if bird.system in self.switch.cut or bird.phase not in _STEERED:
+                bird.alone_until = now + _TOUCH
+
     def _separation(self) -> None:
         now = time.monotonic()
         flying = [bird for bird in self.birds if bird.place is not None and now - bird.place[0] < 0.5]
@@ -591,7 +617,9 @@ class Flock:
             for other in flying[:k]:
                 assert one.place is not None
                 assert other.place is not None
-                if min(one.place[1][2], other.place[1][2]) > 1.0:
+                # Who was cut off, or has no companion, is where nobody heard that it would be.
+                in_touch = now > max(one.alone_until, other.alone_until)
+                if in_touch and min(one.place[1][2], other.place[1][2]) > 1.0:
                     apart = math.dist(one.place[1], other.place[1])
                     self.least = min(self.least, apart)
                     assert apart >= D_MIN, (one.system, other.system, apart)

@@ -1,5 +1,5 @@
-"""What may go wrong in the air, of the guard's list (docs/guard.md): how it begins and ends, and the sentence that
-the companion has to say of it in time."""
+"""What may go wrong in the air, of the guard's list (docs/guard.md): how it begins and ends, and the sentence
+that the companion has to say of it in time."""
 
 from __future__ import annotations
 
@@ -91,8 +91,10 @@ def _not_numbers(scene: Scene) -> Edit:
 
 
 def _battery(left: float) -> Callable[[Scene], Edit]:
-    return lambda _scene: lambda message: (
-        (message._replace(battery_remaining=left) if isinstance(message, SysStatus) else message),
+    return lambda _scene: (
+        lambda message: (
+            (message._replace(battery_remaining=left) if isinstance(message, SysStatus) else message),
+        )
     )
 
 
@@ -139,6 +141,16 @@ def _move_origin(scene: Scene) -> None:
 
     scene.craft.radio.outward[scene.name] = outward
     scene.craft.radio.inward[scene.name] = inward
+    _tell_origin(scene)
+
+
+def _move_back(scene: Scene) -> None:
+    _clear(scene)
+    _tell_origin(scene)
+
+
+def _tell_origin(scene: Scene) -> None:
+    """As autopilots do when it has moved."""
     scene.craft.autopilot._telemetry.request(49)
 
 
@@ -188,15 +200,11 @@ def _start_anew(scene: Scene) -> None:
 
 
 def _cut(channel: str) -> Callable[[Scene], None]:
-    return lambda scene: scene.field.ether.cut(
-        channel.format(scene.craft.system), [scene.craft.seat.name]
-    )
+    return lambda scene: scene.field.ether.cut(channel.format(scene.craft.system), [scene.craft.seat.name])
 
 
 def _heal(channel: str) -> Callable[[Scene], None]:
-    return lambda scene: scene.field.ether.heal(
-        channel.format(scene.craft.system), [scene.craft.seat.name]
-    )
+    return lambda scene: scene.field.ether.heal(channel.format(scene.craft.system), [scene.craft.seat.name])
 
 
 def _silence(scene: Scene) -> None:
@@ -221,7 +229,9 @@ def _lead_back(scene: Scene) -> None:
 
 def _leap(scene: Scene) -> None:
     angle = scene.random.uniform(0.0, 2.0 * math.pi)
-    scene.field.target.leap(scene.random.uniform(3.0, 7.0) * np.array([math.cos(angle), math.sin(angle), 0.0]))
+    scene.field.target.leap(
+        scene.random.uniform(3.0, 7.0) * np.array([math.cos(angle), math.sin(angle), 0.0])
+    )
 
 
 def _lose_gps(scene: Scene) -> None:
@@ -259,7 +269,9 @@ MISHAPS = (
     Mishap("target leaps", (0.1, 0.2), _leap, whole=True),
     Mishap("target beyond the fence", (18.0, 22.0), _lead_out, _lead_back, whole=True),
     Mishap("swarm link cut", (4.5, 10.0), _cut("swarm"), _heal("swarm"), "Neighbour", 4.2),
-    Mishap("autopilot link cut", (1.0, 8.0), _cut("autopilot-{}"), _heal("autopilot-{}"), "Own position", 0.7),
+    Mishap(
+        "autopilot link cut", (1.0, 8.0), _cut("autopilot-{}"), _heal("autopilot-{}"), "Own position", 0.7
+    ),
     Mishap("no plan", (1.0, 3.0), _no_plans, _plans_again, NO_PLAN, 0.9),
     Mishap("no plan for long", (6.0, 8.0), _no_plans, _plans_again, f"{NO_PLAN}: landing", 5.5),
     Mishap("battery low", (600.0, 600.0), _outward(_battery(0.15)), _clear, "Battery", 1.3),
@@ -271,7 +283,7 @@ MISHAPS = (
     Mishap("hangs", (1.0, 6.0), _hang, _go_on),
     Mishap("companion starts anew", (0.5, 4.0), _hang, _start_anew),
     Mishap("clock jumps", (600.0, 600.0), _outward(_other_clock), _clear, CLOCK, 3.5),
-    Mishap("origin moves", (600.0, 600.0), _move_origin, _clear),
+    Mishap("origin moves", (600.0, 600.0), _move_origin, _move_back),
     Mishap("GPS shifted", (3.0, 8.0), _shift_gps, _unshift_gps),
     Mishap("GPS lost", (2.0, 15.0), _lose_gps, _regain_gps),
     Mishap("told to hold", (5.0, 10.0), _order(17), _go),

@@ -2,8 +2,8 @@
 neighbours and autopilots, signatures that are wrong.
 
 Where the links are signed the flight is the one without a stranger, to the last bit. Where they are not, a
-stranger with the name of the own autopilot *is* the own autopilot: what then holds is that nothing raises, and
-that set-points stay finite and within the limits of speed and acceleration.
+stranger with the name of the own autopilot *is* the own autopilot: what then holds is that nothing raises,
+and that set-points stay finite and within the limits of speed and acceleration.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ LOOK = 100_000
 
 @cache
 def recorded() -> tuple[bytes, ...]:
-    """Frames of real flights: of the logs beside the checkout if they are there, of the pieces in any case."""
+    """Frames of real flights: of the logs beside the checkout if they are there, of the pieces in any
+    case."""
     found: list[bytes] = []
     for path in (SHIPPED, *PIECES, *WHOLE):
         for number, record in enumerate(read_tlog(path)):
@@ -73,7 +74,9 @@ class Stranger:
     def __init__(self, seed: int, systems: Sequence[int]) -> None:
         self._random = Random(f"stranger {seed}")
         self._systems = systems
-        self.places = {f"autopilot-{system}": f"autopilot-{system}" for system in systems} | {"swarm": "swarm"}
+        self.places = {f"autopilot-{system}": f"autopilot-{system}" for system in systems} | {
+            "swarm": "swarm"
+        }
         self._heard: deque[bytes] = deque(maxlen=_REMEMBERED)
         self._codec = Codec()
         self._forger = Signing(OTHER)
@@ -88,10 +91,10 @@ class Stranger:
         if self.quiet:
             return []
         self._forger.present(now)
-        out = []
+        out: list[Datagram] = []
         for link in self.places.values():
-            for _ in range(self._random.choice((0, 0, 1, 1, 2))):
-                out.append(Datagram(link, self._data(now, link)))
+            count = self._random.choice((0, 0, 1, 1, 2))
+            out.extend(Datagram(link, self._data(now, link)) for _ in range(count))
         return out
 
     def _data(self, now: int, link: str) -> bytes:
@@ -105,7 +108,9 @@ class Stranger:
             "recorded, damaged": lambda: damaged(random, random.choice(recorded()), self._known, WIRE_EDITS),
             "forged": lambda: self._codec.encode(self._forged(now, link)),
             "forged, signed with another key": lambda: self._signed.encode(self._forged(now, link)),
-            "forged, signed with nothing": lambda: absurd(random, self._codec.encode(self._forged(now, link))),
+            "forged, signed with nothing": lambda: absurd(
+                random, self._codec.encode(self._forged(now, link))
+            ),
             "noise": lambda: random.randbytes(random.randrange(1, 600)),
         }
         name = random.choice(list(kinds))
@@ -155,8 +160,8 @@ class Stranger:
 
 
 class Siege:
-    """Flies ``seconds`` with ``count`` vehicles, signed or not, with a stranger or without. ``trails``: a digest
-    of all that the companions have sent, every ten seconds."""
+    """Flies ``seconds`` with ``count`` vehicles, signed or not, with a stranger or without. ``trails``: a
+    digest of all that the companions have sent, every ten seconds."""
 
     def __init__(
         self,

@@ -1,8 +1,8 @@
 """Sortie after sortie through a seeded plan of mishaps, and the laws that hold all the while.
 
-Three kinds of laws. What is sent: finite, within limits, near the vehicle, only while the vehicle is ours. What
-is said: a mishap is a concern in time, a concern a STATUSTEXT in time. What follows: each concern's reaction, and
-after a rest everybody is up, around the target, and nothing is amiss.
+Three kinds of laws. What is sent: finite, within limits, near the vehicle, only while the vehicle is ours.
+What is said: a mishap is a concern in time, a concern a STATUSTEXT in time. What follows: each concern's
+reaction, and after a rest everybody is up, around the target, and nothing is amiss.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from airfield import CONFIG, EPOCH, RADIUS, SECOND, Airfield, Craft
-from mishaps import LOST, MISHAPS, NO_PLAN, OLD, UNHEARD, Mishap, Scene
+from mishaps import MISHAPS, NO_PLAN, OLD, UNHEARD, Mishap, Scene
 
 from companion.guard import Holding
 from companion.pilot import OPERATORS_GO, STEERED, Phase
+from companion.tracks import State
 from mavlink_bridge.messages import SetpointLocal
 
 LOOK = 100_000
@@ -68,7 +69,7 @@ class Promise(NamedTuple):
     holds: Callable[[], bool | None]
 
 
-class Law(AssertionError):
+class BrokenLawError(AssertionError):
     """One that was broken, and what came before."""
 
 
@@ -125,7 +126,7 @@ class Sorties:
         self.memory: list[tuple[float, int]] = []
 
     def fly(self) -> None:
-        """All of it. Law for what is broken."""
+        """All of it. BrokenLawError for what is broken."""
         self.field.loop.run(EPOCH + round(self.seconds * 1e6), self._tick)
 
     def fingerprint(self) -> tuple[Any, ...]:
@@ -149,9 +150,9 @@ class Sorties:
         self._must(craft, math.hypot(*message.velocity) <= fastest + SINGLE, f"v_max: {message}")
         view = craft.companion.world.at(now)
         if view.own is None or view.local is None:
-            raise Law(f"seed {self.seed}: a set-point without a place")
+            raise BrokenLawError(f"seed {self.seed}: a set-point without a place")
         here = view.local.position_to_fleet(message.position)
-        if view.own.age <= 100_000:
+        if view.own.age <= 100_000 and not self._has_jumped(craft, now, view.own):
             off = float(np.linalg.norm(here - view.own.position))
             self._must(craft, off <= CONFIG.guard.tube + 0.5, f"{off:.2f} m from the vehicle: {message}")
         before, anchor = self._setpoints.get(system), (guard.anchored_anew, view.local)
@@ -159,6 +160,15 @@ class Sorties:
             step, dt = float(np.linalg.norm(here - before.here)), 1e-6 * (now - before.now)
             self._must(craft, step <= fastest * dt + _CORRECTED, f"a jump of {step:.2f} m: {message}")
         self._setpoints[system] = Sent(now, here, anchor, message)
+
+    def _has_jumped(self, craft: Craft, now: int, own: State) -> bool:
+        """Whether it was believed elsewhere when the plan was made: an estimate may jump, as when GPS is back."""
+        then, place, jumped = craft.marks.get("believed", (now, own.position, 0))
+        reach = 1.0 + 1e-6 * (now - then) * math.hypot(*CONFIG.limits.v_max)
+        if float(np.linalg.norm(own.position - place)) > reach:
+            jumped = now
+        craft.marks["believed"] = now, own.position, jumped
+        return now - jumped <= 2 * CONFIG.rates.replan_us
 
     # What is seen
 
@@ -217,7 +227,7 @@ class Sorties:
     def _must(self, craft: Craft, holds: bool, law: str) -> None:
         if not holds:
             self.note(craft, law)
-            raise Law(f"seed {self.seed}: {law}\n" + "\n".join(self.log))
+            raise BrokenLawError(f"seed {self.seed}: {law}\n" + "\n".join(self.log))
 
     # What follows
 
@@ -250,11 +260,15 @@ class Sorties:
         self._promise(craft, _SPOKEN, "said: " + name, lambda: self._was_said(craft, said, begun))
         if text.endswith("landing") and before.phase in STEERED:
             gone = (Phase.ESCORT, Phase.HOLD, Phase.RETURN)
-            self._promise(craft, 0.3, f"lands: {name}", lambda: self._rows[craft.system][-1].phase not in gone)
+            self._promise(
+                craft, 0.3, f"lands: {name}", lambda: self._rows[craft.system][-1].phase not in gone
+            )
             self._promise(craft, _DOWN, f"is down: {name}", lambda: self._is_down(craft))
         if text.endswith("coming back") and before.phase in (Phase.ESCORT, Phase.HOLD):
             gone = (Phase.ESCORT, Phase.HOLD)
-            self._promise(craft, 0.3, f"returns: {name}", lambda: self._rows[craft.system][-1].phase not in gone)
+            self._promise(
+                craft, 0.3, f"returns: {name}", lambda: self._rows[craft.system][-1].phase not in gone
+            )
         if text.startswith((OLD, NO_PLAN)):
             self._promise(craft, 0.8, f"brakes: {name}", lambda: self._brakes(craft, text, 0.8))
             self._promise(craft, 2.5, f"hovers: {name}", lambda: self._hovers(craft, text, 2.5))
@@ -312,14 +326,18 @@ class Sorties:
         words = "coming back" if after is Phase.RETURN else "landing"
         told = now - self._last_orders.get(craft.system, 0) < 2 * SECOND
         reason = told or any(text.endswith(words) for one in self._since(craft, 1.0) for text in one.texts)
-        self._must(craft, reason or any(text.endswith(words) for text in row.texts), f"a reason: {after.value}")
+        self._must(
+            craft, reason or any(text.endswith(words) for text in row.texts), f"a reason: {after.value}"
+        )
 
     def _rest(self, now: int) -> None:
         """After a minute without mishaps: up, around the target, nothing amiss."""
         self.rests += 1
         for craft in self.field.crafts:
             row = self._rows[craft.system][-1]
-            self._must(craft, row.phase is Phase.ESCORT and craft.companion.pilot.guided, "escorts after a rest")
+            self._must(
+                craft, row.phase is Phase.ESCORT and craft.companion.pilot.guided, "escorts after a rest"
+            )
             self._must(craft, not row.texts, f"nothing is amiss after a rest: {sorted(row.texts)}")
             off = craft.place - self.field.target.place
             far = math.hypot(math.hypot(off[0], off[1]) - RADIUS, off[2] - CONFIG.surface.height)
@@ -348,10 +366,11 @@ class Sorties:
         waits = pilot.phase is Phase.CONNECT and pilot.waiting_for == OPERATORS_GO
         rows = self._since(craft, 20.0)
         left = len(rows) > 150 and all(row.phase is Phase.YIELDED for row in rows)
-        if (waits or (left and not craft.marks.get("taken"))) and now - craft.marks.get("asked", 0) > 2 * SECOND:
-            if craft.autopilot.airborne or self._is_free(craft):
-                craft.marks["asked"] = now
-                self.field.tower.go(system)
+        recent = now - craft.marks.get("asked", 0) <= 2 * SECOND
+        wanted = waits or (left and not craft.marks.get("taken"))
+        if wanted and not recent and (craft.autopilot.airborne or self._is_free(craft)):
+            craft.marks["asked"] = now
+            self.field.tower.go(system)
 
     def _is_free(self, craft: Craft) -> bool:
         others = [other for other in self.field.crafts if other is not craft and other.autopilot.airborne]

@@ -1,0 +1,56 @@
+"""An hour in lock-step through mishaps: every one answered as docs/guard.md says, and nothing grows."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+from collections.abc import Callable
+
+import pytest
+from mishaps import MISHAPS
+from sorties import LEG, REST, Sorties
+
+FLAT = 2 << 20
+"""Bytes either way. Of the process, not of Python's objects: the solver and the compiled kernels have memory
+too."""
+WARM = 900.0
+"""s in which caches fill: of compiled code, of plans read, of terms of the filters."""
+HOUR = 3600.0
+
+
+def shown(whole: float) -> Callable[[float], None]:
+    """How far it is, on a terminal."""
+
+    def progress(seconds: float) -> None:
+        if sys.stderr.isatty():
+            sys.stderr.write(f"\r{seconds:.0f} of {whole:.0f} s simulated")
+            sys.stderr.flush()
+
+    return progress
+
+
+@pytest.mark.slow
+def test_some_minutes_of_mishaps() -> None:
+    flown = Sorties(3, 60.0, count=2)
+    flown.fly()
+    assert sum(flown.begun.values()) > 2
+    assert sum(flown.judged.values()) > 2
+    again = Sorties(3, 20.0, count=2)
+    again.fly()
+    third = Sorties(3, 20.0, count=2)
+    third.fly()
+    assert again.fingerprint() == third.fingerprint()
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", [1])
+def test_an_hour_of_mishaps(seed: int) -> None:
+    flown = Sorties(seed, HOUR, progress=shown(HOUR))
+    flown.fly()
+    assert flown.rests == int(HOUR // (LEG + REST))
+    assert flown.begun.keys() == {mishap.name for mishap in MISHAPS}
+    assert flown.judged.keys() >= {f"noticed: {mishap.name}" for mishap in MISHAPS if mishap.sentence}
+    assert flown.sorties > 60
+    warm = [size for seconds, size in flown.memory if seconds >= WARM]
+    middle = statistics.median(warm)
+    assert max(abs(size - middle) for size in warm) <= FLAT, flown.memory
