@@ -19,7 +19,7 @@ def test_what_is_written_is_read(first: int, gaps: list[tuple[int, int]]) -> Non
     times = [first]
     for gap, count in gaps:
         for _ in range(count):
-            times.append(times[-1] + gap)  # noqa: PERF401
+            times.append(times[-1] + gap)
     with TemporaryDirectory() as directory:
         file = StepsFile(Path(directory) / "steps.npz")
         for time in times:

@@ -34,12 +34,15 @@ from mavlink_bridge.messages import CommandLong, GlobalPosition, Heartbeat, Mess
 from outrider.beacon import Beacon
 from outrider.paths import Motion
 
-PATIENCE: Final = 120.0
+PATIENCE: Final = 300.0
 """s until a test gives up; what is waited for comes within seconds, on a machine that has nothing else to
 do."""
 GROUND: Final = Source(255, 190)
 INJECT, GPS_UNIT, OFF, OK = 420, 4, 1, 0
 LOST = "its process"
+PACE: Final = 0.9
+"""By its rate a clock is known for a simulation's, which stands now and then on a busy machine. At 1 it is
+taken for a vehicle's, and what stood for slow: for a minute nothing of it is fresh."""
 D_MIN = 0.5
 _STEERED = ("escort", "hold", "return", "settle")
 _TOUCH = 5.0
@@ -152,6 +155,7 @@ class Bird:
             f"--flavour={self.flavour}",
             f"--first-id={self.system}",
             f"--port-base={self._base}",
+            f"--speedup={PACE}",
             f"--origin={origin[0]:.7f},{origin[1]:.7f},{FLEET.altitude}",
         )
         other = self._base + (2 if self.flavour == "ardupilot" else 10)
@@ -455,8 +459,7 @@ class Trouble:
         yield from self._sees("over", "Target lost", since)
 
     def _pause(self) -> Life:
-        """One way alone, a clock that stood cannot be told from a link that became slow: it hovers until, a
-        minute later, that is believed."""
+        """It brakes while nothing is heard, and flies on when the simulation does."""
         bird, since = self.bird, len(self.bird.events)
         bird.signal_sitl(signal.SIGSTOP)
         yield from self._pause_of(self._random.uniform(1.0, 3.0))

@@ -162,7 +162,7 @@ class Sorties:
         self._setpoints[system] = Sent(now, here, anchor, message)
 
     def _has_jumped(self, craft: Craft, now: int, own: State) -> bool:
-        """Whether it was believed elsewhere when the plan was made: an estimate may jump, as when GPS is back."""
+        """Whether it was believed elsewhere when the plan was made: an estimate jumps when GPS is back."""
         then, place, jumped = craft.marks.get("believed", (now, own.position, 0))
         reach = 1.0 + 1e-6 * (now - then) * math.hypot(*CONFIG.limits.v_max)
         if float(np.linalg.norm(own.position - place)) > reach:

@@ -18,13 +18,14 @@ WARM = 900.0
 HOUR = 3600.0
 
 
-def shown(whole: float) -> Callable[[float], None]:
+def shown(whole: float, capfd: pytest.CaptureFixture[str]) -> Callable[[float], None]:
     """How far it is, on a terminal."""
 
     def progress(seconds: float) -> None:
-        if sys.stderr.isatty():
-            sys.stderr.write(f"\r{seconds:.0f} of {whole:.0f} s simulated")
-            sys.stderr.flush()
+        with capfd.disabled():
+            if sys.stderr.isatty():
+                sys.stderr.write(f"\r{seconds:.0f} of {whole:.0f} s ")
+                sys.stderr.flush()
 
     return progress
 
@@ -44,8 +45,8 @@ def test_some_minutes_of_mishaps() -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("seed", [1])
-def test_an_hour_of_mishaps(seed: int) -> None:
-    flown = Sorties(seed, HOUR, progress=shown(HOUR))
+def test_an_hour_of_mishaps(seed: int, capfd: pytest.CaptureFixture[str]) -> None:
+    flown = Sorties(seed, HOUR, progress=shown(HOUR, capfd))
     flown.fly()
     assert flown.rests == int(HOUR // (LEG + REST))
     assert flown.begun.keys() == {mishap.name for mishap in MISHAPS}

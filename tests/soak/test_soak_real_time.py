@@ -15,9 +15,17 @@ WARM = 60.0
 """s of a process in which its memory may still grow."""
 
 
+@pytest.mark.slow
+def test_some_seconds_in_real_time(tmp_path: Path) -> None:
+    flock = Flock(tmp_path, ("px4",), 1, 12.0)
+    flock.fly()
+    check_summaries(flock.birds)
+    assert sum(flock.troubles[0].begun.values()) >= 1
+
+
 @pytest.mark.soak
-def test_ten_minutes_in_real_time(tmp_path: Path) -> None:
-    flock = Flock(tmp_path, ("ardupilot", "px4", "px4"), 1, TEN, shown(TEN))
+def test_ten_minutes_in_real_time(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    flock = Flock(tmp_path, ("ardupilot", "px4"), 1, TEN, shown(TEN, capfd))
     flock.fly()
     check_summaries(flock.birds)
     for trouble in flock.troubles:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from siege import BOUT, PEACE, Siege
 from test_soak_mishaps import shown
 
 TEN = 600.0
+Progress = Callable[[float], None]
 
 
-def signed(seed: int, seconds: float, count: int) -> None:
+def signed(seed: int, seconds: float, count: int, progress: Progress = lambda _s: None) -> None:
     """With a stranger it is the flight without one, to the last bit."""
-    quiet = Siege(seed, seconds, signed=True, besieged=False, count=count, progress=shown(seconds))
+    quiet = Siege(seed, seconds, signed=True, besieged=False, count=count, progress=progress)
     quiet.fly()
-    loud = Siege(seed, seconds, signed=True, besieged=True, count=count, progress=shown(seconds))
+    loud = Siege(seed, seconds, signed=True, besieged=True, count=count, progress=progress)
     loud.fly()
     assert loud.trails == quiet.trails
     assert loud.setpoints == quiet.setpoints
@@ -22,9 +25,9 @@ def signed(seed: int, seconds: float, count: int) -> None:
     assert not sum(quiet.stranger.said.values())
 
 
-def unsigned(seed: int, seconds: float, count: int) -> None:
+def unsigned(seed: int, seconds: float, count: int, progress: Progress = lambda _s: None) -> None:
     """Within the limits all the while, and in its place again when it is over and everything began anew."""
-    flown = Siege(seed, seconds, signed=False, besieged=True, count=count, progress=shown(seconds))
+    flown = Siege(seed, seconds, signed=False, besieged=True, count=count, progress=progress)
     flown.fly()
     assert flown.setpoints > seconds
     assert flown.peaces == round(seconds // (BOUT + PEACE)) + (seconds % (BOUT + PEACE) > PEACE)
@@ -41,10 +44,10 @@ def test_a_stranger_on_unsigned_links_leads_nobody_beyond_the_limits() -> None:
 
 
 @pytest.mark.soak
-def test_ten_minutes_of_strangers_on_signed_links() -> None:
-    signed(1, TEN, 3)
+def test_ten_minutes_of_strangers_on_signed_links(capfd: pytest.CaptureFixture[str]) -> None:
+    signed(1, TEN, 3, shown(TEN, capfd))
 
 
 @pytest.mark.soak
-def test_ten_minutes_of_strangers_on_unsigned_links() -> None:
-    unsigned(1, TEN, 3)
+def test_ten_minutes_of_strangers_on_unsigned_links(capfd: pytest.CaptureFixture[str]) -> None:
+    unsigned(1, TEN, 3, shown(TEN, capfd))
