@@ -15,7 +15,7 @@ fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--met
 test: .venv/.made .venv/clients/.made  ## everything; one test with ARGS="-k name"
 	@$(BIN)/pytest -n $(JOBS) --dist loadfile $(ARGS) </dev/null
 
-soak: .venv/.made  ## what is too long for CI, about half an hour; part of it with ARGS="-k yaml"
+soak: .venv/.made  ## what is too long for CI, about an hour; part of it with ARGS="-k yaml"
 	@$(BIN)/pytest --soak -vv -n $(JOBS) --dist worksteal $(ARGS) </dev/null
 
 lint: .venv/.made  ## style, types, and who may import whom

@@ -11,8 +11,8 @@ from birds import Flock, check_summaries
 from test_soak_mishaps import FLAT, shown
 
 TEN = 600.0
-WARM = 60.0
-"""s of a process in which its memory may still grow."""
+WARM = 240.0
+"""s of a process in which its caches fill: thousands of gains of its filters, and of frames."""
 
 
 @pytest.mark.slow
