@@ -271,6 +271,17 @@ class Bird:
         """Whether there is such an event after the first ``since``."""
         return any(event["what"] == what and text in event["text"] for event in self.events[since:])
 
+    def is_concerned(self, text: str) -> bool:
+        """Whether that is a concern now."""
+        told = [event for event in self.events if event["what"] in ("concern", "over", "process")]
+        told = [event for event in told if text in event["text"] or event["what"] == "process"]
+        return bool(told) and told[-1]["what"] == "concern"
+
+    @property
+    def life(self) -> tuple[int, int]:
+        """Another one: another process flies, or none does, and knows nobody yet."""
+        return self.lives, sum(event["what"] in ("process", "lost", "phase") for event in self.events)
+
     @property
     def phase(self) -> str:
         phases = [event["text"] for event in self.events if event["what"] in ("phase", "lost")]
@@ -322,7 +333,7 @@ class Trouble:
                 "told to return": self._return,
             }
         names: list[str] = []
-        while not self._over():
+        while not (self._over() and self.begun):
             if not names:
                 # All of them, again and again, each time in another order.
                 names = self._random.sample(list(mishaps), len(mishaps))
@@ -440,23 +451,21 @@ class Trouble:
         yield from self._mode(GUIDED)
 
     def _cut(self) -> Life:
-        bird, since = self.bird, len(self.bird.events)
-        deaf = [other for other in self.others if other.phase == "escort"]
-        heard = {other.system: len(other.events) for other in deaf}
-        lives = {other.system: other.lives for other in deaf}
+        bird, now = self.bird, time.monotonic()
+        deaf = {other.system: other.life for other in self.others if other.alone_until < now}
         bird.switch.cut.add(bird.system)
-        yield from self._sees("concern", "is not heard", since)
-        yield from self._sees("concern", "Target lost", since)
+        yield "Target lost", lambda: bird.is_concerned("Target lost")
         words = f"Neighbour {bird.system} is not heard"
         yield (
             f"others say {words}",
             lambda: all(
-                other.lives != lives[other.system] or other.sees("concern", words, heard[other.system])
-                for other in deaf
+                other.is_concerned(words) or other.life != deaf[other.system]
+                for other in self.others
+                if other.system in deaf
             ),
         )
         bird.switch.cut.discard(bird.system)
-        yield from self._sees("over", "Target lost", since)
+        yield "Target is back", lambda: not bird.is_concerned("Target lost")
 
     def _pause(self) -> Life:
         """It brakes while nothing is heard, and flies on when the simulation does."""
@@ -465,7 +474,7 @@ class Trouble:
         yield from self._pause_of(self._random.uniform(1.0, 3.0))
         bird.signal_sitl(signal.SIGCONT)
         yield from self._sees("concern", "Own position is old", since)
-        yield from self._sees("over", "Own position is old", since)
+        yield "a position that is new", lambda: not bird.is_concerned("Own position is old")
         assert not bird.sees("lost", "", since), bird.events[since:]
 
     def _noise(self) -> Life:

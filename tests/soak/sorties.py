@@ -256,7 +256,8 @@ class Sorties:
         name = "Battery" if name.startswith("Battery") else "Neighbour" if name.startswith("Neigh") else name
         self.concerns[name] += 1
         said = text if not text.startswith("Target lost") else "Target lost"
-        begun = row.now
+        # Of the target it tells on the ground already.
+        begun = row.now - (20 * SECOND if said == "Target lost" else 0)
         self._promise(craft, _SPOKEN, "said: " + name, lambda: self._was_said(craft, said, begun))
         if text.endswith("landing") and before.phase in STEERED:
             gone = (Phase.ESCORT, Phase.HOLD, Phase.RETURN)
