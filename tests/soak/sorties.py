@@ -73,10 +73,10 @@ class BrokenLawError(AssertionError):
     """One that was broken, and what came before."""
 
 
-def planned(seed: int, seconds: float) -> list[tuple[float, Mishap, int, float]]:
-    """When, what, to which vehicle (by a number), for how long (s)."""
+def planned(seed: int, first: float, seconds: float) -> list[tuple[float, Mishap, int, float]]:
+    """When (from ``first`` on), what, to which vehicle (by a number), for how long (s)."""
     random = Random(f"mishaps {seed}")
-    found, t = [], 30.0
+    found, t = [], first
     while t < seconds:
         t += random.expovariate(1.0 / EVERY)
         what = random.choice(MISHAPS)
@@ -96,10 +96,16 @@ def resident() -> int:
 
 
 class Sorties:
-    """Flies ``seconds`` with ``count`` vehicles; ``progress`` hears the simulated seconds."""
+    """Flies ``seconds`` with ``count`` vehicles; ``progress`` hears the simulated seconds; ``first``: when
+    (s) the first mishap may be."""
 
     def __init__(
-        self, seed: int, seconds: float, count: int = 3, progress: Callable[[float], None] = lambda _s: None
+        self,
+        seed: int,
+        seconds: float,
+        count: int = 3,
+        progress: Callable[[float], None] = lambda _s: None,
+        first: float = 30.0,
     ) -> None:
         self.seed, self.seconds = seed, seconds
         self._progress = progress
@@ -107,7 +113,7 @@ class Sorties:
         self.sent: Counter[int] = Counter()
         self.field = Airfield(count, seed, self._take)
         self._by_system = {craft.system: craft for craft in self.field.crafts}
-        self._plan = deque(planned(seed, seconds))
+        self._plan = deque(planned(seed, first, seconds))
         self._running: list[tuple[float, Mishap, Scene]] = []
         self._promises: list[Promise] = []
         self._rows: dict[int, deque[Row]] = {craft.system: deque(maxlen=300) for craft in self.field.crafts}

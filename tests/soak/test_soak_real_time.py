@@ -17,7 +17,7 @@ WARM = 240.0
 
 @pytest.mark.slow
 def test_some_seconds_in_real_time(tmp_path: Path) -> None:
-    flock = Flock(tmp_path, ("px4",), 1, 12.0)
+    flock = Flock(tmp_path, ("px4",), 1, 6.0)
     flock.fly()
     check_summaries(flock.birds)
     assert sum(flock.troubles[0].begun.values()) >= 1
