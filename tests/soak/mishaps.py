@@ -9,7 +9,8 @@ from random import Random
 from typing import Any, NamedTuple
 
 import numpy as np
-from airfield import FENCE, GROUND, Airfield, Craft, Edit
+from air_nodes import FENCE, GROUND, Edit
+from airfield import Airfield, Craft
 
 from companion.errors import SolverError
 from mavlink_bridge.codec import Codec

@@ -16,7 +16,8 @@ from functools import cache
 from random import Random
 
 import numpy as np
-from airfield import CONFIG, EPOCH, FIRST, FLEET, RADIUS, SECOND, Airfield, Craft
+from air_nodes import EPOCH, FIRST, FLEET, RADIUS, SECOND
+from airfield import CONFIG, Airfield, Craft
 from corpora import absurd_plan, frames, messages
 from damage import WIRE_EDITS, absurd, damaged, framed
 from recorded_logs import PIECES, SHIPPED, WHOLE

@@ -17,7 +17,8 @@ from random import Random
 from typing import Any, NamedTuple
 
 import numpy as np
-from airfield import CONFIG, EPOCH, RADIUS, SECOND, Airfield, Craft
+from air_nodes import EPOCH, RADIUS, SECOND
+from airfield import CONFIG, Airfield, Craft
 from mishaps import MISHAPS, NO_PLAN, OLD, UNHEARD, Mishap, Scene
 
 from companion.guard import Holding

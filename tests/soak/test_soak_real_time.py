@@ -7,7 +7,7 @@ import statistics
 from pathlib import Path
 
 import pytest
-from birds import Flock, check_summaries
+from flock import Flock, check_summaries
 from test_soak_mishaps import FLAT, shown
 
 TEN = 600.0
