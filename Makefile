@@ -18,7 +18,7 @@ test: .venv/.made .venv/clients/.made  ## everything; one test with ARGS="-k nam
 trial: .venv/.made  ## five companions on five vehicles through all that may happen; ARGS="--speed 1 --flavour px4"
 	@$(BIN)/python -m trials $(ARGS)
 
-soak: .venv/.made  ## what is too long for CI, about half an hour; part of it with ARGS="-k yaml"
+soak: .venv/.made  ## what is too long for CI, about an hour; part of it with ARGS="-k yaml"
 	@$(BIN)/pytest --soak -vv -n $(JOBS) --dist worksteal $(ARGS) </dev/null
 
 lint: .venv/.made  ## style, types, and who may import whom

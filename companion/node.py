@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -114,6 +115,8 @@ class Companion:
         self._heading = Heading(config.heading, config.horizon)
         self._boot: int | None = None
         self._next_plan = self._next_setpoint = 0
+        self._fastest = hypot(*config.limits.v_max)
+        self._flown = 0
         self._plans = self._relaxed = 0
         self._plan_ns = array("I")
         self._plan_at = array("q")
@@ -262,11 +265,15 @@ class Companion:
         if view.local is not self._frame:
             # Where the vehicle was in the old frame must not be flown to in the new one.
             self._frame, self.guard.horizon = view.local, None
+        if self._certified is None and now - self._flown > self.config.guard.hold_us:
+            # It hung, and the autopilot did as it saw fit: the old plan leads from where nobody is any more.
+            self.guard.horizon = None
+        self._flown = now
         if not self.pilot.streaming or view.own is None or view.local is None:
             self.guard.horizon = None
             return
         stale = view.own.age > self.config.guard.own_stale_us
-        measured = Motion(view.own.position, view.own.velocity, _ZERO)
+        measured = Motion(view.own.position, self._bounded(view.own.velocity), _ZERO)
         if self.guard.horizon is None:
             if stale or view.yaw is None:
                 return
@@ -291,6 +298,12 @@ class Companion:
             self.guard.start(now, measured)
             return
         self._plan(now, view, measured)
+
+    def _bounded(self, velocity: Array) -> Array:
+        """A measured ``velocity`` (3,) as a plan may begin with it: whatever the own autopilot, or who speaks
+        in its name, says of its speed, nothing faster than the limits is asked for."""
+        speed = float(np.sqrt(velocity @ velocity))
+        return velocity if speed <= self._fastest else velocity * (self._fastest / speed)
 
     def _fly_certified(
         self, now: int, view: View, measured: Motion, flight: CertifiedFlight, *, stale: bool
