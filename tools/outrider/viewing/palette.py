@@ -39,3 +39,10 @@ def hex_of(k: int) -> str:
 def colours(count: int) -> NDArray[np.uint8]:
     """(count, 3) of so many vehicles."""
     return np.array([rgb(hex_of(k)) for k in range(count)], dtype=np.uint8).reshape(-1, 3)
+
+
+def linear(colour: RGB | NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """sRGB (…, 3) as intensities: what the browser takes for lines and for many meshes at once."""
+    share = np.asarray(colour) / 255.0
+    found = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.rint(255.0 * found).astype(np.uint8)

@@ -38,7 +38,9 @@ class Panel:
         hint: str = "",
     ) -> None:
         self._server, self._stage, self._gui = server, stage, server.gui
-        self.wishes = begin
+        self.wishes = self._begin = begin
+        self._watched = False
+        self._speed: viser.GuiDropdownHandle[str] | None = None
         self.sought: float | None = None
         self._series: deque[tuple[float, float]] = deque()
         self._thin = 0
@@ -68,6 +70,18 @@ class Panel:
         self._add_layers()
         if hint:
             gui.add_markdown(hint)
+
+    def watch(self, watched: bool) -> None:
+        """Whether any browser shows the page: a flight goes at the pace of time for who watches it, and as at
+        first when nobody is left who could let it go on."""
+        if self._speed is None or watched == self._watched:
+            return
+        self._watched = watched
+        if watched and self._begin.speed is None:
+            self._speed.value = "1"  # type: ignore[misc]
+            self.wishes = self.wishes._replace(speed=1.0)
+        elif not watched:
+            self.wishes = self.wishes._replace(speed=self._begin.speed, paused=False)
 
     def see(self, moment: Moment) -> None:
         """One more point of the plot. A time before the last begins anew."""
@@ -106,7 +120,8 @@ class Panel:
         gui = self._gui
         pause = gui.add_button_group("Time", ("pause", "play", "step"))
         now = self.wishes.speed
-        speed = gui.add_dropdown("Speed", SPEEDS, initial_value=SPEEDS[-1] if now is None else f"{now:g}")
+        first = SPEEDS[-1] if now is None else f"{now:g}"
+        self._speed = speed = gui.add_dropdown("Speed", SPEEDS, initial_value=first)
 
         @pause.on_click
         def _(_event: object) -> None:

@@ -44,7 +44,8 @@ class Player:
         self.hint = ""
         self._spent = [_of(plan_times, system) for system in scene.systems]
         self._wishes = self.begin
-        self._at = self.span[0]
+        # Before that they only take off.
+        self._at = min(max(self.span[0], -1.0), self.span[1])
         self._wall: float | None = None
         self._told: float | None = None
         self._sought = True

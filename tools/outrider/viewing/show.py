@@ -22,8 +22,8 @@ _CHANGES: frozenset[Lever] = frozenset({"methods", "loss", "target"})
 
 
 class Show:
-    """One flight for ``attendant``. ``watched``: whether there is somebody at a terminal, for whom a lock-step
-    flight goes at the pace of time."""
+    """One flight for ``attendant``. ``watched``: whether somebody is at a terminal, for whom a lock-step
+    flight goes at the pace of time from the beginning."""
 
     def __init__(self, attendant: Attendant, watched: bool) -> None:
         self._attendant, self._watched = attendant, watched

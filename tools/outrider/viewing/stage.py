@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from outrider.viewing import shapes
 from outrider.viewing.moment import Array, Moment, Single
-from outrider.viewing.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, rgb
+from outrider.viewing.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, linear, rgb
 from outrider.viewing.planes import MOST, Plane, between, facing
 from outrider.viewing.scene import Scene, Solid
 from outrider.viewing.trails import Trails
@@ -43,8 +43,9 @@ class Stage:
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self._stage, self.scene = server.scene, scene
         stage, count = server.scene, len(scene.systems)
-        self._colours = colours(count)
-        self._colours[scene.tasked :] = SOFT
+        self._painted = colours(count)
+        self._painted[scene.tasked :] = SOFT
+        self._colours = linear(self._painted)
         self._focus = np.array(scene.centre)
         self._layers = Layers()
         stage.set_up_direction("+z")
@@ -57,7 +58,7 @@ class Stage:
         self._target = self._around_the_target()
         self._movers = [self._solid(f"mover-{j}", mover) for j, mover in enumerate(scene.movers)]
         self._rotors = self._many("rotors", shapes.rotors(), self._colours, self.size)
-        self._frames = self._many("frames", shapes.frame(), np.array(INK, np.uint8), self.size)
+        self._frames = self._many("frames", shapes.frame(), linear(INK), self.size)
         self._shells = self._many(
             "shells", shapes.ball(0.5 * (scene.d_min or 0.0)), self._colours, 1.0, opacity=0.18
         )
@@ -70,19 +71,19 @@ class Stage:
             batched_wxyzs=np.tile(_UNTURNED, (MOST, 1)),
             batched_positions=np.tile(_AWAY, (MOST, 1)),
             batched_scales=np.full(MOST, 0.2 * scene.reach),
-            batched_colors=ACCENT,
+            batched_colors=linear(ACCENT),
             opacity=0.22,
             side="double",
             cast_shadow=False,
             receive_shadow=False,
         )
         self._plans = stage.add_line_segments(
-            f"{WORLD}/plans", np.zeros((1, 2, 3)), INK, thickness=3.0, thickness_units="screen"
+            f"{WORLD}/plans", np.zeros((1, 2, 3)), linear(INK), thickness=3.0, thickness_units="screen"
         )
         self._drops = stage.add_line_segments(
-            f"{WORLD}/drops", np.zeros((1, 2, 3)), LINE, thickness=1.0, thickness_units="screen"
+            f"{WORLD}/drops", np.zeros((1, 2, 3)), linear(SOLID), thickness=1.0, thickness_units="screen"
         )
-        self._trails = Trails(stage, f"{WORLD}/trails", self._colours, 1.6)
+        self._trails = Trails(stage, f"{WORLD}/trails", self._colours, 2.0)
         self._labels = [
             stage.add_label(
                 f"{WORLD}/label-{system}",
@@ -202,7 +203,7 @@ class Stage:
             self._stage.add_mesh_simple(
                 f"{WORLD}/goal-{k}",
                 *mark,
-                color=self._colours[k],
+                color=self._painted[k],
                 side="double",
                 position=goal,
                 cast_shadow=False,
@@ -249,14 +250,14 @@ class Stage:
             stage.add_line_segments(
                 f"{name}/surface-{j}",
                 np.stack([closed[:-1], closed[1:]], axis=1),
-                SOFT,
-                thickness=1.4,
+                linear(SOFT),
+                thickness=1.6,
                 thickness_units="screen",
             )
         return frame
 
     def _look_at(self, server: viser.ViserServer) -> None:
-        distance = 1.12 * self.scene.reach / np.tan(0.5 * FIELD)
+        distance = 1.05 * self.scene.reach / np.tan(0.5 * FIELD)
         level = np.cos(ELEVATION)
         direction = np.array([np.cos(AZIMUTH) * level, np.sin(AZIMUTH) * level, np.sin(ELEVATION)])
         camera = server.initial_camera

@@ -37,6 +37,7 @@ class Theatre:
             self.server = Server(host=host, port=port, verbose=False)
         here = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::", "::1") else host
         self.url = f"http://{here}:{self.server.get_port()}"
+        self.server.gui.add_markdown("Nothing has come yet.")
         self._stage: Stage | None = None
         self._panel: Panel | None = None
 
@@ -48,6 +49,8 @@ class Theatre:
             self.show(source, wall)
             panel = self._panel
             if panel is not None:
+                if source.span is None:
+                    panel.watch(bool(self.server.get_clients()))
                 sought, panel.sought = panel.sought, None
                 if sought is not None or panel.wishes != last_wishes or wall - said > _SAY:
                     said, last_wishes = wall, panel.wishes
