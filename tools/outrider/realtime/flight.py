@@ -176,7 +176,7 @@ class _Leader:
         crew: Crew,
         board: Board,
         progress: Progress,
-        view: RealTimeView | None,
+        view: RealTimeView | None = None,
     ) -> None:
         self._fleet, self._conductor, self._crew, self._board = fleet, conductor, crew, board
         self._progress = progress

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import socket
 
-_ROOM = 1 << 20
+ROOM = 1 << 20
 """Bytes that may be under way; the system may allow less."""
 _LARGEST = 1 << 20
 
 
 class Line:
-    """One ``end``. ``dropped``: datagrams that there was no room for, or nobody left to take."""
+    """One ``end``, with ``room`` (bytes). ``dropped``: datagrams that there was no room for, or nobody left to take."""
 
-    def __init__(self, end: socket.socket) -> None:
+    def __init__(self, end: socket.socket, room: int = ROOM) -> None:
         end.setblocking(False)
         for which in (socket.SO_SNDBUF, socket.SO_RCVBUF):
-            end.setsockopt(socket.SOL_SOCKET, which, _ROOM)
+            end.setsockopt(socket.SOL_SOCKET, which, room)
         self._end = end
         self.dropped = 0
 
