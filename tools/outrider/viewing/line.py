@@ -10,7 +10,8 @@ _LARGEST = 1 << 20
 
 
 class Line:
-    """One ``end``, with ``room`` (bytes). ``dropped``: datagrams that there was no room for, or nobody left to take."""
+    """One ``end``, with ``room`` (bytes). ``dropped``: datagrams that there was no room for, or nobody left
+    to take."""
 
     def __init__(self, end: socket.socket, room: int = ROOM) -> None:
         end.setblocking(False)

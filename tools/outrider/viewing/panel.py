@@ -40,6 +40,7 @@ class Panel:
         self._server, self._stage, self._gui = server, stage, server.gui
         self.wishes = self._begin = begin
         self._watched = False
+        self._last: Moment | None = None
         self._speed: viser.GuiDropdownHandle[str] | None = None
         self.sought: float | None = None
         self._series: deque[tuple[float, float]] = deque()
@@ -50,6 +51,7 @@ class Panel:
         gui.configure_theme(
             control_width="medium", show_logo=False, show_share_button=False, brand_color=(31, 95, 174)
         )
+        gui.main_panel.dock_right()
         self._head = gui.add_markdown("")
         self._slider: viser.GuiSliderHandle[float] | None = None
         if "pace" in scene.levers:
@@ -98,7 +100,8 @@ class Panel:
         slider is to stand."""
         if wall >= self._next_table:
             self._next_table = wall + TABLE_EVERY
-            self._head.content = self._headline(moment)
+            self._last = moment
+            self.head()
             self._table.content = table(self._stage.scene, moment)
             if self._slider is not None and playing is not None:
                 self._slider.value = playing  # type: ignore[misc]
@@ -107,6 +110,11 @@ class Panel:
             time, distance = np.array(self._series).T
             d_min = self._stage.scene.d_min
             self._plot.data = (time, distance, np.full(len(time), np.nan if d_min is None else d_min))
+
+    def head(self) -> None:
+        """The line above all, by what was shown last and is wished now."""
+        if self._last is not None:
+            self._head.content = self._headline(self._last)
 
     def _headline(self, moment: Moment) -> str:
         pair, scene = nearest(moment.position), self._stage.scene

@@ -52,6 +52,8 @@ class Theatre:
                 if source.span is None:
                     panel.watch(bool(self.server.get_clients()))
                 sought, panel.sought = panel.sought, None
+                if panel.wishes != last_wishes:
+                    panel.head()
                 if sought is not None or panel.wishes != last_wishes or wall - said > _SAY:
                     said, last_wishes = wall, panel.wishes
                     source.wish(panel.wishes, sought)
