@@ -69,6 +69,7 @@ def leave(
     np.savez_compressed(
         directory / "flight.npz",
         system=np.arange(11, 11 + vehicles),
+        start_us=np.int64(BOOT + round(1e6 * BEFORE)),
         time_s=time,
         position=position.astype(np.float32),
         velocity=velocity.astype(np.float32),
