@@ -1,4 +1,4 @@
-"""Where moments come from beside flights: runs that are played, links that are listened to, a page of memory."""
+"""Where moments come from beside flights: played runs, links that are listened to, a page of memory."""
 
 from __future__ import annotations
 

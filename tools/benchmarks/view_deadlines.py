@@ -72,7 +72,8 @@ def main() -> None:
                 found[view].append(flight(stack, browser, view, seed))
             last = found[view][-1]
             sys.stdout.write(
-                f"seed {seed} {FLIGHTS[view]:8} {100.0 * last.missed:6.2f} % missed, p99 {last.late_ms:.2f} ms late\n"
+                f"seed {seed} {FLIGHTS[view]:8} {100.0 * last.missed:6.2f} % missed, "
+                f"p99 {last.late_ms:.2f} ms late\n"
             )
             sys.stdout.flush()
     means = [100.0 * sum(one.missed for one in found[view]) / rounds for view in (False, True)]
