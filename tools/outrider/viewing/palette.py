@@ -42,7 +42,8 @@ def colours(count: int) -> NDArray[np.uint8]:
 
 
 def linear(colour: RGB | NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """sRGB (…, 3) as intensities: what the browser takes for lines and for many meshes at once."""
+    """sRGB (…, 3) as intensities: what the browser takes for colours of points and of single meshes
+    among many; one colour for all is sRGB."""
     share = np.asarray(colour) / 255.0
     found = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.rint(255.0 * found).astype(np.uint8)

@@ -24,6 +24,7 @@ _LARGER, _SHARE = 3.0, 0.09
 seen."""
 _TARGET = rgb("#17202a")
 _UNTURNED = (1.0, 0.0, 0.0, 0.0)
+_NO_LINE = np.zeros((1, 2, 3))
 
 
 class Layers(NamedTuple):
@@ -78,10 +79,10 @@ class Stage:
             receive_shadow=False,
         )
         self._plans = stage.add_line_segments(
-            f"{WORLD}/plans", np.zeros((1, 2, 3)), linear(INK), thickness=3.0, thickness_units="screen"
+            f"{WORLD}/plans", _NO_LINE, _NO_LINE.astype(np.uint8), thickness=3.0, thickness_units="screen"
         )
         self._drops = stage.add_line_segments(
-            f"{WORLD}/drops", np.zeros((1, 2, 3)), linear(SOLID), thickness=1.0, thickness_units="screen"
+            f"{WORLD}/drops", _NO_LINE, SOLID, thickness=1.0, thickness_units="screen"
         )
         self._trails = Trails(stage, f"{WORLD}/trails", self._colours, 2.0)
         self._labels = [
@@ -250,7 +251,7 @@ class Stage:
             stage.add_line_segments(
                 f"{name}/surface-{j}",
                 np.stack([closed[:-1], closed[1:]], axis=1),
-                linear(SOFT),
+                SOFT,
                 thickness=1.6,
                 thickness_units="screen",
             )
