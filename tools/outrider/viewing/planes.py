@@ -11,7 +11,8 @@ from outrider.viewing.moment import Array, Single
 
 NEAR = 8.0
 """m: vehicles further from each other than that have no need of a plane in the picture."""
-MOST = 48
+MOST = 16
+"""Planes in a picture: of more of them nobody sees anything."""
 
 
 class Plane(NamedTuple):
