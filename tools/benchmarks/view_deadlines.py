@@ -1,7 +1,8 @@
 """What a live view costs a flight in real time: missed deadlines with it and without, in turns.
 
-``python -m benchmarks.view_deadlines [ROUNDS] [--browser]``: on an otherwise idle machine. With ``--browser``
-a page is open too (Playwright and Chromium, rendering in software): it takes a core, as a browser does.
+``python -m benchmarks.view_deadlines [ROUNDS] [--priority] [--browser]``: on an otherwise idle machine, or
+with ``--priority`` (real-time, for all who fly) on one that is not. With ``--browser`` a page is open too
+(Playwright and Chromium, rendering in software): it takes a core, as a browser does.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Punctual(NamedTuple):
     late_ms: float
 
 
-def flight(stack: ExitStack, browser: bool, view: bool, seed: int) -> Punctual:
+def flight(stack: ExitStack, options: set[str], view: bool, seed: int) -> Punctual:
     """One flight, with a view or without."""
     prepared = swarm.prepare("antipodal", Options(vehicles=VEHICLES))
     directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -39,9 +40,9 @@ def flight(stack: ExitStack, browser: bool, view: bool, seed: int) -> Punctual:
         attendant = Attendant(port=18300)
         stack.callback(attendant.close)
         show = Show(attendant, watched=False)
-        if browser:
+        if "--browser" in options:
             _open(stack, attendant.url)
-    pace = Pace(real_time=True)
+    pace = Pace(real_time=True, priority="--priority" in options)
     summary = swarm.fly(prepared, seed, directory, lambda _stage, _seconds: None, pace, show)
     misses, steps, late = summary["deadline_misses"], summary["deadline_steps"], summary["lateness_ms"]
     if not (isinstance(misses, int) and isinstance(steps, int) and isinstance(late, dict)):
@@ -64,12 +65,12 @@ def _open(stack: ExitStack, url: str) -> None:
 def main() -> None:
     """Fly in turns, and say what came of it."""
     rounds = next((int(word) for word in sys.argv[1:] if word.isdigit()), 3)
-    browser = "--browser" in sys.argv
+    options = set(sys.argv[1:])
     found: dict[bool, list[Punctual]] = {False: [], True: []}
     for seed in range(1, rounds + 1):
         for view in (False, True) if seed % 2 else (True, False):
             with ExitStack() as stack:
-                found[view].append(flight(stack, browser, view, seed))
+                found[view].append(flight(stack, options, view, seed))
             last = found[view][-1]
             sys.stdout.write(
                 f"seed {seed} {FLIGHTS[view]:8} {100.0 * last.missed:6.2f} % missed, "
