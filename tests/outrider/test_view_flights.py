@@ -66,6 +66,7 @@ def test_who_is_only_seen_flies_as_alone(alone: dict[str, bytes], tmp_path: Path
         assert 0 < len(found) == view.count - ours.dropped
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_view_may_be_killed_or_hang(which: signal.Signals, alone: dict[str, bytes], tmp_path: Path) -> None:
     attendant = Attendant(port=18080)
