@@ -12,13 +12,13 @@ import numpy as np
 from companion.bearings import turned
 from companion.certified.flight import CertifiedFlight
 from companion.certified.keeper import Why
-from companion.config import CompanionConfig
+from companion.config import CompanionConfig, MethodName
 from companion.dials import Dials
 from companion.errors import CompanionError, SurfaceError
 from companion.forces import Obstacles
 from companion.guard import Guard
 from companion.heading import Heading
-from companion.horizon import Array, Motion
+from companion.horizon import Array, Horizon, Motion
 from companion.pilot import NAV_LAND, NAV_TAKEOFF, STEERED, Phase, Pilot
 from companion.plan_log import PlanLog
 from companion.planner import Aim, Plan, Planner, standing
@@ -132,14 +132,28 @@ class Companion:
             keeper = self._certified.keeper
             failures, anchored = keeper.held[Why.UNSOLVED], keeper.anchored_anew
         return Tally(
-            self._plans, self._relaxed, failures, self._kept, anchored, self._plan_ns[:], self._plan_at[:]
+            self._plans, self._relaxed, failures, self.held, anchored, self._plan_ns[:], self._plan_at[:]
         )
 
     @property
-    def _kept(self) -> int:
+    def held(self) -> int:
         """How often an old plan was kept."""
         certified = self._certified
         return self.guard.held if certified is None else sum(certified.keeper.held.values())
+
+    @property
+    def flown(self) -> Horizon | None:
+        """What it flies; None while it steers nothing."""
+        return self.guard.horizon
+
+    @property
+    def last_spent(self) -> int | None:
+        """The stopwatch's reading (ns) of the last plan."""
+        return self._plan_ns[-1] if self._plan_ns else None
+
+    def use(self, methods: tuple[MethodName, ...]) -> None:
+        """From the next plan on."""
+        self.planner.use(methods)
 
     def shed(self) -> Sequence[int]:
         """Take the stopwatch's readings (ns) away, and the plan log with them: for who runs for days."""
@@ -196,7 +210,7 @@ class Companion:
             return _NOTHING
         self.world.say(now, self.voice)
         said: list[Message] = [*self.voice.due(now)]
-        said += self._dials.due(now, self._plan_ns, self._kept, self.world.target.age(now))
+        said += self._dials.due(now, self._plan_ns, self.held, self.world.target.age(now))
         return {link: said if link in self.config.voice.links else [] for link in ("autopilot", "ground")}
 
     def _has_to_act(self, now: int) -> bool:
