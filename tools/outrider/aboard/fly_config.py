@@ -50,8 +50,10 @@ class FlyConfig(Settings):
     radio: Literal[57600] | None = Field(
         None, description="baud of a radio that eight vehicles share as the swarm link; null: a network"
     )
-    clock: Literal["autopilot", "wall"] = Field(
-        "autopilot", description="whose time it lives by: a simulation's may run ten times as fast"
+    clock: Literal["auto", "autopilot", "wall"] = Field(
+        "auto",
+        description="whose time it lives by: that of a simulation (autopilot), which may run ten times as fast, "
+        "or for a real one the wall's; auto: found out in ten seconds before the go, a simulation by its rate",
     )
     period_us: int = Field(
         10_000, ge=1_000, le=100_000, multiple_of=4, description="of its steps, µs of that clock"

@@ -27,6 +27,10 @@ _AGAIN = 10.0
 """s after which an autopilot's words are told again that it keeps repeating."""
 _REPEATED = ("autopilot", "refused")
 _WAITING = (Phase.CONNECT, Phase.PREPARE)
+_PLAIN = 0.002
+"""A clock that is off by more is no quartz."""
+CLOCK = "the rate of the autopilot's clock"
+"""What it waits for last before the go."""
 
 
 class State(NamedTuple):
@@ -79,6 +83,7 @@ class News:
         self._states = 0
         self._plan_ms = (0.0, 0.0)
         self._told = self._refusals = self._steps = 0
+        self._judged = False
         self._concerns: dict[str, Concern] = {}
         self._sentences: dict[str, str] = {}
         self._lately: dict[tuple[str, str], float] = {}
@@ -165,13 +170,16 @@ class News:
         if self._followed is not None and self._followed.steps != self._steps:
             self._steps = self._followed.steps
             self._event(at, "clock", "the autopilot's clock was set, or began anew")
+        if self._followed is not None and self._followed.judged is not None and not self._judged:
+            self._judged = True
+            self._event(at, "clock", judgement(self._followed.judged, simulated=self._followed.simulated))
 
     def _waiting(self) -> str:
         pilot = self._companion.pilot
         if isinstance(self._companion, DryRun):
             return self._companion.pilot.lacking
         if pilot.waiting_for == OPERATORS_GO and not self._cockpit.settled:
-            return "the rate of the autopilot's clock"
+            return CLOCK
         return pilot.waiting_for if pilot.phase in _WAITING else ""
 
     def _would(self) -> str:
@@ -185,6 +193,18 @@ class News:
         self._lately = {key: time for key, time in self._lately.items() if time + _AGAIN > at}
         self._lately[what, text] = at
         self._tell(kind="event", at=at, what=what, text=text)
+
+
+def judgement(rate: float, *, simulated: bool) -> str:
+    """What the autopilot's clock was found to be, in words."""
+    if simulated:
+        return f"a simulation's, {rate:.2f} times as fast as the wall's: it is followed"
+    if abs(rate - 1.0) < _PLAIN:
+        return "a real one: the wall's time counts"
+    return (
+        f"taken for a real one with a delay that changes, though it seems to run at {rate:.3f} of the wall's; "
+        "for a simulation write clock: autopilot"
+    )
 
 
 def _words(message: SetpointLocal) -> str:

@@ -81,7 +81,12 @@ class Worker:
     def _fly(self, files: ExitStack) -> None:
         asked, node = self._asked, self._companion
         wall = WallClock()
-        followed = FollowedClock(wall, wall.now()) if asked.config.clock == "autopilot" else None
+        known = {"auto": None, "autopilot": True}
+        followed = (
+            None
+            if asked.config.clock == "wall"
+            else FollowedClock(wall, wall.now(), simulated=known[asked.config.clock])
+        )
         cockpit = Cockpit(node, wall, followed, self._signing)
         departures = Departures(node.config.limits)
         news = News(cockpit, departures, followed, self._signing, self._orders.tell)
