@@ -9,13 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from companion.dry_run import DryRun
 from companion.last_word import LastWord
 from companion.node import Companion
+from companion.pilot import STEERED, Phase
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.signing import Signing
 
+OURS = (Phase.PREPARE, *STEERED, Phase.LAND)
+"""The phases in which we have the vehicle: before and after, and when somebody took it, it is nobody's business
+of ours, in whatever mode it flies."""
 _OTHERS = ("swarm", "target")
 
 
@@ -41,8 +46,11 @@ class Cockpit:
     def give_up(self) -> None:
         """Nobody looks after this process any more: no set-points from now on, but the last word."""
         if self.last is None:
-            heard = self.companion.pilot.vehicle.heartbeat
-            self.last = LastWord(self.companion.system, heard, self._signing)
+            pilot = self.companion.pilot
+            ours = pilot.phase in OURS and not isinstance(self.companion, DryRun)
+            self.last = LastWord(
+                self.companion.system, pilot.vehicle.heartbeat, self._signing, steered=ours
+            )
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """As the companion's."""

@@ -18,10 +18,10 @@ from companion.pilot import OPERATORS_GO, Phase
 from companion.reception import AUTOPILOT
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.messages import Heartbeat, Source
-from mavlink_bridge.node import Datagram
 from mavlink_bridge.signing import Signing
 from outrider.aboard.crew import Crew
 from outrider.aboard.diary import Diary
+from outrider.aboard.farewell import farewell
 from outrider.aboard.identify import Identification
 from outrider.aboard.intercom import Desk, OrderLink, intercom
 from outrider.aboard.news import State
@@ -73,7 +73,7 @@ class Flight:
         self._orders = Orders(asked.system, asked.config.takeoff_height, self._signing)
         self._began = time.monotonic()
         self._heard = 0.0
-        self._left = self._go_given = False
+        self._left = self._go_given = self._failed = False
         self._trouble = ""
 
     def run(self) -> None:
@@ -95,6 +95,7 @@ class Flight:
             finally:
                 self._finish(desk, crew)
             if self._over():
+                self.fault = self.fault or self._failed
                 return
             place = self._directory / f"restart-{len(self.restarts)}"
             place.mkdir()
@@ -218,39 +219,43 @@ class Flight:
         desk.order(self._orders.frame(word))
 
     def _finish(self, desk: Desk, crew: Crew) -> None:
-        desk.stop()
-        until = time.monotonic() + _LEAVING
-        while not (self._left or crew.status is not None or self._at_once()):
-            if time.monotonic() > until:
-                self.diary.note("process", "the companion's process does not end: killed")
-                crew.kill()
-                until += _LEAVING
-            wait([desk.fileno(), crew.sentinel], _QUICK)
-            self._hear(desk)
-        if not self._at_once():
-            self._say_last_word()
-        else:
-            crew.kill()
-        crew.join()
+        """The process that flies shall end, and then, whatever comes between, the vehicle is told to hold."""
+        try:
+            self._dismiss(desk, crew)
+        finally:
+            try:
+                self._say_last_word()
+            finally:
+                crew.join()
         self._hear(desk)
         desk.close()
+
+    def _dismiss(self, desk: Desk, crew: Crew) -> None:
+        desk.stop()
+        until = time.monotonic() + _LEAVING
+        while not (self._left or crew.status is not None):
+            if self._at_once() or time.monotonic() > until:
+                crew.kill()
+                crew.join()
+                self.diary.note("process", "the companion's process does not end: killed")
+                return
+            wait([desk.fileno(), crew.sentinel], _QUICK)
+            self._hear(desk)
 
     def _at_once(self) -> bool:
         return len(self._stops) > 1
 
     def _say_last_word(self) -> None:
-        """Where our set-points steered last, ask for a hover."""
-        if self.asked.dry_run or self.state.beat is None:
+        """Where the companion had the vehicle, ask for a hover."""
+        state = self.state
+        if self.asked.dry_run or state.beat is None:
             return
-        beat = Heartbeat(Source(self.asked.system, AUTOPILOT), *self.state.beat)
+        beat = Heartbeat(Source(self.asked.system, AUTOPILOT), *state.beat)
         if self._signing is not None:
-            self._signing.resume(self.state.stamp)
-        node = LastWord(self.asked.system, beat, self._signing)
-        end = self._wiring.ends["autopilot"]
-        while not node.over and not self._at_once():
-            inbox = [Datagram("autopilot", data) for data in end.receive()]
-            for datagram in node.step(self._wall.now(), inbox):
-                end.send(datagram.data)
-            time.sleep(_QUICK)
-        self.last_word = node.said
-        self.diary.note("last word", f"the vehicle: {node.said or 'not asked'}")
+            self._signing.resume(state.stamp)
+        word = LastWord(self.asked.system, beat, self._signing, steered=state.ours)
+        farewell(word, self._wiring.ends["autopilot"], self._wall, self._at_once)
+        self.last_word, self._failed = word.said, word.failed
+        self.diary.note("last word", f"the vehicle: {word.said or 'asked to hold, no answer yet'}")
+        if word.failed:
+            self.diary.note("critical", "the vehicle is armed and nobody has it: take it over")

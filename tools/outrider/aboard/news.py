@@ -15,7 +15,7 @@ from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.histogram import Histogram
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.signing import Signing
-from outrider.aboard.cockpit import Cockpit
+from outrider.aboard.cockpit import OURS, Cockpit
 from outrider.aboard.departures import Departures
 from outrider.hangar.modes import mode_name
 
@@ -60,6 +60,11 @@ class State(NamedTuple):
     would: str = ""
     concerns: tuple[str, ...] = ()
     stamp: int = 0
+
+    @property
+    def ours(self) -> bool:
+        """Whether the companion has the vehicle."""
+        return Phase(self.phase) in OURS
 
 
 class News:
