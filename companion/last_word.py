@@ -36,7 +36,12 @@ class LastWord:
     """
 
     def __init__(
-        self, system: int, heartbeat: Heartbeat | None, signing: Signing | None = None, *, steered: bool = True
+        self,
+        system: int,
+        heartbeat: Heartbeat | None,
+        signing: Signing | None = None,
+        *,
+        steered: bool = True,
     ) -> None:
         self.name = f"last-word-{system}"
         self.said = ""

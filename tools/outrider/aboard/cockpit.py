@@ -48,9 +48,7 @@ class Cockpit:
         if self.last is None:
             pilot = self.companion.pilot
             ours = pilot.phase in OURS and not isinstance(self.companion, DryRun)
-            self.last = LastWord(
-                self.companion.system, pilot.vehicle.heartbeat, self._signing, steered=ours
-            )
+            self.last = LastWord(self.companion.system, pilot.vehicle.heartbeat, self._signing, steered=ours)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """As the companion's."""

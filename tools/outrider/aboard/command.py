@@ -22,13 +22,15 @@ from outrider.aboard.request import Request
 from outrider.aboard.screen import Screen
 from outrider.aboard.typed import typing
 from outrider.aboard.wiring import Wiring, wire
-from outrider.interruption import noted
+from outrider.interruption import Came, noted
 from outrider.run_directories import new_directory
 from outrider.saying import say
 
 FAULT: Final = 3
 CONFIGURATION, SUMMARY = "configuration.yaml", "summary.json"
-_STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
+"""Ctrl-Z, and what a terminal says to those in its background."""
 
 
 def run(asked: Request) -> int:
@@ -56,7 +58,7 @@ def run(asked: Request) -> int:
     return FAULT if flight.fault else 0
 
 
-def _flown(asked: Request, directory: Path, diary: Diary, stops: list[int], wiring: Wiring) -> Flight:
+def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wiring: Wiring) -> Flight:
     """On a terminal with a picture; elsewhere with a line for each event."""
     console = Console(stderr=True)
     with typing(console.is_terminal) as typed:
@@ -75,16 +77,21 @@ def _flown(asked: Request, directory: Path, diary: Diary, stops: list[int], wiri
                 screen.look()
 
         flight = screen.flight = Flight(asked, wiring, directory, diary, typed, stops, look)
-        with screen.live:
+        screen.live.start()
+        try:
             flight.run()
+        finally:
+            with suppress(OSError):
+                screen.live.stop()
         return flight
 
 
 @contextmanager
 def _never_stopped() -> Iterator[None]:
-    """Ctrl-Z would leave a vehicle to its last set-point."""
-    before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+    """It would leave a vehicle to its last set-point."""
+    before = {which: signal.signal(which, signal.SIG_IGN) for which in _SUSPENDING}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTSTP, before)
+        for which, handler in before.items():
+            signal.signal(which, handler)

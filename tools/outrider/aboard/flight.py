@@ -30,6 +30,7 @@ from outrider.aboard.request import Request
 from outrider.aboard.typed import Typed
 from outrider.aboard.wiring import Wiring
 from outrider.aboard.worker import Worker
+from outrider.interruption import Came, insisted
 
 LOOK: Final = 0.05
 """s between two looks."""
@@ -45,7 +46,7 @@ _QUICK: Final = 0.01
 
 class Flight:
     """``look`` is called some times a second with the latest ``state``. ``stops``: the signals that have
-    come; the first ends the flight, the second at once."""
+    come; the first ends the flight, one that is a second later ends it at once."""
 
     def __init__(
         self,
@@ -54,7 +55,7 @@ class Flight:
         directory: Path,
         diary: Diary,
         typed: Typed,
-        stops: Sequence[int],
+        stops: Sequence[Came],
         look: Callable[[], None],
     ) -> None:
         self.asked, self.diary = asked, diary
@@ -148,7 +149,7 @@ class Flight:
     def _over(self) -> bool:
         """Whether it is time to end; ``ended`` says why."""
         if not self.ended and self._stops:
-            self.ended = f"stopped by {signal.Signals(self._stops[0]).name}"
+            self.ended = f"stopped by {signal.Signals(self._stops[0].which).name}"
         if not self.ended and self.asked.seconds is not None and self.seconds >= self.asked.seconds:
             self.ended = "the time is over"
         return bool(self.ended)
@@ -243,7 +244,7 @@ class Flight:
             self._hear(desk)
 
     def _at_once(self) -> bool:
-        return len(self._stops) > 1
+        return insisted(self._stops)
 
     def _say_last_word(self) -> None:
         """Where the companion had the vehicle, ask for a hover."""

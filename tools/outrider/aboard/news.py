@@ -85,6 +85,7 @@ class News:
         """µs of CPU time."""
         self._began: int | None = None
         self._shown: int | None = None
+        self._phase: Phase | None = None
         self._states = 0
         self._plan_ms = (0.0, 0.0)
         self._told = self._refusals = self._steps = 0
@@ -97,9 +98,12 @@ class News:
         """After the step at ``now`` (µs of its clock)."""
         self._began = now if self._began is None else self._began
         at = round((now - self._began) * 1e-6, 2)
+        phase = self._companion.pilot.phase
+        # Whoever hears of another phase has to know the rest: it may have the last word a moment later.
+        at_once = phase is not self._phase
         self._changes(at)
-        if self._shown is None or wall - self._shown >= SHOWN:
-            self._shown = wall
+        if self._shown is None or at_once or wall - self._shown >= SHOWN:
+            self._shown, self._phase = wall, phase
             self._tell(kind="state", **self.state(now)._asdict())
 
     def state(self, now: int) -> State:

@@ -30,7 +30,15 @@ from outrider.aboard.news import News
 from outrider.aboard.request import Request
 from outrider.recorder import Recorder
 
-_IGNORED: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
+_IGNORED: Final = (
+    signal.SIGINT,
+    signal.SIGTERM,
+    signal.SIGHUP,
+    signal.SIGQUIT,
+    signal.SIGTSTP,
+    signal.SIGTTIN,
+    signal.SIGTTOU,
+)
 """The parent alone is told by signals when to end; a terminal that is closed or stopped ends no flight."""
 
 
