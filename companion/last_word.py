@@ -2,8 +2,8 @@
 
 An autopilot that was just told positions and velocities flies on along them for its time-out. So whoever
 sees a companion end asks for the mode in which the autopilot holds its place by itself; but only where our
-set-points steered last: whoever else has the vehicle keeps it. What came of it the autopilot's heartbeat says:
-an acknowledgement may be somebody else's, or that of a mode that did not last.
+set-points steered last: whoever else has the vehicle keeps it. What came of it the autopilot's heartbeat
+says: an acknowledgement may be somebody else's, or that of a mode that did not last.
 """
 
 from __future__ import annotations

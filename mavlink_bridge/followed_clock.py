@@ -6,10 +6,10 @@ plane of arrival and stamp all messages lie on or below the line of those that t
 along the upper edge of what the last seconds brought, piece by piece (Moon, Skelly and Towsley, "Estimation
 and removal of clock skew from network delay measurements", 1999), and the clock runs along it.
 
-Only a simulation's clock is followed so, for good: on a busy machine it stands for a moment and never makes up
-for that; then the clock goes on as if nothing were, and follows the stamps from there. A real autopilot's clock
-is as good as the own one, and a delay that grows looks just like a clock that is slow: so there the wall's time
-is better, by which what is old looks old. Which of the two it is, is decided once (``verdict``).
+Only a simulation's clock is followed so, for good: on a busy machine it stands for a moment and never makes
+up for that; then the clock goes on as if nothing were, and follows the stamps from there. A real autopilot's
+clock is as good as the own one, and a delay that grows looks just like a clock that is slow: so there the
+wall's time is better, by which what is old looks old. Which of the two it is, is decided once.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _STALL: Final = 50_000
 _EVIDENCE: Final = 10_000_000
 """µs of the wall after which it is decided what it is."""
 _REAL: Final = 0.2
-"""A clock whose rate is off by more is a simulation's. That is wide: to take a simulation for real grounds it, to
-take a queue that grows for a simulation hides that all is old."""
+"""A clock whose rate is off by more is a simulation's. That is wide: to take a simulation for real grounds it,
+to take a queue that grows for a simulation hides that all is old."""
 _SLEW: Final = 0.5
 """A clock that is ahead goes on at this share of its rate: it never stands."""
 _WITNESSES: Final = 5

@@ -19,8 +19,8 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.signing import Signing
 
 OURS = (Phase.PREPARE, *STEERED, Phase.LAND)
-"""The phases in which we have the vehicle: before and after, and when somebody took it, it is nobody's business
-of ours, in whatever mode it flies."""
+"""The phases in which we have the vehicle: before and after, and when somebody took it, it is no business of
+ours, in whatever mode it flies."""
 _OTHERS = ("swarm", "target")
 
 

@@ -22,8 +22,8 @@ _SENTENCES: Final = {
 
 class Diary:
     """Writes ``events.jsonl`` in ``directory``; ``tell`` gets the lines for people. ``phases``: each with
-    when it began, s; ``concerns``: how often each began. A disk that is full, and people who do not listen any
-    more, hold up nobody."""
+    when it began, s; ``concerns``: how often each began. A full disk, and
+    people who do not listen any more, hold up nobody."""
 
     def __init__(self, directory: Path, clock: Callable[[], float]) -> None:
         """``clock``: s since the beginning."""

@@ -26,6 +26,7 @@ from outrider.aboard.identify import Identification
 from outrider.aboard.intercom import Desk, OrderLink, intercom
 from outrider.aboard.news import State
 from outrider.aboard.orders import QUIT, Orders, understood
+from outrider.aboard.pulse import Pulse
 from outrider.aboard.request import Request
 from outrider.aboard.typed import Typed
 from outrider.aboard.wiring import Wiring
@@ -34,8 +35,6 @@ from outrider.interruption import Came, insisted
 
 LOOK: Final = 0.05
 """s between two looks."""
-HUNG: Final = 2.0
-"""s without news after which the process that flies is taken for hung."""
 MOST: Final = 5
 WITHIN: Final = 60.0
 """So many processes lost in so many seconds are the end."""
@@ -73,7 +72,7 @@ class Flight:
         self._signing = None if asked.key is None else Signing(asked.key)
         self._orders = Orders(asked.system, asked.config.takeoff_height, self._signing)
         self._began = time.monotonic()
-        self._heard = 0.0
+        self._pulse = Pulse(self._began)
         self._left = self._go_given = self._failed = False
         self._trouble = ""
 
@@ -91,7 +90,7 @@ class Flight:
             try:
                 self.diary.note("process", f"the companion flies in process {crew.start()}")
                 orders.release()
-                self._left, self._heard = False, time.monotonic()
+                self._left, self._pulse = False, Pulse(time.monotonic())
                 self._look_after(desk, crew)
             finally:
                 self._finish(desk, crew)
@@ -133,15 +132,16 @@ class Flight:
     def _look_after(self, desk: Desk, crew: Crew) -> None:
         while not self._over():
             wait([desk.fileno(), crew.sentinel], LOOK)
-            self._hear(desk)
+            desk.beat(time.monotonic())
             self._obey(desk)
             self._look()
+            self._hear(desk)
             if self._left or crew.status is not None:
                 self._lose(f"its process ended with status {crew.status}")
                 return
-            if time.monotonic() - self._heard > HUNG:
+            if self._pulse.stopped(time.monotonic()):
                 crew.kill()
-                self._lose(f"its process has not been heard for {HUNG:g} s")
+                self._lose("its process is not heard any more")
                 return
             if self.state.phase == Phase.DONE.value:
                 self.ended = self.ended or "landed"
@@ -166,7 +166,7 @@ class Flight:
 
     def _hear(self, desk: Desk) -> None:
         for news in desk.news():
-            self._heard = time.monotonic()
+            self._pulse.heard(time.monotonic())
             kind = news.pop("kind")
             if kind == "state":
                 self.state = State(**news)

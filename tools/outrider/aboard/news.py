@@ -211,7 +211,7 @@ def judgement(rate: float, *, simulated: bool) -> str:
     if abs(rate - 1.0) < _PLAIN:
         return "a real one: the wall's time counts"
     return (
-        f"taken for a real one with a delay that changes, though it seems to run at {rate:.3f} of the wall's; "
+        f"taken for a real one with a delay that changes, though it seems to be {rate:.3f} times as fast; "
         "for a simulation write clock: autopilot"
     )
 

@@ -105,7 +105,7 @@ class Worker:
         }
 
         def stepped(now: int) -> bool:
-            if os.getppid() != self._parent:
+            if os.getppid() != self._parent or self._orders.alone:
                 cockpit.give_up()
             if isinstance(node, DryRun):
                 for message in node.would:
