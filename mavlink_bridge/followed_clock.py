@@ -35,8 +35,8 @@ _STALL: Final = 50_000
 _EVIDENCE: Final = 10_000_000
 """µs of the wall after which it is decided what it is."""
 _REAL: Final = 0.2
-"""A clock whose rate is off by more is a simulation's. That is wide: to take a simulation for real grounds it,
-to take a queue that grows for a simulation hides that all is old."""
+"""A clock whose rate is off by more is a simulation's. That is wide: to take a simulation for real grounds
+it, to take a queue that grows for a simulation hides that all is old."""
 _SLEW: Final = 0.5
 """A clock that is ahead goes on at this share of its rate: it never stands."""
 _WITNESSES: Final = 5

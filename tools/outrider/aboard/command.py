@@ -41,7 +41,7 @@ def run(asked: Request) -> int:
 
         return rehearsed(asked, asked.log)
     config, began = asked.config, time.monotonic()
-    wiring = wire(asked.endpoints, config.system, config.target, WallClock())
+    wiring = wire(asked.endpoints, config.system, config.target, config.settings, WallClock())
     with closing(wiring), noted(_STOPS) as stops, _never_stopped():
         directory = new_directory(asked.out, f"fly-{config.system}")
         document = config.model_dump(mode="json")

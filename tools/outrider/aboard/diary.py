@@ -22,8 +22,8 @@ _SENTENCES: Final = {
 
 class Diary:
     """Writes ``events.jsonl`` in ``directory``; ``tell`` gets the lines for people. ``phases``: each with
-    when it began, s; ``concerns``: how often each began. A full disk, and
-    people who do not listen any more, hold up nobody."""
+    when it began, s; ``concerns``: how often each began. A full disk, and people who do not listen any more,
+    hold up nobody."""
 
     def __init__(self, directory: Path, clock: Callable[[], float]) -> None:
         """``clock``: s since the beginning."""
@@ -38,7 +38,7 @@ class Diary:
         now = round(self._clock(), 2)
         if what == "phase":
             self.phases.append((text, now))
-        elif what == "concern":
+        elif what in ("concern", "critical"):
             self.concerns[text] += 1
         event = {"wall_s": now, "clock_s": at, "what": what, "text": text}
         with suppress(OSError, ValueError):

@@ -105,7 +105,8 @@ class Flight:
     def _crew(self, place: Path) -> tuple[Crew, Desk, OrderLink]:
         """A process that is ready to be forked, and both ends of what joins it; ``place`` gets its log."""
         desk, orders = intercom()
-        return Crew(Worker(self.asked, self._wiring.ends, orders, place)), desk, orders
+        wiring = self._wiring
+        return Crew(Worker(self.asked, wiring.ends, wiring.twin, orders, place)), desk, orders
 
     @property
     def seconds(self) -> float:

@@ -15,7 +15,7 @@ from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.histogram import Histogram
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.signing import Signing
-from outrider.aboard.cockpit import OURS, Cockpit
+from outrider.aboard.cockpit import OURS, TWIN, Cockpit
 from outrider.aboard.departures import Departures
 from outrider.hangar.modes import mode_name
 
@@ -29,8 +29,6 @@ _REPEATED = ("autopilot", "refused")
 _WAITING = (Phase.CONNECT, Phase.PREPARE)
 _PLAIN = 0.002
 """A clock that is off by more is no quartz."""
-CLOCK = "the rate of the autopilot's clock"
-"""What it waits for last before the go."""
 
 
 class State(NamedTuple):
@@ -89,7 +87,7 @@ class News:
         self._states = 0
         self._plan_ms = (0.0, 0.0)
         self._told = self._refusals = self._steps = 0
-        self._judged = False
+        self._judged = self._twin = False
         self._concerns: dict[str, Concern] = {}
         self._sentences: dict[str, str] = {}
         self._lately: dict[tuple[str, str], float] = {}
@@ -176,6 +174,9 @@ class News:
                 if name not in concerns:
                     self._event(at, "over", concern.text)
             self._concerns = concerns
+        if (twin := self._cockpit.barred == TWIN) != self._twin:
+            self._twin = twin
+            self._event(at, "critical" if twin else "over", "another companion with this system id is heard")
         if self._followed is not None and self._followed.steps != self._steps:
             self._steps = self._followed.steps
             self._event(at, "clock", "the autopilot's clock was set, or began anew")
@@ -187,8 +188,8 @@ class News:
         pilot = self._companion.pilot
         if isinstance(self._companion, DryRun):
             return self._companion.pilot.lacking
-        if pilot.waiting_for == OPERATORS_GO and not self._cockpit.settled:
-            return CLOCK
+        if pilot.phase is Phase.CONNECT and pilot.waiting_for == OPERATORS_GO and self._cockpit.barred:
+            return self._cockpit.barred
         return pilot.waiting_for if pilot.phase in _WAITING else ""
 
     def _would(self) -> str:

@@ -28,6 +28,7 @@ from outrider.aboard.harmless import HarmlessLink
 from outrider.aboard.intercom import OrderLink
 from outrider.aboard.news import News
 from outrider.aboard.request import Request
+from outrider.aboard.twin import Twin
 from outrider.recorder import Recorder
 
 _IGNORED: Final = (
@@ -43,13 +44,15 @@ _IGNORED: Final = (
 
 
 class Worker:
-    """``links`` by the companion's names; ``directory`` gets the log."""
+    """``links`` by the companion's names, on which ``twin`` listens; ``directory`` gets the log."""
 
-    def __init__(self, asked: Request, links: Mapping[str, Link], orders: OrderLink, directory: Path) -> None:
+    def __init__(
+        self, asked: Request, links: Mapping[str, Link], twin: Twin, orders: OrderLink, directory: Path
+    ) -> None:
         self._asked, self._orders, self._directory = asked, orders, directory
         self._doors = [HarmlessLink(link) for link in links.values()] if asked.dry_run else []
         self._links = dict(zip(links, self._doors or links.values(), strict=True))
-        self._parent = os.getpid()
+        self._parent, self._twin = os.getpid(), twin
         self._signing = None if asked.key is None else Signing(asked.key)
         kind = DryRun if asked.dry_run else Companion
         config = asked.config
@@ -95,7 +98,7 @@ class Worker:
             if asked.config.clock == "wall"
             else FollowedClock(wall, wall.now(), simulated=known[asked.config.clock])
         )
-        cockpit = Cockpit(node, wall, followed, self._signing)
+        cockpit = Cockpit(node, wall, followed, self._signing, self._twin)
         departures = Departures(node.config.limits)
         news = News(cockpit, departures, followed, self._signing, self._orders.tell)
         recorder = Recorder(self._directory, [asked.system], files)
