@@ -11,8 +11,8 @@ from companion.config import CompanionConfig
 from companion.settings import Settings
 from mavlink_bridge.frames import FleetFrame
 
-System = Annotated[int, Field(ge=1, le=250)]
-"""System ids above are ground stations'."""
+System = Annotated[int, Field(ge=0, le=250)]
+"""0: not said yet. System ids above are ground stations'."""
 
 
 class FleetOrigin(Settings):
@@ -43,7 +43,9 @@ RADIOS = {57600: Radio(state_us=200_000, plan_us=500_000, plan_stale_us=1_100_00
 class FlyConfig(Settings):
     """One companion. Its ``system`` id is its vehicle's."""
 
-    system: System = Field(description="system id of the own autopilot; also given by --system")
+    system: System = Field(
+        0, description="system id of the own autopilot, no other vehicle's; 0: given by --system"
+    )
     target: int = Field(ge=1, le=255, description="system id of the target")
     origin: FleetOrigin
     takeoff_height: float = Field(5.0, ge=0.5, le=120.0, description="m above the ground, at the go")

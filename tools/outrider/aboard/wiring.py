@@ -22,7 +22,7 @@ LAST_VEHICLE = 250
 """System ids above are ground stations'."""
 _COMMANDS = (75, 76)
 _SWARMS = frozenset((33, 111, 385))
-"""What companions tell each other: GLOBAL_POSITION_INT, TIMESYNC, TUNNEL; other news there may be anybody's."""
+"""What companions tell each other: GLOBAL_POSITION_INT, TIMESYNC, TUNNEL. Other news may be anybody's."""
 
 
 class Wiring(NamedTuple):
