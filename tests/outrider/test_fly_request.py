@@ -16,7 +16,7 @@ AUTOPILOT, SWARM = "udpin:127.0.0.1:14550", "mcast:,127.0.0.1"
 
 @pytest.mark.parametrize("shipped", ["ardupilot", "px4"])
 def test_no_two_vehicles_get_one_id_by_default(shipped: str) -> None:
-    with pytest.raises(InputError, match="--system: is missing.*1…250"):
+    with pytest.raises(InputError, match=r"--system: is missing.*1…250"):
         checked(Options(AUTOPILOT, shipped, SWARM))
     assert checked(Options(AUTOPILOT, shipped, SWARM, system=7)).system == 7
 

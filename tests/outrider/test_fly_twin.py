@@ -1,5 +1,5 @@
-"""Two with one system id never fly beside each other unknown: another who speaks with the own ids is found, and
-no go is taken; what comes back of the own words is nobody."""
+"""Two with one system id never fly beside each other unknown: another who speaks with the own ids is found,
+and no go is taken; what comes back of the own words is nobody."""
 
 from __future__ import annotations
 

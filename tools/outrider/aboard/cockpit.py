@@ -79,7 +79,7 @@ class Cockpit:
         if not self.settled:
             inbox = [datagram for datagram in inbox if datagram.link not in _OTHERS]
         answers: list[Datagram] = []
-        if barred := self.barred:
+        if (barred := self.barred) and not isinstance(self.companion, DryRun):
             inbox, answers = self._gate.closed(inbox)
         if (barred == TWIN) != self._warned:
             self._warned = barred == TWIN

@@ -13,7 +13,9 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any, Final
 
+from companion.dry_run import ONLOOKER
 from companion.last_word import LastWord
+from companion.node import COMPONENT
 from companion.pilot import OPERATORS_GO, Phase
 from companion.reception import AUTOPILOT
 from mavlink_bridge.clock import WallClock
@@ -25,7 +27,7 @@ from outrider.aboard.farewell import farewell
 from outrider.aboard.identify import Identification
 from outrider.aboard.intercom import Desk, OrderLink, intercom
 from outrider.aboard.news import State
-from outrider.aboard.orders import QUIT, Orders, understood
+from outrider.aboard.orders import QUIT, Orders, answered, understood
 from outrider.aboard.pulse import Pulse
 from outrider.aboard.request import Request
 from outrider.aboard.typed import Typed
@@ -99,14 +101,19 @@ class Flight:
                 return
             place = self._directory / f"restart-{len(self.restarts)}"
             place.mkdir()
-            self.state = State()
+            if self._signing is not None:
+                self._signing.resume(self.state.stamp)
+            self.state, self.waiting = State(), ""
             crew, desk, orders = self._crew(place)
 
     def _crew(self, place: Path) -> tuple[Crew, Desk, OrderLink]:
         """A process that is ready to be forked, and both ends of what joins it; ``place`` gets its log."""
         desk, orders = intercom()
         wiring = self._wiring
-        return Crew(Worker(self.asked, wiring.ends, wiring.twin, orders, place)), desk, orders
+        worker = Worker(self.asked, wiring.ends, wiring.twin, orders, place)
+        if self._signing is not None:
+            worker.resume(self._signing.newest)
+        return Crew(worker), desk, orders
 
     @property
     def seconds(self) -> float:
@@ -116,7 +123,8 @@ class Flight:
     def _identify(self) -> bool:
         endpoint, config = self.asked.endpoints["autopilot"], self.asked.config
         link = self._wiring.physical("autopilot")
-        known = Identification(link, str(endpoint), config.system, self._signing)
+        component = ONLOOKER if self.asked.dry_run else COMPONENT
+        known = Identification(link, str(endpoint), Source(config.system, component), self._signing)
         while not self._over():
             beat = known.look(self._wall.now())
             if beat is not None:
@@ -178,6 +186,9 @@ class Flight:
                 elif news["what"] == "phase":
                     self.state, self.waiting = self.state._replace(phase=news["text"]), ""
                 self.diary.note(news["what"], news["text"], news["at"])
+            elif kind == "ack":
+                answer = answered(news["command"], news["result"], self.state.phase, self.waiting)
+                self.diary.note("answer", answer)
             elif kind == "figures":
                 self.figures = news
             elif kind == "fault":

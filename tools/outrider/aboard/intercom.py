@@ -9,7 +9,10 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
+from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.link import LinkCounters
+from mavlink_bridge.messages import CommandAck
+from outrider.aboard.orders import OPERATOR
 
 _MOST: Final = 65536
 _STOP: Final = b"stop"
@@ -19,6 +22,7 @@ ALONE: Final = 5.0
 word."""
 _BETWEEN: Final = 0.5
 """s between two beats."""
+_ACK: Final = 77
 _BUFFER: Final = 1 << 20
 
 
@@ -76,6 +80,7 @@ class OrderLink:
     def __init__(self, end: socket.socket, clock: Callable[[], float] = time.monotonic) -> None:
         """``clock``: s."""
         self._end, self._clock = end, clock
+        self._codec = Codec(lambda identifier, _system, _component: identifier == _ACK)
         self._received = 0
         self._heard: float | None = None
         self.stop = False
@@ -109,7 +114,10 @@ class OrderLink:
         return found
 
     def send(self, data: bytes) -> None:
-        """Answers to orders are news, which ``tell`` has; nothing goes this way."""
+        """Of what is told to the ground, the answers to what was ordered here: as news of ``kind`` ack."""
+        for message in self._codec.feed(data, whole=True):
+            if isinstance(message, CommandAck) and message.target_component == OPERATOR:
+                self.tell(kind="ack", command=message.command, result=message.result)
 
     def tell(self, **news: object) -> None:
         """Say something to the parent."""

@@ -56,7 +56,7 @@ class Worker:
         self._signing = None if asked.key is None else Signing(asked.key)
         kind = DryRun if asked.dry_run else Companion
         config = asked.config
-        self._companion = kind(
+        self.companion = kind(
             config.settings,
             config.system,
             config.target,
@@ -64,6 +64,12 @@ class Worker:
             time.thread_time_ns,
             self._signing,
         )
+
+    def resume(self, newest: int) -> None:
+        """Go on after another process, whose signatures went up to that stamp: a simulation's time may run
+        ahead of the wall's."""
+        if self._signing is not None:
+            self._signing.resume(newest)
 
     def main(self) -> None:
         """The process, from fork to exit."""
@@ -90,7 +96,7 @@ class Worker:
         return 0
 
     def _fly(self, files: ExitStack) -> None:
-        asked, node = self._asked, self._companion
+        asked, node = self._asked, self.companion
         wall = WallClock()
         known = {"auto": None, "autopilot": True}
         followed = (
@@ -136,7 +142,7 @@ class Worker:
 
     def _leave(self, loop: RealTime, news: News, departures: Departures, rate: float) -> None:
         """What the summary needs."""
-        node, statistics = self._companion, loop.statistics
+        node, statistics = self.companion, loop.statistics
         for reading in node.shed():
             news.plan_times.add(reading // 1000)
         profile = node.pilot.profile
