@@ -20,8 +20,10 @@ from outrider.aboard.figures import summary
 from outrider.aboard.flight import Flight
 from outrider.aboard.request import Request
 from outrider.aboard.screen import Screen
+from outrider.aboard.terminal import Terminal
 from outrider.aboard.typed import typing
 from outrider.aboard.wiring import Wiring, wire
+from outrider.errors import InputError
 from outrider.interruption import Came, noted
 from outrider.run_directories import new_directory
 from outrider.saying import say
@@ -45,11 +47,19 @@ def run(asked: Request) -> int:
     with closing(wiring), noted(_STOPS) as stops, _never_stopped():
         directory = new_directory(asked.out, f"fly-{config.system}")
         document = config.model_dump(mode="json")
-        (directory / CONFIGURATION).write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+        try:
+            text = yaml.safe_dump(document, sort_keys=False)
+            (directory / CONFIGURATION).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--out {directory}: cannot be written: {error.strerror}") from None
         with closing(Diary(directory, lambda: time.monotonic() - began)) as diary:
             flight = _flown(asked, directory, diary, stops, wiring)
     found = summary(flight, directory)
-    (directory / SUMMARY).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    try:
+        (directory / SUMMARY).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        with suppress(OSError):
+            say(f"{directory / SUMMARY}: not written: {error.strerror}")
     with suppress(OSError):
         if asked.as_json:
             sys.stdout.write(json.dumps(found) + "\n")
@@ -67,7 +77,7 @@ def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wir
             flight = Flight(asked, wiring, directory, diary, typed, stops, lambda: None)
             flight.run()
             return flight
-        screen = Screen(console)
+        screen = Screen(terminal := Terminal(sys.stderr.fileno()))
         diary.tell = screen.tell
 
         def look() -> None:
@@ -83,6 +93,7 @@ def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wir
         finally:
             with suppress(OSError):
                 screen.live.stop()
+            terminal.close()
         return flight
 
 

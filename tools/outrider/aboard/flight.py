@@ -100,7 +100,6 @@ class Flight:
                 self.fault = self.fault or self._failed
                 return
             place = self._directory / f"restart-{len(self.restarts)}"
-            place.mkdir()
             if self._signing is not None:
                 self._signing.resume(self.state.stamp)
             self.state, self.waiting = State(), ""

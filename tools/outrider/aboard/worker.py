@@ -8,7 +8,6 @@ import sys
 import time
 import traceback
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Final
 
@@ -26,10 +25,10 @@ from outrider.aboard.cockpit import Cockpit
 from outrider.aboard.departures import Departures
 from outrider.aboard.harmless import HarmlessLink
 from outrider.aboard.intercom import OrderLink
+from outrider.aboard.log import Log
 from outrider.aboard.news import News
 from outrider.aboard.request import Request
 from outrider.aboard.twin import Twin
-from outrider.recorder import Recorder
 
 _IGNORED: Final = (
     signal.SIGINT,
@@ -79,15 +78,18 @@ class Worker:
             self._orders.tell(kind="event", at=0.0, what="priority", text=ask_for_priority().told)
         else:
             sharpen_timers()
-        with ExitStack() as files:
-            status = self._flown(files)
+        with Log(self._directory, self._asked.system, self._lament) as log:
+            status = self._flown(log)
             # The parent has the last word from here on; files take their time.
             self._orders.tell(kind="left")
         sys.exit(status)
 
-    def _flown(self, files: ExitStack) -> int:
+    def _lament(self, text: str) -> None:
+        self._orders.tell(kind="event", at=None, what="concern", text=text)
+
+    def _flown(self, log: Log) -> int:
         try:
-            self._fly(files)
+            self._fly(log)
         except Exception as error:
             if os.environ.get("OUTRIDER_TRACEBACK"):
                 traceback.print_exc()
@@ -95,7 +97,7 @@ class Worker:
             return 3
         return 0
 
-    def _fly(self, files: ExitStack) -> None:
+    def _fly(self, log: Log) -> None:
         asked, node = self._asked, self.companion
         wall = WallClock()
         known = {"auto": None, "autopilot": True}
@@ -107,7 +109,6 @@ class Worker:
         cockpit = Cockpit(node, wall, followed, self._signing, self._twin)
         departures = Departures(node.config.limits)
         news = News(cockpit, departures, followed, self._signing, self._orders.tell)
-        recorder = Recorder(self._directory, [asked.system], files)
         links: dict[str, Link | Sequence[Link]] = {
             **self._links,
             "ground": (self._links["ground"], self._orders),
@@ -132,7 +133,7 @@ class Worker:
                 Scheduled(cockpit, asked.config.period_us),
                 links,
                 wall if followed is None else followed,
-                taps=(recorder, departures),
+                taps=(log, departures),
                 on_idle=idle,
             )
             try:
