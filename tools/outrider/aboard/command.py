@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +15,7 @@ import yaml
 from rich.console import Console
 
 from mavlink_bridge.clock import WallClock
+from outrider.aboard.berth import berth
 from outrider.aboard.diary import Diary
 from outrider.aboard.figures import summary
 from outrider.aboard.flight import Flight
@@ -42,6 +43,11 @@ def run(asked: Request) -> int:
         from outrider.aboard.log_run import rehearsed
 
         return rehearsed(asked, asked.log)
+    with nullcontext() if asked.dry_run else berth(asked.system, str(asked.endpoints["autopilot"])):
+        return _live(asked)
+
+
+def _live(asked: Request) -> int:
     config, began = asked.config, time.monotonic()
     wiring = wire(asked.endpoints, config.system, config.target, config.settings, WallClock())
     with closing(wiring), noted(_STOPS) as stops, _never_stopped():

@@ -92,6 +92,7 @@ class Flight:
             try:
                 self.diary.note("process", f"the companion flies in process {crew.start()}")
                 orders.release()
+                self._wiring.lend()
                 self._left, self._pulse = False, Pulse(time.monotonic())
                 self._look_after(desk, crew)
             finally:

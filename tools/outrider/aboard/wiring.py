@@ -15,6 +15,7 @@ from mavlink_bridge.links.dealt import Dealer, DealtLink, Wants
 from mavlink_bridge.links.endpoints import Endpoint
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.links.serial_port import SerialPort
 from outrider.aboard.twin import Twin
 from outrider.errors import InputError
 
@@ -41,6 +42,12 @@ class Wiring(NamedTuple):
         """Forget what has arrived: what was said before nobody listened counts no more."""
         for dealer in self.dealers:
             dealer.forget()
+
+    def lend(self) -> None:
+        """A process that was forked has them now."""
+        for dealer in self.dealers:
+            if isinstance(dealer.link, SerialPort):
+                dealer.link.let_go()
 
     def close(self) -> None:
         """All of them."""
