@@ -20,6 +20,7 @@ def test_no_two_vehicles_get_one_id_by_default(shipped: str) -> None:
     with pytest.raises(InputError, match=r"--system: is missing.*1…250"):
         checked(Options(AUTOPILOT, shipped, SWARM))
     assert checked(Options(AUTOPILOT, shipped, SWARM, system=7)).system == 7
+    assert checked(Options("tlog:flight.tlog", shipped, dry_run=True)).system == 1
 
 
 def test_a_neighbour_is_never_anyones_target(tmp_path: Path) -> None:

@@ -146,7 +146,8 @@ class Flight:
             self._look()
             self._hear(desk)
             if self._left or crew.status is not None:
-                self._lose(f"its process ended with status {crew.status}")
+                ended = "gave up" if crew.status is None else f"ended with status {crew.status}"
+                self._lose(f"its process {ended}")
                 return
             if self._pulse.stopped(time.monotonic()):
                 crew.kill()

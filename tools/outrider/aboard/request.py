@@ -67,16 +67,18 @@ def checked(options: Options) -> Request:
         if options.system == config.target:
             raise InputError(f"--system {options.system}: is the target's; allowed: another's")
         config = config.model_copy(update={"system": options.system})
+    if options.dry_run and options.go:
+        raise InputError("--go: does not go with --dry-run, in which nothing takes off")
+    autopilot = _endpoint("autopilot", options.autopilot)
+    if isinstance(autopilot, Replay):
+        # Nobody is flown: who is in the log is said there.
+        config = config if config.system else config.model_copy(update={"system": 1})
+        return _of_log(options, config, Path(autopilot.path))
     if not config.system:
         raise InputError(
             f"--system: is missing, and {options.config} says nothing of it; needed: the id of the own "
             "autopilot (SYSID_THISMAV, MAV_SYS_ID), 1…250, which no other vehicle may have"
         )
-    if options.dry_run and options.go:
-        raise InputError("--go: does not go with --dry-run, in which nothing takes off")
-    autopilot = _endpoint("autopilot", options.autopilot)
-    if isinstance(autopilot, Replay):
-        return _of_log(options, config, Path(autopilot.path))
     if options.swarm is None:
         raise InputError(
             "--swarm: is missing; needed: the endpoint by which the other companions are heard, such as "
