@@ -1,6 +1,7 @@
 """An understudy on a live link: it asks for the messages that it needs, and orders nothing.
 
-What leaves it: heartbeats, requests for messages, answers to orders (which it does not take), and texts.
+What leaves it: heartbeats, requests for messages, and texts; not as the companion, which may be there as
+well. It answers no order.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from companion.pilot import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
 from companion.understudy import Onlooker, Understudy
 from companion.world import View
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, Message, Source, StatusText
+from mavlink_bridge.messages import CommandLong, Heartbeat, Message, Source, StatusText
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.signing import Signing
 
+ONLOOKER = 194
+"""MAV_COMP_ID_ONBOARD_COMPUTER4."""
 REQUESTS = (SET_MESSAGE_INTERVAL, REQUEST_MESSAGE)
 """Commands that change nothing of what a vehicle does."""
 
@@ -52,11 +55,15 @@ class DryRun(Understudy):
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:
         super()._encode(**links)
-        told = {link: [m for m in messages if _changes_nothing(m)] for link, messages in links.items()}
+        own = Source(self.system, ONLOOKER)
+        told: dict[str, list[Message]] = {
+            link: [m._replace(source=own) for m in messages if _changes_nothing(m)]
+            for link, messages in links.items()
+        }
         return Companion._encode(self, **told)
 
 
 def _changes_nothing(message: Message) -> bool:
     if isinstance(message, CommandLong):
         return message.command in REQUESTS
-    return isinstance(message, Heartbeat | CommandAck | StatusText)
+    return isinstance(message, Heartbeat | StatusText)

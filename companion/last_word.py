@@ -2,7 +2,8 @@
 
 An autopilot that was just told positions and velocities flies on along them for its time-out. So whoever
 sees a companion end asks for the mode in which the autopilot holds its place by itself; but only where our
-set-points steered last: whoever else has the vehicle keeps it.
+set-points steered last: whoever else has the vehicle keeps it. What came of it the autopilot's heartbeat
+says: an acknowledgement may be somebody else's, or that of a mode that did not last.
 """
 
 from __future__ import annotations
@@ -21,19 +22,30 @@ from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.signing import Signing
 
-_AGAIN = 100_000
+_AGAIN, _GRANTED = 100_000, 1_500_000
+"""µs between two askings, and after one that was accepted: until then the heartbeat has told of it."""
 _PATIENCE = 3_000_000
-"""µs between two askings, and until it is given up."""
+"""µs until it is given up."""
 _HEARTBEAT, _ACK = 0, 77
 
 
 class LastWord:
     """A ``Node`` with one link, ``autopilot``; times are of the wall. ``heartbeat``: the last that the
-    companion heard, None for none. ``over``: nothing more is to be done; ``said``: what came of it."""
+    companion heard, None for none; ``steered``: whether it had the vehicle. ``over``: nothing more is to be
+    done; ``said``: what came of it; ``failed``: the vehicle may fly on along the last set-points.
+    """
 
-    def __init__(self, system: int, heartbeat: Heartbeat | None, signing: Signing | None = None) -> None:
+    def __init__(
+        self,
+        system: int,
+        heartbeat: Heartbeat | None,
+        signing: Signing | None = None,
+        *,
+        steered: bool = True,
+    ) -> None:
         self.name = f"last-word-{system}"
         self.said = ""
+        self.failed = False
         self._own = Source(system, COMPONENT)
         self._vehicle = Vehicle()
         if heartbeat is not None:
@@ -48,6 +60,10 @@ class LastWord:
         self._until: int | None = None
         self._next = 0
         self._asked = self._fresh = False
+        if heartbeat is None:
+            self.said = "not heard"
+        elif not steered:
+            self.said = "not ours" if self._vehicle.armed else "not armed"
 
     @property
     def over(self) -> bool:
@@ -55,21 +71,20 @@ class LastWord:
         return bool(self.said)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Ask for the mode until it is granted, at most for three seconds."""
+        """Ask for the mode until the autopilot is in it, at most for three seconds."""
         if self._signing is not None:
             self._signing.present(now)
         if self._until is None:
             self._until = now + _PATIENCE
-        answer = None
         for datagram in inbox:
             for message in self._codec.feed(datagram.data, whole=True):
-                if isinstance(message, CommandAck):
-                    answer = message.result if message.command == DO_SET_MODE and self._asked else answer
-                else:
+                if not isinstance(message, CommandAck):
                     self._vehicle.hear(message)
                     self._fresh = True
+                elif message.command == DO_SET_MODE and message.result == ACCEPTED and self._asked:
+                    self._next = now + _GRANTED
         if not self.over:
-            self.said = self._verdict(now, answer)
+            self.said = self._verdict(late=now >= self._until)
         if self.over or not self._steered or now < self._next:
             return []
         self._next, self._asked = now + _AGAIN, True
@@ -77,18 +92,20 @@ class LastWord:
         order = CommandLong(self._own, self._own.system, AUTOPILOT, DO_SET_MODE, 0, params)
         return [Datagram("autopilot", self._codec.encode(order))]
 
-    def _verdict(self, now: int, answer: int | None) -> str:
-        """What came of it; empty while that is not known."""
-        if not self._vehicle.armed:
+    def _verdict(self, *, late: bool) -> str:
+        """What came of it; empty while that is not known: what the companion heard last may be a moment
+        old."""
+        vehicle, name = self._vehicle, self._profile.hold_name
+        if not self._fresh and not late:
+            return ""
+        if not vehicle.armed:
             return "not armed"
-        if not self._steered:
-            if self._asked:
-                return f"holds ({self._profile.hold_name})"
-            # What the companion heard last may be a moment old.
-            return "not ours" if self._fresh or now >= (self._until or 0) else ""
-        if answer == ACCEPTED:
-            return f"holds ({self._profile.hold_name})"
-        return f"did not take {self._profile.hold_name}" if now >= (self._until or 0) else ""
+        if self._steered:
+            self.failed = late
+            return f"did not take {name}" if late else ""
+        beat = vehicle.heartbeat
+        held = beat is not None and beat.custom_mode == _hold_mode(self._profile)
+        return f"holds ({name})" if held and self._asked else "not ours"
 
     @property
     def _profile(self) -> Profile:
@@ -98,3 +115,9 @@ class LastWord:
     def _steered(self) -> bool:
         """Whether our set-points steer it."""
         return self._vehicle.armed and self._vehicle.in_guided_mode
+
+
+def _hold_mode(profile: Profile) -> int:
+    """How HEARTBEAT tells of it: PX4's custom_mode is two bytes, main and sub mode."""
+    _, main, sub = profile.hold_params
+    return int(sub) << 24 | int(main) << 16 if profile is PX4 else int(main)

@@ -6,8 +6,10 @@ plane of arrival and stamp all messages lie on or below the line of those that t
 along the upper edge of what the last seconds brought, piece by piece (Moon, Skelly and Towsley, "Estimation
 and removal of clock skew from network delay measurements", 1999), and the clock runs along it.
 
-A simulation is told by its rate. On a busy machine it stands for a moment and never makes up for that: then
-the clock goes on as if nothing were, and follows the stamps from there.
+Only a simulation's clock is followed so, for good: on a busy machine it stands for a moment and never makes
+up for that; then the clock goes on as if nothing were, and follows the stamps from there. A real autopilot's
+clock is as good as the own one, and a delay that grows looks just like a clock that is slow: so there the
+wall's time is better, by which what is old looks old. Which of the two it is, is decided once.
 """
 
 from __future__ import annotations
@@ -30,8 +32,11 @@ _STEP: Final = 500_000
 """µs of the wall: a stamp off the line by more tells of a clock that was set, stopped or began anew."""
 _STALL: Final = 50_000
 """The same of a simulation, whose clock stands whenever its machine has something else to do."""
-_REAL: Final = 0.02
-"""A clock whose rate is off by more is a simulation's."""
+_EVIDENCE: Final = 10_000_000
+"""µs of the wall after which it is decided what it is."""
+_REAL: Final = 0.2
+"""A clock whose rate is off by more is a simulation's. That is wide: to take a simulation for real grounds
+it, to take a queue that grows for a simulation hides that all is old."""
 _SLEW: Final = 0.5
 """A clock that is ahead goes on at this share of its rate: it never stands."""
 _WITNESSES: Final = 5
@@ -52,9 +57,12 @@ class FollowedClock:
     Before the first stamp it runs as ``clock`` does. Where stamps jump, by more than half a second of the
     wall, it goes on as before and follows them from there: ``steps`` counts that. So it does where a
     simulation has lost time. ``rate``: of it against ``clock``. May be fed by one thread and read by others.
+
+    ``simulated`` says what it follows, if that is known beforehand; otherwise ten seconds of stamps do, and
+    after them it runs on as ``clock`` does unless they are a simulation's.
     """
 
-    def __init__(self, clock: Clock, begin: int = 0) -> None:
+    def __init__(self, clock: Clock, begin: int = 0, *, simulated: bool | None = None) -> None:
         self._clock = clock
         self._lock = Lock()
         self._wall, self._shown = clock.now(), float(begin)
@@ -66,8 +74,12 @@ class FollowedClock:
         self._strayed = 0
         self._surplus = 0.0
         self._known = False
+        self._verdict = simulated
+        self._evidence: list[_Seen] = []
         self.rate = 1.0
         self.steps = 0
+        self.judged: float | None = None
+        """The rate by which it was decided what it follows; None before, and where that was known."""
 
     def now(self) -> int:
         """What it shows, µs."""
@@ -84,6 +96,8 @@ class FollowedClock:
     def observe(self, wall: int, stamp: int) -> None:
         """A message with ``stamp`` (µs of the sender's clock) arrived at ``wall`` (µs of ``clock``)."""
         with self._lock:
+            if self._verdict is False:
+                return
             if self._base is None:
                 self._lay(wall, stamp)
                 return
@@ -100,15 +114,31 @@ class FollowedClock:
 
     @property
     def known(self) -> bool:
-        """Whether its rate is known: since when there were stamps for a second."""
-        return self._known
+        """Whether its rate is known, and what it follows."""
+        return self._verdict is False or (self._verdict is True and self._known)
 
     @property
     def simulated(self) -> bool:
-        """Whether its rate is none of a real clock's."""
-        return abs(self.rate - 1.0) > _REAL
+        """Whether it follows a simulation's clock; as it seems so far until that is decided."""
+        return self._off if self._verdict is None else self._verdict
 
     # Own, under the lock
+
+    @property
+    def _off(self) -> bool:
+        return abs(self.rate - 1.0) > _REAL
+
+    def _decide(self, wall: int) -> None:
+        """From here on it is the one or the other."""
+        evidence = self._evidence
+        if self._verdict is not None or evidence[-1].wall - evidence[0].wall < _EVIDENCE:
+            return
+        self.judged = _slope_above(evidence)
+        self._verdict = self._off and abs(self.judged - 1.0) > _REAL
+        evidence.clear()
+        if not self._verdict:
+            shown = float(self._read(wall))
+            self._wall, self._shown, self._surplus, self.rate = wall, shown, 0.0, 1.0
 
     def _line(self, wall: int) -> float:
         return self._shown + self.rate * (wall - self._wall)
@@ -130,6 +160,7 @@ class FollowedClock:
         self._strayed = 0
         self._known = False
         self._pieces.clear()
+        self._evidence.clear()
         self._best, self._begun = _Seen(wall, stamp), wall
 
     def _gather(self, seen: _Seen) -> None:
@@ -143,6 +174,8 @@ class FollowedClock:
             self._pieces.append(best)
             self._best = None
             self._fit(seen.wall)
+            self._evidence.append(best)
+            self._decide(seen.wall)
 
     def _fit(self, wall: int) -> None:
         """The line anew, from ``wall`` on."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import Final, Protocol
 
 from mavlink_bridge.framing import Framer
 from mavlink_bridge.header import Header
@@ -16,15 +16,27 @@ ROOM: Final = 1 << 20
 """Bytes that wait at an end at most."""
 
 
+class Ear(Protocol):
+    """Who listens to all that passes a ``Dealer``."""
+
+    def said(self, data: bytes) -> None:
+        """Frames that leave, by whichever end."""
+        ...
+
+    def heard(self, header: Header, frame: bytes) -> None:
+        """A frame that arrives, whoever gets it."""
+        ...
+
+
 class Dealer:
     """``ends``: a link for each name of ``deal``, which says which headers it gets; a frame goes to every end
-    that wants it, and to none if nobody does. Checksums are looked at, signatures are not.
+    that wants it, and to none if nobody does. Checksums are looked at, signatures are not. ``ear`` hears all.
 
     Its ends are read by one thread at a time. The physical link is closed with the last of them.
     """
 
-    def __init__(self, link: Link, deal: Mapping[str, Wants]) -> None:
-        self.link = link
+    def __init__(self, link: Link, deal: Mapping[str, Wants], ear: Ear | None = None) -> None:
+        self.link, self._ear = link, ear
         self.ends = {name: DealtLink(self, first=number == 0) for number, name in enumerate(deal)}
         self._deal = [(self.ends[name], wants) for name, wants in deal.items()]
         self._framer = Framer()
@@ -37,10 +49,19 @@ class Dealer:
                 (Header(frame.system, frame.component, frame.message_id), frame.data)
                 for frame in self._framer.feed(datagram, whole=True)
             ]
+            if self._ear is not None:
+                for header, data in frames:
+                    self._ear.heard(header, data)
             for end, wants in self._deal:
                 own = [data for header, data in frames if wants(header)]
                 if own:
                     end.put(b"".join(own))
+
+    def send(self, data: bytes) -> None:
+        """By the physical link."""
+        if self._ear is not None:
+            self._ear.said(data)
+        self.link.send(data)
 
     def forget(self) -> None:
         """What has arrived at all ends until now."""
@@ -102,7 +123,7 @@ class DealtLink:
         """By the physical link."""
         if self._open:
             self._sent += 1
-            self._dealer.link.send(data)
+            self._dealer.send(data)
 
     def close(self) -> None:
         """This end."""

@@ -49,6 +49,13 @@ class SerialPort(StreamLink):
             return
         super().send(data)
 
+    def let_go(self) -> None:
+        """Leave the port to a process that was forked with it; whoever receives or sends here again opens it
+        again. As long as somebody has a port open that was pulled out, it comes back under another name."""
+        with self._lock:
+            self._forget()
+            self._next_attempt = self._clock.now()
+
     def _reopen(self, now: int) -> None:
         try:
             self._adopt(self._raw())

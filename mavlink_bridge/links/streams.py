@@ -96,6 +96,18 @@ class StreamLink:
 
     # For the kinds of links
 
+    def _forget(self) -> None:
+        """Close this process's copies of all streams, and of what waits for them: the selector of the other
+        process, which is the same to the system, stays as it is."""
+        if not self._open:
+            return
+        for stream in self._streams:
+            stream.close()
+        self._streams.clear()
+        self._selector.close()
+        self._selector = selectors.DefaultSelector()
+        self._fileno = _number(self._selector)
+
     def _adopt(self, fileno: int) -> None:
         """One more stream."""
         stream = Stream(fileno, self._backlog)

@@ -58,7 +58,7 @@ class Sender:
 def test_it_shows_what_the_sender_shows_at_any_rate(rate, seed, jitter):
     wall = SimulatedClock(123 * SECOND)
     sender = Sender(rate, jitter=jitter, seed=seed)
-    clock = FollowedClock(wall, begin=1000)
+    clock = FollowedClock(wall, begin=1000, simulated=True)
     sender.follow(wall, clock, 8.0)
     begin = sender.time(wall.now()) - clock.now()
     off = []
@@ -72,7 +72,7 @@ def test_it_shows_what_the_sender_shows_at_any_rate(rate, seed, jitter):
 @pytest.mark.parametrize("rate", [1.0, 10.0])
 def test_it_never_goes_back_and_goes_on_when_the_sender_began_anew(rate):
     wall = SimulatedClock(SECOND)
-    clock = FollowedClock(wall)
+    clock = FollowedClock(wall, simulated=True)
     shown = []
     sender = Sender(rate)
     sender.follow(wall, clock, 5.0, lambda _t: shown.append(clock.now()))
@@ -88,7 +88,7 @@ def test_it_never_goes_back_and_goes_on_when_the_sender_began_anew(rate):
 
 def test_one_stamp_that_is_damaged_changes_nothing():
     wall = SimulatedClock(SECOND)
-    clock = FollowedClock(wall)
+    clock = FollowedClock(wall, simulated=True)
     sender = Sender(1.0)
     sender.follow(wall, clock, 4.0)
     before = clock.now()
@@ -109,9 +109,47 @@ def test_without_a_sender_it_runs_as_the_wall_does():
 @pytest.mark.parametrize("rate", [1.0, 10.0])
 def test_it_waits_as_long_as_the_sender_takes(rate):
     wall = SimulatedClock(SECOND)
-    clock = FollowedClock(wall)
+    clock = FollowedClock(wall, simulated=True)
     Sender(rate).follow(wall, clock, 6.0)
     began, shown = wall.now(), clock.now()
     clock.wait_until(shown + SECOND)
     assert wall.now() - began == pytest.approx(SECOND / rate, rel=0.02)
     assert clock.now() >= shown + SECOND
+
+
+@given(
+    rate=st.sampled_from((0.5, 2.0, 5.0, 10.0, 0.99, 1.0, 1.0002, 1.011)),
+    seed=st.integers(0, 50),
+    jitter=st.integers(0, 30_000),
+)
+@settings(max_examples=30, deadline=None)
+def test_a_simulation_is_told_by_its_rate_and_a_real_clock_is_the_walls_from_then_on(rate, seed, jitter):
+    wall = SimulatedClock(SECOND)
+    clock = FollowedClock(wall)
+    sender = Sender(rate, jitter=jitter, seed=seed)
+    shown = []
+    sender.follow(wall, clock, 9.9, lambda _t: shown.append((clock.now(), clock.known)))
+    assert not any(known for _, known in shown)
+    sender.follow(wall, clock, 5.0, lambda _t: shown.append((clock.now(), clock.known)))
+    assert clock.known
+    assert all(b >= a for (a, _), (b, _) in pairwise(shown))
+    assert clock.simulated == (abs(rate - 1.0) > 0.2)
+    if not clock.simulated:
+        assert clock.rate == 1.0
+        offset = clock.now() - wall.now()
+        # Whatever its stamps do then.
+        sender.rate, sender.boot = 0.9, sender.boot + 3 * SECOND
+        sender.follow(wall, clock, 20.0, lambda t: shown.append((clock.now() - t, True)))
+        assert {offset} == {shown for shown, _ in shown[-100:]}
+
+
+def test_a_backlog_that_comes_at_once_is_no_simulation():
+    """What waited somewhere before anybody listened."""
+    wall = SimulatedClock(20 * SECOND)
+    clock = FollowedClock(wall)
+    for k in range(50):
+        clock.observe(wall.now(), 15 * SECOND + k * 100_000)
+        wall.wait_until(wall.now() + 10_000)
+    Sender(1.0, boot=0).follow(wall, clock, 15.0)
+    assert clock.known
+    assert not clock.simulated

@@ -21,6 +21,7 @@ from link_pairs import (
     free_port,
     gather,
     meet,
+    serial,
     tcp,
     wait,
 )
@@ -433,6 +434,36 @@ def test_a_serial_port_that_was_pulled_out_comes_back(tmp_path: Path) -> None:
     os.close(plugs.pop())
     port.close()
     vehicle.close()
+
+
+def test_who_lets_a_serial_port_go_has_no_file_of_it_and_the_fork_goes_on() -> None:
+    """A port that was pulled out keeps its name until the last one has closed it."""
+    here, there = serial()
+    assert isinstance(here, SerialPort)
+    name = os.ttyname(here._streams[0].fileno())
+    (read, write), number = os.pipe(), frame(1)
+    child = os.fork()
+    if not child:
+        # After the parent has let go.
+        os.read(read, 1)
+        here.send(number)
+        os._exit(0 if here.counters.sent else 1)
+    here.let_go()
+    files = {
+        os.readlink(f"/proc/self/fd/{file}")
+        for file in os.listdir("/proc/self/fd")
+        if file.isdigit() and os.path.exists(f"/proc/self/fd/{file}")
+    }
+    assert name not in files
+    os.write(write, b"1")
+    assert gather(there, bool) == [number]
+    assert os.waitpid(child, 0)[1] == 0
+    here.send(frame(2))
+    assert gather(there, bool) == [frame(2)]
+    for end in (read, write):
+        os.close(end)
+    here.close()
+    there.close()
 
 
 def test_a_line_that_is_behind_takes_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:

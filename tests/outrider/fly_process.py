@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import yaml
 from test_sitl_command import free_base, sitl
 
 from mavlink_bridge.clock import WallClock
@@ -26,6 +27,7 @@ from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.messages import Heartbeat
 from outrider.beacon import Beacon
 from outrider.paths import Motion
+from outrider.resources import find
 
 HOST: Final = "127.0.0.1"
 PATIENCE: Final = 60.0
@@ -62,7 +64,12 @@ class Flying:
         self.directory = directory / "run"
         command = [sys.executable, "-m", "outrider", "fly", "--json", f"--out={self.directory}", *options]
         self.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
         )
         self.pump: list[Callable[[], None]] = []
 
@@ -139,7 +146,9 @@ class Ear:
 
 
 @contextmanager
-def flight(tmp_path: Path, flavour: str, speed: float, *options: str) -> Iterator[tuple[Flying, Ear]]:
+def flight(
+    tmp_path: Path, flavour: str, speed: float, *options: str, clock: str = "autopilot"
+) -> Iterator[tuple[Flying, Ear]]:
     """One vehicle of the SITL, its companion, a target, and an ear."""
     with ExitStack() as files:
         base = free_base(flavour, 1)
@@ -150,9 +159,10 @@ def flight(tmp_path: Path, flavour: str, speed: float, *options: str) -> Iterato
         heard, said = open_link(other, WallClock()), open_link(group, WallClock())
         files.callback(heard.close)
         files.callback(said.close)
-        flying = Flying(
-            tmp_path, f"--autopilot={autopilot}", f"--swarm={group}", f"--config={flavour}", *options
-        )
+        document = yaml.safe_load(find("companions", flavour).read_text(encoding="utf-8"))
+        (tmp_path / "own.yaml").write_text(yaml.safe_dump(document | {"system": 1, "clock": clock}))
+        config = f"--config={tmp_path / 'own.yaml'}"
+        flying = Flying(tmp_path, f"--autopilot={autopilot}", f"--swarm={group}", config, *options)
         ear = Ear(heard)
         flying.pump += [Target(said, speed).pump, ear.mode]
         try:

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_up_around_the_target_and_back(tmp_path: Path) -> None:
-    with flight(tmp_path, "ardupilot", 5.0) as (flying, ear):
+    with flight(tmp_path, "ardupilot", 5.0, clock="auto") as (flying, ear):
         flying.order("go")
         flying.sees("waiting", "the operator's go")
         assert ear.mode() == 0
@@ -73,6 +73,22 @@ def test_sigterm_lets_it_hold(tmp_path: Path, flavour: str) -> None:
         assert (status, said["ended"], said["fault"]) == (0, "stopped by SIGTERM", False)
         assert said["last_word"].startswith("holds")
         while ear.mode() != HELD[flavour]:
+            assert len(ear.beats) < 100
+
+
+def test_a_group_that_is_signalled_and_not_read_leaves_a_vehicle_that_holds(tmp_path: Path) -> None:
+    """As by Ctrl-\\, by ``timeout``, or by a terminal that is closed: all are signalled, some twice."""
+    with flight(tmp_path, "ardupilot", 5.0, "--go") as (flying, ear):
+        flying.sees("phase", "escort")
+        assert flying.process.stderr is not None
+        flying.process.stderr.close()
+        for which in (signal.SIGQUIT, signal.SIGTERM, signal.SIGTERM, signal.SIGTTOU):
+            os.killpg(flying.process.pid, which)
+        status, said = flying.end()
+        assert (status, said["ended"], said["fault"]) == (0, "stopped by SIGQUIT", False)
+        assert said["restarts"] == []
+        assert said["last_word"] == "holds (BRAKE)"
+        while ear.mode() != HELD["ardupilot"]:
             assert len(ear.beats) < 100
 
 

@@ -12,7 +12,7 @@ from shipped import FIREFLY, scenario
 from mavlink_bridge.tlog import read_tlog
 from outrider.conductor import Stage
 from outrider.errors import OutriderError
-from outrider.interruption import interruptible
+from outrider.interruption import Came, insisted, interruptible, noted
 from outrider.swarm import Prepared, fly
 
 
@@ -52,3 +52,15 @@ def test_what_is_not_stopped_is_left_alone() -> None:
     assert signal.getsignal(signal.SIGTERM) is before
     with pytest.raises(ZeroDivisionError), interruptible("nothing"):
         raise ZeroDivisionError
+
+
+def test_what_comes_twice_in_a_moment_came_once() -> None:
+    """``timeout`` signals its command, and then its command's group."""
+    with noted([signal.SIGTERM]) as came:
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGTERM)
+    assert [one.which for one in came] == [signal.SIGTERM] * 2
+    first = Came(signal.SIGTERM, 100.0)
+    assert not insisted([])
+    assert not insisted([first, Came(signal.SIGTERM, 100.005), Came(signal.SIGHUP, 100.9)])
+    assert insisted([first, Came(signal.SIGTERM, 100.005), Came(signal.SIGTERM, 101.2)])

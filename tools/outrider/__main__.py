@@ -221,7 +221,7 @@ def fly(
     ground: Annotated[Optional[str], typer.Option(help="Endpoint of orders; the autopilot's.")] = None,  # noqa: UP045
     system: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(min=1, max=250, help="In place of the file's system id."),
+        typer.Option(min=1, max=250, help="In place of the file's system id; each vehicle has another."),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Plan and say what would be sent; steer and arm nothing.")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
+from typing import NamedTuple
 
 from outrider.errors import OutriderError
 
@@ -31,13 +33,20 @@ def interruptible(left: str) -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
+class Came(NamedTuple):
+    """A signal, and when (s of the monotonic clock)."""
+
+    which: int
+    at: float
+
+
 @contextmanager
-def noted(signals: Sequence[signal.Signals]) -> Iterator[list[int]]:
+def noted(signals: Sequence[signal.Signals]) -> Iterator[list[Came]]:
     """Those of ``signals`` that have come, and would otherwise have ended the process."""
-    came: list[int] = []
+    came: list[Came] = []
 
     def note(which: int, _frame: FrameType | None) -> None:
-        came.append(which)
+        came.append(Came(which, time.monotonic()))
 
     before = {which: signal.signal(which, note) for which in signals}
     try:
@@ -45,3 +54,12 @@ def noted(signals: Sequence[signal.Signals]) -> Iterator[list[int]]:
     finally:
         for which, handler in before.items():
             signal.signal(which, handler)
+
+
+def insisted(came: Sequence[Came]) -> bool:
+    """Whether somebody asked again. Who signals a group of processes is heard twice in a moment: that is
+    one."""
+    return bool(came) and any(one.at - came[0].at >= _AGAIN for one in came)
+
+
+_AGAIN = 1.0

@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Final
 
@@ -15,20 +15,25 @@ import yaml
 from rich.console import Console
 
 from mavlink_bridge.clock import WallClock
+from outrider.aboard.berth import berth
 from outrider.aboard.diary import Diary
 from outrider.aboard.figures import summary
 from outrider.aboard.flight import Flight
 from outrider.aboard.request import Request
 from outrider.aboard.screen import Screen
+from outrider.aboard.terminal import Terminal
 from outrider.aboard.typed import typing
 from outrider.aboard.wiring import Wiring, wire
-from outrider.interruption import noted
+from outrider.errors import InputError
+from outrider.interruption import Came, noted
 from outrider.run_directories import new_directory
 from outrider.saying import say
 
 FAULT: Final = 3
 CONFIGURATION, SUMMARY = "configuration.yaml", "summary.json"
-_STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
+"""Ctrl-Z, and what a terminal says to those in its background."""
 
 
 def run(asked: Request) -> int:
@@ -38,16 +43,29 @@ def run(asked: Request) -> int:
         from outrider.aboard.log_run import rehearsed
 
         return rehearsed(asked, asked.log)
+    with nullcontext() if asked.dry_run else berth(asked.system, str(asked.endpoints["autopilot"])):
+        return _live(asked)
+
+
+def _live(asked: Request) -> int:
     config, began = asked.config, time.monotonic()
-    wiring = wire(asked.endpoints, config.system, config.target, WallClock())
+    wiring = wire(asked.endpoints, config.system, config.target, config.settings, WallClock())
     with closing(wiring), noted(_STOPS) as stops, _never_stopped():
         directory = new_directory(asked.out, f"fly-{config.system}")
         document = config.model_dump(mode="json")
-        (directory / CONFIGURATION).write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+        try:
+            text = yaml.safe_dump(document, sort_keys=False)
+            (directory / CONFIGURATION).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--out {directory}: cannot be written: {error.strerror}") from None
         with closing(Diary(directory, lambda: time.monotonic() - began)) as diary:
             flight = _flown(asked, directory, diary, stops, wiring)
     found = summary(flight, directory)
-    (directory / SUMMARY).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    try:
+        (directory / SUMMARY).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        with suppress(OSError):
+            say(f"{directory / SUMMARY}: not written: {error.strerror}")
     with suppress(OSError):
         if asked.as_json:
             sys.stdout.write(json.dumps(found) + "\n")
@@ -56,7 +74,7 @@ def run(asked: Request) -> int:
     return FAULT if flight.fault else 0
 
 
-def _flown(asked: Request, directory: Path, diary: Diary, stops: list[int], wiring: Wiring) -> Flight:
+def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wiring: Wiring) -> Flight:
     """On a terminal with a picture; elsewhere with a line for each event."""
     console = Console(stderr=True)
     with typing(console.is_terminal) as typed:
@@ -65,7 +83,7 @@ def _flown(asked: Request, directory: Path, diary: Diary, stops: list[int], wiri
             flight = Flight(asked, wiring, directory, diary, typed, stops, lambda: None)
             flight.run()
             return flight
-        screen = Screen(console)
+        screen = Screen(terminal := Terminal(sys.stderr.fileno()))
         diary.tell = screen.tell
 
         def look() -> None:
@@ -75,16 +93,22 @@ def _flown(asked: Request, directory: Path, diary: Diary, stops: list[int], wiri
                 screen.look()
 
         flight = screen.flight = Flight(asked, wiring, directory, diary, typed, stops, look)
-        with screen.live:
+        screen.live.start()
+        try:
             flight.run()
+        finally:
+            with suppress(OSError):
+                screen.live.stop()
+            terminal.close()
         return flight
 
 
 @contextmanager
 def _never_stopped() -> Iterator[None]:
-    """Ctrl-Z would leave a vehicle to its last set-point."""
-    before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+    """It would leave a vehicle to its last set-point."""
+    before = {which: signal.signal(which, signal.SIG_IGN) for which in _SUSPENDING}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTSTP, before)
+        for which, handler in before.items():
+            signal.signal(which, handler)

@@ -16,12 +16,14 @@ _SENTENCES: Final = {
     "autopilot": "autopilot says {!r}",
     "over": "no more: {}",
     "order": "order: {}",
+    "critical": "CRITICAL: {}",
 }
 
 
 class Diary:
     """Writes ``events.jsonl`` in ``directory``; ``tell`` gets the lines for people. ``phases``: each with
-    when it began, s; ``concerns``: how often each began. A disk that is full holds up nobody."""
+    when it began, s; ``concerns``: how often each began. A full disk, and people who do not listen any more,
+    hold up nobody."""
 
     def __init__(self, directory: Path, clock: Callable[[], float]) -> None:
         """``clock``: s since the beginning."""
@@ -36,13 +38,14 @@ class Diary:
         now = round(self._clock(), 2)
         if what == "phase":
             self.phases.append((text, now))
-        elif what == "concern":
+        elif what in ("concern", "critical"):
             self.concerns[text] += 1
         event = {"wall_s": now, "clock_s": at, "what": what, "text": text}
         with suppress(OSError, ValueError):
             self._file.write(json.dumps(event, ensure_ascii=False) + "\n")
             self._file.flush()
-        self.tell(f"{now:8.1f} s  {_SENTENCES.get(what, '{}').format(text)}")
+        with suppress(OSError, ValueError):
+            self.tell(f"{now:8.1f} s  {_SENTENCES.get(what, '{}').format(text)}")
 
     def close(self) -> None:
         """Finish the file."""

@@ -13,28 +13,30 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any, Final
 
+from companion.dry_run import ONLOOKER
 from companion.last_word import LastWord
+from companion.node import COMPONENT
 from companion.pilot import OPERATORS_GO, Phase
 from companion.reception import AUTOPILOT
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.messages import Heartbeat, Source
-from mavlink_bridge.node import Datagram
 from mavlink_bridge.signing import Signing
 from outrider.aboard.crew import Crew
 from outrider.aboard.diary import Diary
+from outrider.aboard.farewell import farewell
 from outrider.aboard.identify import Identification
 from outrider.aboard.intercom import Desk, OrderLink, intercom
 from outrider.aboard.news import State
-from outrider.aboard.orders import QUIT, Orders, understood
+from outrider.aboard.orders import QUIT, Orders, answered, understood
+from outrider.aboard.pulse import Pulse
 from outrider.aboard.request import Request
 from outrider.aboard.typed import Typed
 from outrider.aboard.wiring import Wiring
 from outrider.aboard.worker import Worker
+from outrider.interruption import Came, insisted
 
 LOOK: Final = 0.05
 """s between two looks."""
-HUNG: Final = 2.0
-"""s without news after which the process that flies is taken for hung."""
 MOST: Final = 5
 WITHIN: Final = 60.0
 """So many processes lost in so many seconds are the end."""
@@ -45,7 +47,7 @@ _QUICK: Final = 0.01
 
 class Flight:
     """``look`` is called some times a second with the latest ``state``. ``stops``: the signals that have
-    come; the first ends the flight, the second at once."""
+    come; the first ends the flight, one that is a second later ends it at once."""
 
     def __init__(
         self,
@@ -54,7 +56,7 @@ class Flight:
         directory: Path,
         diary: Diary,
         typed: Typed,
-        stops: Sequence[int],
+        stops: Sequence[Came],
         look: Callable[[], None],
     ) -> None:
         self.asked, self.diary = asked, diary
@@ -72,8 +74,8 @@ class Flight:
         self._signing = None if asked.key is None else Signing(asked.key)
         self._orders = Orders(asked.system, asked.config.takeoff_height, self._signing)
         self._began = time.monotonic()
-        self._heard = 0.0
-        self._left = self._go_given = False
+        self._pulse = Pulse(self._began)
+        self._left = self._go_given = self._failed = False
         self._trouble = ""
 
     def run(self) -> None:
@@ -90,21 +92,28 @@ class Flight:
             try:
                 self.diary.note("process", f"the companion flies in process {crew.start()}")
                 orders.release()
-                self._left, self._heard = False, time.monotonic()
+                self._wiring.lend()
+                self._left, self._pulse = False, Pulse(time.monotonic())
                 self._look_after(desk, crew)
             finally:
                 self._finish(desk, crew)
             if self._over():
+                self.fault = self.fault or self._failed
                 return
             place = self._directory / f"restart-{len(self.restarts)}"
-            place.mkdir()
-            self.state = State()
+            if self._signing is not None:
+                self._signing.resume(self.state.stamp)
+            self.state, self.waiting = State(), ""
             crew, desk, orders = self._crew(place)
 
     def _crew(self, place: Path) -> tuple[Crew, Desk, OrderLink]:
         """A process that is ready to be forked, and both ends of what joins it; ``place`` gets its log."""
         desk, orders = intercom()
-        return Crew(Worker(self.asked, self._wiring.ends, orders, place)), desk, orders
+        wiring = self._wiring
+        worker = Worker(self.asked, wiring.ends, wiring.twin, orders, place)
+        if self._signing is not None:
+            worker.resume(self._signing.newest)
+        return Crew(worker), desk, orders
 
     @property
     def seconds(self) -> float:
@@ -114,7 +123,8 @@ class Flight:
     def _identify(self) -> bool:
         endpoint, config = self.asked.endpoints["autopilot"], self.asked.config
         link = self._wiring.physical("autopilot")
-        known = Identification(link, str(endpoint), config.system, self._signing)
+        component = ONLOOKER if self.asked.dry_run else COMPONENT
+        known = Identification(link, str(endpoint), Source(config.system, component), self._signing)
         while not self._over():
             beat = known.look(self._wall.now())
             if beat is not None:
@@ -131,15 +141,17 @@ class Flight:
     def _look_after(self, desk: Desk, crew: Crew) -> None:
         while not self._over():
             wait([desk.fileno(), crew.sentinel], LOOK)
-            self._hear(desk)
+            desk.beat(time.monotonic())
             self._obey(desk)
             self._look()
+            self._hear(desk)
             if self._left or crew.status is not None:
-                self._lose(f"its process ended with status {crew.status}")
+                ended = "gave up" if crew.status is None else f"ended with status {crew.status}"
+                self._lose(f"its process {ended}")
                 return
-            if time.monotonic() - self._heard > HUNG:
+            if self._pulse.stopped(time.monotonic()):
                 crew.kill()
-                self._lose(f"its process has not been heard for {HUNG:g} s")
+                self._lose("its process is not heard any more")
                 return
             if self.state.phase == Phase.DONE.value:
                 self.ended = self.ended or "landed"
@@ -147,7 +159,7 @@ class Flight:
     def _over(self) -> bool:
         """Whether it is time to end; ``ended`` says why."""
         if not self.ended and self._stops:
-            self.ended = f"stopped by {signal.Signals(self._stops[0]).name}"
+            self.ended = f"stopped by {signal.Signals(self._stops[0].which).name}"
         if not self.ended and self.asked.seconds is not None and self.seconds >= self.asked.seconds:
             self.ended = "the time is over"
         return bool(self.ended)
@@ -164,7 +176,7 @@ class Flight:
 
     def _hear(self, desk: Desk) -> None:
         for news in desk.news():
-            self._heard = time.monotonic()
+            self._pulse.heard(time.monotonic())
             kind = news.pop("kind")
             if kind == "state":
                 self.state = State(**news)
@@ -175,6 +187,9 @@ class Flight:
                 elif news["what"] == "phase":
                     self.state, self.waiting = self.state._replace(phase=news["text"]), ""
                 self.diary.note(news["what"], news["text"], news["at"])
+            elif kind == "ack":
+                answer = answered(news["command"], news["result"], self.state.phase, self.waiting)
+                self.diary.note("answer", answer)
             elif kind == "figures":
                 self.figures = news
             elif kind == "fault":
@@ -218,39 +233,43 @@ class Flight:
         desk.order(self._orders.frame(word))
 
     def _finish(self, desk: Desk, crew: Crew) -> None:
-        desk.stop()
-        until = time.monotonic() + _LEAVING
-        while not (self._left or crew.status is not None or self._at_once()):
-            if time.monotonic() > until:
-                self.diary.note("process", "the companion's process does not end: killed")
-                crew.kill()
-                until += _LEAVING
-            wait([desk.fileno(), crew.sentinel], _QUICK)
-            self._hear(desk)
-        if not self._at_once():
-            self._say_last_word()
-        else:
-            crew.kill()
-        crew.join()
+        """The process that flies shall end, and then, whatever comes between, the vehicle is told to hold."""
+        try:
+            self._dismiss(desk, crew)
+        finally:
+            try:
+                self._say_last_word()
+            finally:
+                crew.join()
         self._hear(desk)
         desk.close()
 
+    def _dismiss(self, desk: Desk, crew: Crew) -> None:
+        desk.stop()
+        until = time.monotonic() + _LEAVING
+        while not (self._left or crew.status is not None):
+            if self._at_once() or time.monotonic() > until:
+                crew.kill()
+                crew.join()
+                self.diary.note("process", "the companion's process does not end: killed")
+                return
+            wait([desk.fileno(), crew.sentinel], _QUICK)
+            self._hear(desk)
+
     def _at_once(self) -> bool:
-        return len(self._stops) > 1
+        return insisted(self._stops)
 
     def _say_last_word(self) -> None:
-        """Where our set-points steered last, ask for a hover."""
-        if self.asked.dry_run or self.state.beat is None:
+        """Where the companion had the vehicle, ask for a hover."""
+        state = self.state
+        if self.asked.dry_run or state.beat is None:
             return
-        beat = Heartbeat(Source(self.asked.system, AUTOPILOT), *self.state.beat)
+        beat = Heartbeat(Source(self.asked.system, AUTOPILOT), *state.beat)
         if self._signing is not None:
-            self._signing.resume(self.state.stamp)
-        node = LastWord(self.asked.system, beat, self._signing)
-        end = self._wiring.ends["autopilot"]
-        while not node.over and not self._at_once():
-            inbox = [Datagram("autopilot", data) for data in end.receive()]
-            for datagram in node.step(self._wall.now(), inbox):
-                end.send(datagram.data)
-            time.sleep(_QUICK)
-        self.last_word = node.said
-        self.diary.note("last word", f"the vehicle: {node.said or 'not asked'}")
+            self._signing.resume(state.stamp)
+        word = LastWord(self.asked.system, beat, self._signing, steered=state.ours)
+        farewell(word, self._wiring.ends["autopilot"], self._wall, self._at_once)
+        self.last_word, self._failed = word.said, word.failed
+        self.diary.note("last word", f"the vehicle: {word.said or 'asked to hold, no answer yet'}")
+        if word.failed:
+            self.diary.note("critical", "the vehicle is armed and nobody has it: take it over")

@@ -11,8 +11,8 @@ from companion.config import CompanionConfig
 from companion.settings import Settings
 from mavlink_bridge.frames import FleetFrame
 
-System = Annotated[int, Field(ge=1, le=250)]
-"""System ids above are ground stations'."""
+System = Annotated[int, Field(ge=0, le=250)]
+"""0: not said yet. System ids above are ground stations'."""
 
 
 class FleetOrigin(Settings):
@@ -44,15 +44,19 @@ still has the one before, of 1.6 s."""
 class FlyConfig(Settings):
     """One companion. Its ``system`` id is its vehicle's."""
 
-    system: System = Field(description="system id of the own autopilot; also given by --system")
+    system: System = Field(
+        0, description="system id of the own autopilot, no other vehicle's; 0: given by --system"
+    )
     target: int = Field(ge=1, le=255, description="system id of the target")
     origin: FleetOrigin
     takeoff_height: float = Field(5.0, ge=0.5, le=120.0, description="m above the ground, at the go")
     radio: Literal[57600] | None = Field(
         None, description="baud of a radio that eight vehicles share as the swarm link; null: a network"
     )
-    clock: Literal["autopilot", "wall"] = Field(
-        "autopilot", description="whose time it lives by: a simulation's may run ten times as fast"
+    clock: Literal["auto", "autopilot", "wall"] = Field(
+        "auto",
+        description="whose time it lives by: autopilot for a simulation, which may run ten times as fast; "
+        "wall for a real one; auto: found out in ten seconds before the go, a simulation by its rate",
     )
     period_us: int = Field(
         10_000, ge=1_000, le=100_000, multiple_of=4, description="of its steps, µs of that clock"

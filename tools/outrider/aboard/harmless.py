@@ -11,8 +11,8 @@ from mavlink_bridge.links.link import Link, LinkCounters
 
 _COMMAND_LONG: Final = 76
 _COMMAND: Final = Struct("<28xH")
-_TELL: Final = frozenset((0, 77, 251, 253))
-"""HEARTBEAT, COMMAND_ACK, NAMED_VALUE_FLOAT, STATUSTEXT."""
+_TELL: Final = frozenset((0, 251, 253))
+"""HEARTBEAT, NAMED_VALUE_FLOAT, STATUSTEXT."""
 
 
 class HarmlessLink:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from companion.autopilots import Profile
 from companion.autopilots.known import KNOWN, profile_of
-from companion.node import COMPONENT
 from companion.reception import AUTOPILOT
 from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from mavlink_bridge.codec import Codec
@@ -14,16 +13,17 @@ from mavlink_bridge.signing import Signing
 from outrider.errors import InputError
 
 _BEAT = 1_000_000
-_PATIENCE = 5_000_000
-"""µs for which others may be heard before the own vehicle is; heartbeats come once a second."""
+_PATIENCE = 60_000_000
+"""µs for which others may be heard before the own vehicle is: its autopilot may boot last."""
 _HEARTBEAT = 0
 
 
 class Identification:
-    """Asked again and again until it answers. ``link``: the physical one, on which all are heard."""
+    """Asked again and again until it answers. ``link``: the physical one, on which all are heard; ``own``:
+    who asks, with the system id of the own vehicle."""
 
-    def __init__(self, link: Link, endpoint: str, system: int, signing: Signing | None) -> None:
-        self._link, self._endpoint, self._system = link, endpoint, system
+    def __init__(self, link: Link, endpoint: str, own: Source, signing: Signing | None) -> None:
+        self._link, self._endpoint, self._own, self._system = link, endpoint, own, own.system
         self._signing = signing
         self._codec = Codec(
             lambda identifier, _system, component: identifier == _HEARTBEAT and component == AUTOPILOT,
@@ -41,8 +41,7 @@ class Identification:
         if now >= self._next:
             # Routers and autopilots that wait to be spoken to learn by it that somebody is here.
             self._next = now + _BEAT
-            own = Source(self._system, COMPONENT)
-            beat = Heartbeat(own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+            beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
             self._link.send(self._codec.encode(beat))
         for data in self._link.receive():
             for message in self._codec.feed(data, whole=True):

@@ -5,13 +5,24 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
+from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.link import LinkCounters
+from mavlink_bridge.messages import CommandAck
+from outrider.aboard.orders import OPERATOR
 
 _MOST: Final = 65536
 _STOP: Final = b"stop"
+_BEAT: Final = b"beat"
+ALONE: Final = 5.0
+"""s without a beat after which the child is on its own: nobody would hand on an order, nor have the last
+word."""
+_BETWEEN: Final = 0.5
+"""s between two beats."""
+_ACK: Final = 77
 _BUFFER: Final = 1 << 20
 
 
@@ -29,6 +40,13 @@ class Desk:
 
     def __init__(self, end: socket.socket) -> None:
         self._end = end
+        self._beaten = 0.0
+
+    def beat(self, now: float) -> None:
+        """The parent looks after things at ``now`` (s); the child is told twice a second."""
+        if now - self._beaten >= _BETWEEN:
+            self._beaten = now
+            self._put(_BEAT)
 
     def fileno(self) -> int:
         """Readable: there is news."""
@@ -59,10 +77,20 @@ class OrderLink:
     """The child's end: to the loop a ``Link`` like the others, by which orders arrive. ``stop``: whether it
     has been told to end."""
 
-    def __init__(self, end: socket.socket) -> None:
-        self._end = end
+    def __init__(self, end: socket.socket, clock: Callable[[], float] = time.monotonic) -> None:
+        """``clock``: s."""
+        self._end, self._clock = end, clock
+        self._codec = Codec(lambda identifier, _system, _component: identifier == _ACK)
         self._received = 0
+        self._heard: float | None = None
         self.stop = False
+
+    @property
+    def alone(self) -> bool:
+        """Whether the parent has been silent for too long, since it was first asked."""
+        if self._heard is None:
+            self._heard = self._clock()
+        return self._clock() - self._heard > ALONE
 
     @property
     def counters(self) -> LinkCounters:
@@ -77,15 +105,19 @@ class OrderLink:
         """Orders."""
         found = []
         while (data := _taken(self._end)) is not None:
+            self._heard = self._clock()
             if data == _STOP:
                 self.stop = True
-            else:
+            elif data != _BEAT:
                 found.append(data)
         self._received += len(found)
         return found
 
     def send(self, data: bytes) -> None:
-        """Answers to orders are news, which ``tell`` has; nothing goes this way."""
+        """Of what is told to the ground, the answers to what was ordered here: as news of ``kind`` ack."""
+        for message in self._codec.feed(data, whole=True):
+            if isinstance(message, CommandAck) and message.target_component == OPERATOR:
+                self.tell(kind="ack", command=message.command, result=message.result)
 
     def tell(self, **news: object) -> None:
         """Say something to the parent."""

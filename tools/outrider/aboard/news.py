@@ -15,7 +15,7 @@ from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.histogram import Histogram
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.signing import Signing
-from outrider.aboard.cockpit import Cockpit
+from outrider.aboard.cockpit import OURS, TWIN, Cockpit
 from outrider.aboard.departures import Departures
 from outrider.hangar.modes import mode_name
 
@@ -27,6 +27,8 @@ _AGAIN = 10.0
 """s after which an autopilot's words are told again that it keeps repeating."""
 _REPEATED = ("autopilot", "refused")
 _WAITING = (Phase.CONNECT, Phase.PREPARE)
+_PLAIN = 0.002
+"""A clock that is off by more is no quartz."""
 
 
 class State(NamedTuple):
@@ -57,6 +59,11 @@ class State(NamedTuple):
     concerns: tuple[str, ...] = ()
     stamp: int = 0
 
+    @property
+    def ours(self) -> bool:
+        """Whether the companion has the vehicle."""
+        return Phase(self.phase) in OURS
+
 
 class News:
     """Told after every step, tells by ``tell``."""
@@ -76,9 +83,11 @@ class News:
         """µs of CPU time."""
         self._began: int | None = None
         self._shown: int | None = None
+        self._phase: Phase | None = None
         self._states = 0
         self._plan_ms = (0.0, 0.0)
         self._told = self._refusals = self._steps = 0
+        self._judged = self._twin = False
         self._concerns: dict[str, Concern] = {}
         self._sentences: dict[str, str] = {}
         self._lately: dict[tuple[str, str], float] = {}
@@ -87,9 +96,12 @@ class News:
         """After the step at ``now`` (µs of its clock)."""
         self._began = now if self._began is None else self._began
         at = round((now - self._began) * 1e-6, 2)
+        phase = self._companion.pilot.phase
+        # Whoever hears of another phase has to know the rest: it may have the last word a moment later.
+        at_once = phase is not self._phase
         self._changes(at)
-        if self._shown is None or wall - self._shown >= SHOWN:
-            self._shown = wall
+        if self._shown is None or at_once or wall - self._shown >= SHOWN:
+            self._shown, self._phase = wall, phase
             self._tell(kind="state", **self.state(now)._asdict())
 
     def state(self, now: int) -> State:
@@ -162,16 +174,22 @@ class News:
                 if name not in concerns:
                     self._event(at, "over", concern.text)
             self._concerns = concerns
+        if (twin := self._cockpit.barred == TWIN) != self._twin:
+            self._twin = twin
+            self._event(at, "critical" if twin else "over", "another companion with this system id is heard")
         if self._followed is not None and self._followed.steps != self._steps:
             self._steps = self._followed.steps
             self._event(at, "clock", "the autopilot's clock was set, or began anew")
+        if self._followed is not None and self._followed.judged is not None and not self._judged:
+            self._judged = True
+            self._event(at, "clock", judgement(self._followed.judged, simulated=self._followed.simulated))
 
     def _waiting(self) -> str:
         pilot = self._companion.pilot
         if isinstance(self._companion, DryRun):
             return self._companion.pilot.lacking
-        if pilot.waiting_for == OPERATORS_GO and not self._cockpit.settled:
-            return "the rate of the autopilot's clock"
+        if pilot.phase is Phase.CONNECT and pilot.waiting_for == OPERATORS_GO and self._cockpit.barred:
+            return self._cockpit.barred
         return pilot.waiting_for if pilot.phase in _WAITING else ""
 
     def _would(self) -> str:
@@ -185,6 +203,18 @@ class News:
         self._lately = {key: time for key, time in self._lately.items() if time + _AGAIN > at}
         self._lately[what, text] = at
         self._tell(kind="event", at=at, what=what, text=text)
+
+
+def judgement(rate: float, *, simulated: bool) -> str:
+    """What the autopilot's clock was found to be, in words."""
+    if simulated:
+        return f"a simulation's, {rate:.2f} times as fast as the wall's: it is followed"
+    if abs(rate - 1.0) < _PLAIN:
+        return "a real one: the wall's time counts"
+    return (
+        f"taken for a real one with a delay that changes, though it seems to be {rate:.3f} times as fast; "
+        "for a simulation write clock: autopilot"
+    )
 
 
 def _words(message: SetpointLocal) -> str:

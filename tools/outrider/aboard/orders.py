@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 
+from companion.calls import ACCEPTED
 from companion.node import COMPONENT, NAV_LOITER_UNLIM, NAV_RETURN
 from companion.pilot import NAV_LAND, NAV_TAKEOFF
 from companion.reception import LINKS
@@ -31,6 +32,16 @@ class Orders:
         params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, self._height if word == "go" else 0.0)
         source = Source(self._system, OPERATOR)
         return self._codec.encode(CommandLong(source, self._system, COMPONENT, _COMMANDS[word], 0, params))
+
+
+def answered(command: int, result: int, phase: str, waiting: str) -> str:
+    """In words, what the companion makes of an order (COMMAND_ACK); if nothing, in which ``phase`` it is, and
+    what it waits for there."""
+    word = next((word for word, number in _COMMANDS.items() if number == command), f"command {command}")
+    if result == ACCEPTED:
+        return f"{word}: taken"
+    why = f", waits for {waiting}" if waiting else ""
+    return f"{word}: not taken: phase {phase}{why}"
 
 
 def understood(line: str) -> tuple[str | None, str]:

@@ -6,6 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from companion.target_source import GlobalPositionSource
 from mavlink_bridge.errors import EndpointError
 from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Endpoint, Replay, parse_endpoint
@@ -71,7 +72,14 @@ def checked(options: Options) -> Request:
         raise InputError("--go: does not go with --dry-run, in which nothing takes off")
     autopilot = _endpoint("autopilot", options.autopilot)
     if isinstance(autopilot, Replay):
+        # Nobody is flown: who is in the log is said there.
+        config = config if config.system else config.model_copy(update={"system": 1})
         return _of_log(options, config, Path(autopilot.path))
+    if not config.system:
+        raise InputError(
+            f"--system: is missing, and {options.config} says nothing of it; needed: the id of the own "
+            "autopilot (SYSID_THISMAV, MAV_SYS_ID), 1…250, which no other vehicle may have"
+        )
     if options.swarm is None:
         raise InputError(
             "--swarm: is missing; needed: the endpoint by which the other companions are heard, such as "
@@ -87,6 +95,12 @@ def checked(options: Options) -> Request:
     for name in ("swarm", "ground"):
         if isinstance(endpoints[name], Replay):
             raise InputError(f"--{name} {endpoints[name]}: a log hears nothing; allowed: a live endpoint")
+    source = config.companion.target_source
+    if isinstance(source, GlobalPositionSource) and source.anyone and endpoints["target"] == swarm:
+        raise InputError(
+            "--target: is the swarm's, where with target_source.anyone every neighbour would be the target; "
+            "needed: another endpoint, or anyone: false"
+        )
     key = None if options.signing_key is None else key_of(options.signing_key)
     if key is None:
         _warn(endpoints)

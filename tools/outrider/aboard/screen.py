@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from typing import Final
+from typing import IO, Final, cast
 
 from rich import box
 from rich.console import Console, Group
@@ -17,6 +17,7 @@ from rich.text import Text
 from outrider.aboard.flight import Flight
 from outrider.aboard.news import State
 from outrider.aboard.orders import WORDS
+from outrider.aboard.terminal import Terminal
 
 _REFRESH: Final = 0.2
 """s between two pictures."""
@@ -24,15 +25,17 @@ _EVENTS: Final = 8
 
 
 class Screen:
-    """``look`` as often as one likes. ``tell`` is for the diary's lines."""
+    """On ``terminal``. ``look`` as often as one likes: where it takes nothing, nothing is drawn. ``tell`` is
+    for the diary's lines."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, terminal: Terminal) -> None:
+        self._terminal = terminal
         self.flight: Flight | None = None
         self.pending = ""
         self._events: deque[str] = deque(maxlen=_EVENTS)
         self._drawn = 0.0
         # Without a thread of its own: this process forks the one that flies.
-        self.live = Live(console=console, auto_refresh=False)
+        self.live = Live(console=Console(file=cast(IO[str], terminal)), auto_refresh=False)
 
     def tell(self, line: str) -> None:
         """One more event."""
@@ -41,7 +44,7 @@ class Screen:
     def look(self) -> None:
         """What there is to see now."""
         now = time.monotonic()
-        if now - self._drawn >= _REFRESH and self.flight is not None:
+        if now - self._drawn >= _REFRESH and self.flight is not None and self._terminal.takes:
             self._drawn = now
             self.live.update(self._picture(self.flight), refresh=True)
 

@@ -6,7 +6,7 @@ import os
 import select
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Final
 
 if sys.platform != "win32":
@@ -71,7 +71,9 @@ def typing(shown: bool) -> Iterator[Typed]:
     try:
         yield Typed(fileno)
     finally:
-        termios.tcsetattr(fileno, termios.TCSANOW, before)
+        # The terminal may be gone.
+        with suppress(OSError, termios.error):
+            termios.tcsetattr(fileno, termios.TCSANOW, before)
 
 
 def _standard_input() -> int | None:

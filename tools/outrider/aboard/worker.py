@@ -8,7 +8,6 @@ import sys
 import time
 import traceback
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Final
 
@@ -26,26 +25,37 @@ from outrider.aboard.cockpit import Cockpit
 from outrider.aboard.departures import Departures
 from outrider.aboard.harmless import HarmlessLink
 from outrider.aboard.intercom import OrderLink
+from outrider.aboard.log import Log
 from outrider.aboard.news import News
 from outrider.aboard.request import Request
-from outrider.recorder import Recorder
+from outrider.aboard.twin import Twin
 
-_IGNORED: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
+_IGNORED: Final = (
+    signal.SIGINT,
+    signal.SIGTERM,
+    signal.SIGHUP,
+    signal.SIGQUIT,
+    signal.SIGTSTP,
+    signal.SIGTTIN,
+    signal.SIGTTOU,
+)
 """The parent alone is told by signals when to end; a terminal that is closed or stopped ends no flight."""
 
 
 class Worker:
-    """``links`` by the companion's names; ``directory`` gets the log."""
+    """``links`` by the companion's names, on which ``twin`` listens; ``directory`` gets the log."""
 
-    def __init__(self, asked: Request, links: Mapping[str, Link], orders: OrderLink, directory: Path) -> None:
+    def __init__(
+        self, asked: Request, links: Mapping[str, Link], twin: Twin, orders: OrderLink, directory: Path
+    ) -> None:
         self._asked, self._orders, self._directory = asked, orders, directory
         self._doors = [HarmlessLink(link) for link in links.values()] if asked.dry_run else []
         self._links = dict(zip(links, self._doors or links.values(), strict=True))
-        self._parent = os.getpid()
+        self._parent, self._twin = os.getpid(), twin
         self._signing = None if asked.key is None else Signing(asked.key)
         kind = DryRun if asked.dry_run else Companion
         config = asked.config
-        self._companion = kind(
+        self.companion = kind(
             config.settings,
             config.system,
             config.target,
@@ -53,6 +63,12 @@ class Worker:
             time.thread_time_ns,
             self._signing,
         )
+
+    def resume(self, newest: int) -> None:
+        """Go on after another process, whose signatures went up to that stamp: a simulation's time may run
+        ahead of the wall's."""
+        if self._signing is not None:
+            self._signing.resume(newest)
 
     def main(self) -> None:
         """The process, from fork to exit."""
@@ -62,15 +78,18 @@ class Worker:
             self._orders.tell(kind="event", at=0.0, what="priority", text=ask_for_priority().told)
         else:
             sharpen_timers()
-        with ExitStack() as files:
-            status = self._flown(files)
+        with Log(self._directory, self._asked.system, self._lament) as log:
+            status = self._flown(log)
             # The parent has the last word from here on; files take their time.
             self._orders.tell(kind="left")
         sys.exit(status)
 
-    def _flown(self, files: ExitStack) -> int:
+    def _lament(self, text: str) -> None:
+        self._orders.tell(kind="event", at=None, what="concern", text=text)
+
+    def _flown(self, log: Log) -> int:
         try:
-            self._fly(files)
+            self._fly(log)
         except Exception as error:
             if os.environ.get("OUTRIDER_TRACEBACK"):
                 traceback.print_exc()
@@ -78,21 +97,25 @@ class Worker:
             return 3
         return 0
 
-    def _fly(self, files: ExitStack) -> None:
-        asked, node = self._asked, self._companion
+    def _fly(self, log: Log) -> None:
+        asked, node = self._asked, self.companion
         wall = WallClock()
-        followed = FollowedClock(wall, wall.now()) if asked.config.clock == "autopilot" else None
-        cockpit = Cockpit(node, wall, followed, self._signing)
+        known = {"auto": None, "autopilot": True}
+        followed = (
+            None
+            if asked.config.clock == "wall"
+            else FollowedClock(wall, wall.now(), simulated=known[asked.config.clock])
+        )
+        cockpit = Cockpit(node, wall, followed, self._signing, self._twin)
         departures = Departures(node.config.limits)
         news = News(cockpit, departures, followed, self._signing, self._orders.tell)
-        recorder = Recorder(self._directory, [asked.system], files)
         links: dict[str, Link | Sequence[Link]] = {
             **self._links,
             "ground": (self._links["ground"], self._orders),
         }
 
         def stepped(now: int) -> bool:
-            if os.getppid() != self._parent:
+            if os.getppid() != self._parent or self._orders.alone:
                 cockpit.give_up()
             if isinstance(node, DryRun):
                 for message in node.would:
@@ -110,7 +133,7 @@ class Worker:
                 Scheduled(cockpit, asked.config.period_us),
                 links,
                 wall if followed is None else followed,
-                taps=(recorder, departures),
+                taps=(log, departures),
                 on_idle=idle,
             )
             try:
@@ -120,7 +143,7 @@ class Worker:
 
     def _leave(self, loop: RealTime, news: News, departures: Departures, rate: float) -> None:
         """What the summary needs."""
-        node, statistics = self._companion, loop.statistics
+        node, statistics = self.companion, loop.statistics
         for reading in node.shed():
             news.plan_times.add(reading // 1000)
         profile = node.pilot.profile

@@ -81,7 +81,7 @@ def _addresses(asked: Request, terms: Terms) -> list[Address]:
     return places
 
 
-def _wait(crew: Crew, stopped: Sequence[int], count: int) -> None:
+def _wait(crew: Crew, stopped: Sequence[object], count: int) -> None:
     """Until all vehicles are up."""
     while not stopped and not all(crew.board.gauges(index).up for index in range(count)):
         time.sleep(0.02)

@@ -1,0 +1,135 @@
+"""Two with one system id never fly beside each other unknown: another who speaks with the own ids is found,
+and no go is taken; what comes back of the own words is nobody."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.node import COMPONENT, Companion
+from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase
+from mavlink_bridge.clock import SimulatedClock
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.followed_clock import FollowedClock
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.links.dealt import Dealer
+from mavlink_bridge.links.link import memory_pair
+from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Source
+from mavlink_bridge.node import Datagram
+from outrider.aboard.cockpit import CLOCK, TWIN, Cockpit
+from outrider.aboard.fly_config import FleetOrigin, FlyConfig
+from outrider.aboard.gate import Gate
+from outrider.aboard.orders import Orders
+from outrider.aboard.twin import Twin
+
+SECOND = 1_000_000
+OWN = Source(1, COMPONENT)
+CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))
+
+
+class Air:
+    """A swarm link on which the own words come back, as on a multicast group, and others may speak."""
+
+    def __init__(self) -> None:
+        self.clock = SimulatedClock(SECOND)
+        self.twin = Twin(1, self.clock)
+        own, self.far = memory_pair()
+        dealer = Dealer(own, {"swarm": lambda _header: True}, self.twin)
+        self.end = dealer.ends["swarm"]
+        self._codec, self._other = Codec(), Codec()
+
+    def pass_by(self, seconds: float, source: Source | None = None) -> None:
+        """Let them speak five times a second; ``source``: another one."""
+        for _ in range(round(5 * seconds)):
+            self.end.send(self._codec.encode(self.position(OWN)))
+            for data in self.far.receive():
+                self.far.send(data)
+            if source is not None:
+                self.far.send(self._other.encode(self.position(source)))
+            self.end.receive()
+            self.clock.wait_until(self.clock.now() + 200_000)
+
+    def position(self, source: Source) -> GlobalPosition:
+        since = self.clock.now() + (0 if source is OWN else 77_000)
+        return GlobalPosition(source, since, 47.4, 8.5, 500.0, 12.0, (0.0, 0.0, 0.0), None)
+
+
+@pytest.mark.parametrize(
+    ("source", "found"),
+    [(None, False), (Source(1, COMPONENT), True), (Source(2, COMPONENT), False), (Source(1, 1), False)],
+    ids=["nobody", "a twin", "a neighbour", "the own autopilot"],
+)
+def test_who_speaks_with_the_own_ids_is_found(source: Source | None, found: bool) -> None:
+    air = Air()
+    air.pass_by(30.0)
+    assert not air.twin.seen
+    air.pass_by(4.0, source)
+    assert air.twin.seen == found
+    air.pass_by(20.0)
+    assert not air.twin.seen
+
+
+def test_what_was_said_before_this_process_and_comes_late_is_nobody() -> None:
+    air = Air()
+    air.pass_by(1.0, OWN)
+    air.pass_by(1.0)
+    assert not air.twin.seen
+
+
+def order(command: int, system: int = 1, component: int = COMPONENT) -> CommandLong:
+    return CommandLong(Source(255, 190), system, component, command, 0, (0.0,) * 6 + (5.0,))
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([NAV_TAKEOFF, NAV_LAND, 511]),
+            st.sampled_from([1, 2]),
+            st.sampled_from([1, COMPONENT]),
+        ),
+        max_size=6,
+    ),
+    st.binary(max_size=20),
+)
+def test_a_closed_gate_keeps_goes_and_nothing_else(
+    orders: list[tuple[int, int, int]], garbage: bytes
+) -> None:
+    codec, messages = Codec(), [order(*one) for one in orders]
+    data = b"".join(codec.encode(message) for message in messages)
+    inbox = [Datagram("swarm", data), Datagram("ground", data + garbage)]
+    passed, answers = Gate(1, None).closed(inbox)
+    goes = [one for one in orders if one == (NAV_TAKEOFF, 1, COMPONENT)]
+    rest = [m for m in messages if (m.command, m.target_system, m.target_component) != (NAV_TAKEOFF, *OWN)]
+    assert passed[0] == inbox[0]
+    assert Codec().feed(passed[1].data.removesuffix(garbage)) == rest
+    assert passed[1].data.endswith(garbage)
+    denied = [message for datagram in answers for message in Codec().feed(datagram.data)]
+    assert denied == [CommandAck(OWN, NAV_TAKEOFF, 2, 0, 0, 255, 190)] * len(goes)
+
+
+def test_no_go_is_taken_before_the_clock_is_known_nor_beside_a_twin() -> None:
+    air = Air()
+    node = Companion(CONFIG.settings, 1, 100, FleetFrame(47.4, 8.5, 488.0), time.thread_time_ns)
+    node.pilot.phase = Phase.HOLD
+    go = Datagram("ground", Orders(1, 5.0).frame("go"))
+
+    def taken(cockpit: Cockpit) -> bool:
+        node.pilot.phase = Phase.HOLD
+        told = cockpit.step(air.clock.now(), [go])
+        (answer,) = [
+            m for d in told if d.link == "ground" for m in Codec().feed(d.data) if isinstance(m, CommandAck)
+        ]
+        assert (answer.result == 0) == (node.pilot.phase is Phase.ESCORT)
+        return answer.result == 0
+
+    young = Cockpit(node, air.clock, FollowedClock(air.clock), None, air.twin)
+    assert (young.barred, taken(young)) == (CLOCK, False)
+    cockpit = Cockpit(node, air.clock, None, None, air.twin)
+    assert (cockpit.barred, taken(cockpit)) == ("", True)
+    air.pass_by(5.0, OWN._replace())
+    assert (cockpit.barred, taken(cockpit)) == (TWIN, False)
+    air.pass_by(20.0)
+    assert (cockpit.barred, taken(cockpit)) == ("", True)

@@ -1,0 +1,30 @@
+"""Having the last word: the autopilot is asked to hold until it does, or is another's, or time is up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from companion.last_word import LastWord
+from mavlink_bridge.clock import Clock
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.node import Datagram
+
+_STEP: Final = 10_000
+_HURRIED: Final = 300_000
+"""µs that it takes even where somebody is in a hurry."""
+
+
+def farewell(word: LastWord, link: Link, clock: Clock, hurry: Callable[[], bool]) -> None:
+    """Say it over ``link``, the autopilot's; ``clock``: of the wall. ``hurry()``: whether to come to an
+    end."""
+    began = clock.now()
+    while not word.over:
+        now = clock.now()
+        if hurry() and now >= began + _HURRIED:
+            return
+        inbox = [Datagram("autopilot", data) for data in link.receive()]
+        for datagram in word.step(now, inbox):
+            link.send(datagram.data)
+        if not word.over:
+            clock.wait_until(now + _STEP)

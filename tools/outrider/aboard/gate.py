@@ -1,0 +1,51 @@
+"""Where orders to take off end while something speaks against any: they are answered there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from struct import Struct
+from typing import Final
+
+from companion.node import COMPONENT
+from companion.pilot import NAV_TAKEOFF
+from companion.reception import LINKS
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.framing import Frame, leading_frames
+from mavlink_bridge.messages import CommandAck, Source
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
+
+_COMMAND_LONG: Final = 76
+_ORDER: Final = Struct("<28xHBB")
+_DENIED: Final = 2
+"""MAV_RESULT."""
+
+
+class Gate:
+    """Of the companion of ``system``; ``signing``: its own."""
+
+    def __init__(self, system: int, signing: Signing | None) -> None:
+        self._own = Source(system, COMPONENT)
+        self._codec = Codec(None, signing, LINKS.index("ground"))
+
+    def closed(self, inbox: Sequence[Datagram]) -> tuple[list[Datagram], list[Datagram]]:
+        """``inbox`` without the goes for this companion, and the answers to these (COMMAND_ACK)."""
+        passed, answers = [], []
+        for datagram in inbox:
+            frames, end = leading_frames(datagram.data) if datagram.link == "ground" else ((), 0)
+            goes = [frame for frame in frames if self._is_go(frame)]
+            if not goes:
+                passed.append(datagram)
+                continue
+            others = b"".join(frame.data for frame in frames if frame not in goes) + datagram.data[end:]
+            passed.append(Datagram("ground", others))
+            for go in goes:
+                answer = CommandAck(self._own, NAV_TAKEOFF, _DENIED, 0, 0, go.system, go.component)
+                answers.append(Datagram("ground", self._codec.encode(answer)))
+        return passed, answers
+
+    def _is_go(self, frame: Frame) -> bool:
+        if frame.message_id != _COMMAND_LONG:
+            return False
+        whom = _ORDER.unpack_from(frame.payload.ljust(_ORDER.size, b"\0"))
+        return whom == (NAV_TAKEOFF, *self._own)
