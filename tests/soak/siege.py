@@ -255,6 +255,10 @@ class Siege:
             assert far < 1.0, (craft.system, far)
 
     def _lead(self, craft: Craft, now: int) -> None:
+        if not self.signed and craft.companion.pilot.phase is Phase.DONE:
+            # It was told that it has landed, wherever it is: on with the next.
+            craft.radio.boot()
+            craft.seat.start()
         pilot = craft.companion.pilot
         waits = pilot.phase is Phase.CONNECT and pilot.waiting_for == OPERATORS_GO
         if (waits or pilot.phase is Phase.YIELDED) and now - self._asked.get(craft.system, 0) > 2 * SECOND:
