@@ -6,7 +6,7 @@ BIN = .venv/bin
 SCRIPTS = tools/bootstrap.py tools/client_environments.py tools/extract_log.py
 CLIENTS = tests/clients/requirements
 
-.PHONY: fly test soak lint bench schemas requirements clean
+.PHONY: fly test trial soak lint bench schemas requirements clean
 .DEFAULT_GOAL := fly
 
 fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--method tangential …"
@@ -15,7 +15,10 @@ fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--met
 test: .venv/.made .venv/clients/.made  ## everything; one test with ARGS="-k name"
 	@$(BIN)/pytest -n $(JOBS) --dist loadfile $(ARGS) </dev/null
 
-soak: .venv/.made  ## what is too long for CI, about half an hour; part of it with ARGS="-k yaml"
+trial: .venv/.made  ## five companions on five vehicles through all that may happen; ARGS="--speed 1 --flavour px4"
+	@$(BIN)/python -m trials $(ARGS)
+
+soak: .venv/.made  ## what is too long for CI, about an hour; part of it with ARGS="-k yaml"
 	@$(BIN)/pytest --soak -vv -n $(JOBS) --dist worksteal $(ARGS) </dev/null
 
 lint: .venv/.made  ## style, types, and who may import whom
@@ -33,7 +36,7 @@ schemas: .venv/.made  ## write config/schemas anew after a change of a configura
 
 requirements:  ## write uv.lock and requirements.txt anew after a change of dependencies; needs uv
 	@uv lock
-	@uv export --locked --extra sitl --extra export --group dev --no-emit-project --no-header --no-annotate --quiet \
+	@uv export --locked --extra sitl --extra export --extra view --group dev --no-emit-project --no-header --no-annotate --quiet \
 		--format requirements-txt --output-file requirements.txt
 	@for client in $(basename $(wildcard $(CLIENTS)/*.in)); do \
 		uv pip compile --universal --no-deps --generate-hashes --python-version 3.11 --no-header --no-annotate --quiet \

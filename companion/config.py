@@ -221,6 +221,19 @@ class GuardConfig(Settings):
     neighbour_lost_us: int = Field(
         3_000_000, gt=0, le=600_000_000, description="said then, and kept away from"
     )
+    flown_on_us: int = Field(
+        0,
+        ge=0,
+        le=60_000_000,
+        description="an autopilot may fly on for so long without its companion (GUID_TIMEOUT, "
+        "COM_OF_LOSS_T): a neighbour that falls silent may be anywhere on that way; 0: it is carried on "
+        "as any track is",
+    )
+    cautious_speed: Positive | None = Field(
+        None,
+        description="m/s, beside the target's: who misses deadlines, or hears a neighbour no more, flies "
+        "about so fast at most",
+    )
     late_us: Micros = Field(100_000, description="a step later than that is a missed deadline")
     battery_low: float = Field(0.2, ge=0.0, le=1.0, description="share left: it comes back and lands")
     battery_critical: float = Field(0.1, ge=0.0, le=1.0, description="share left: it lands")

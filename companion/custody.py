@@ -2,7 +2,8 @@
 
 A mode that was changed is somebody's will, a pilot's by the switch or a ground station's, and is left alone.
 One thing alone is an accident: set-points were missing for so long that the autopilot's time-out ended the
-mode, and it is in a mode that it chooses then. That mode may be asked for again.
+mode, and it holds its place. Then the mode may be asked for again. What happened while the autopilot was not
+heard nobody has seen: that may have been a pilot.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from enum import Enum
 
 from companion.vehicle import Vehicle
 
-_GAP = 400_000
-"""µs between set-points; PX4's shortest useful time-out is half a second."""
-_BLAME = 4_000_000
+_GAP = 500_000
+"""µs between set-points: PX4's shortest useful time-out, COM_OF_LOSS_T."""
+_BLAME = 2_000_000
 """µs after a gap in which a loss of the mode is its consequence."""
 _PATIENCE = 6_000_000
 """µs for which the mode is asked for again."""
@@ -36,12 +37,10 @@ class Custody:
         self._streamed: int | None = None
         self._gap_ended: int | None = None
         self._lost_at: int | None = None
-        self._silent = False
 
     def begin(self) -> None:
         """It is ours from now on."""
         self._streamed = self._gap_ended = self._lost_at = None
-        self._silent = False
 
     def streamed(self, now: int) -> None:
         """A set-point leaves at ``now`` (µs)."""
@@ -53,11 +52,8 @@ class Custody:
         """At ``now`` (µs)."""
         vehicle = self._vehicle
         if not vehicle.alive:
-            # What happened meanwhile was not seen: our set-points may not have arrived.
-            self._silent = True
+            self._gap_ended, self._lost_at, self._streamed = None, None, now
             return Owner.UNKNOWN
-        if self._silent:
-            self._silent, self._gap_ended = False, now
         if vehicle.guided:
             self._lost_at = None
             return Owner.OURS
@@ -75,3 +71,22 @@ class Custody:
             return True
         missing = self._streamed is not None and now - self._streamed > _GAP
         return missing or (self._gap_ended is not None and now - self._gap_ended <= _BLAME)
+
+
+class Passage:
+    """The modes through which our own orders lead, up or down; any other is somebody's will. ``first``: the
+    mode, custom_mode of HEARTBEAT, in which the order found the vehicle, which it has until the order
+    tells."""
+
+    def __init__(self, first: int) -> None:
+        self._first = first
+        self.entered = False
+        """Whether the order has told."""
+
+    def strays(self, mode: int, ways: frozenset[int], before: frozenset[int] = frozenset()) -> bool:
+        """Whether ``mode`` is none of the ``ways``, nor, until one of those is seen, the first or one of
+        ``before``."""
+        if mode in ways:
+            self.entered = True
+            return False
+        return self.entered or (mode != self._first and mode not in before)

@@ -71,6 +71,21 @@ class Neighbours:
         # When (µs) a vehicle's companion last said where it is; whether its track is of its autopilot's word.
         self._spoken: dict[int, int] = {}
         self._by_autopilot: dict[int, bool] = {}
+        self._brief = False
+
+    @property
+    def brief(self) -> bool:
+        """Whether their clocks are a simulation's, see ``SenderClock``."""
+        return self._brief
+
+    @brief.setter
+    def brief(self, value: bool) -> None:
+        if value != self._brief:
+            self._brief = value
+            for track in self._tracks.values():
+                track.brief = value
+            for clock in self._clocks.values():
+                clock.brief = value
 
     def hear_position(self, now: int, message: GlobalPosition) -> None:
         """A neighbour's GLOBAL_POSITION_INT; the own echo is ignored."""
@@ -87,6 +102,7 @@ class Neighbours:
         track = self._tracks.get(system)
         if track is None or self._by_autopilot[system] != by_autopilot:
             track = Track(self._config.neighbour)
+            track.brief = self._brief
         track.measure(now, position, velocity, message.time_boot)
         time = track.time
         if time is None:
@@ -118,6 +134,7 @@ class Neighbours:
             if clock is None:
                 config = self._config
                 clock = PlanClock(config.neighbour.delay_us, config.guard.plan_stale_us)
+                clock.brief = self._brief
                 self._clocks[system] = clock
             begins = clock.begins(now, horizon.epoch, horizon.dt)
         if begins is None:
@@ -129,7 +146,8 @@ class Neighbours:
         """All neighbours aligned with ``now + n·dt``, n = 0…N.
 
         One that falls silent stays an obstacle where it was last, carried on for a bounded time: it may well
-        be there.
+        be there. With ``guard.flown_on_us`` it may have stopped, or its autopilot flown on: it is an obstacle
+        that holds all of that way.
         """
         config = self._config
         steps = config.horizon.steps + 1
@@ -138,6 +156,12 @@ class Neighbours:
         if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
         carried = np.minimum(np.maximum(age, 0), config.neighbour.extrapolate_us) * 1e-6
+        further = np.zeros(len(ids))
+        if config.guard.flown_on_us:
+            # Somewhere between where it was when it could still be known, and where it may be by now.
+            since = np.clip(age, 0, config.guard.flown_on_us) - config.guard.plan_stale_us
+            carried = np.where(since > 0, 1e-6 * (config.guard.plan_stale_us + since / 2), carried)
+            further = 0.5e-6 * np.maximum(since, 0) * np.linalg.norm(states[:, 3:6], axis=1)
         here = states[:, 0:3] + carried[:, None] * states[:, 3:6]
         positions, trusted = self._table.positions(ids, now, now - config.guard.plan_stale_us)
         off = positions[:, 0] - here
@@ -151,7 +175,13 @@ class Neighbours:
                 ahead = 1e-6 * config.horizon.dt_us * np.arange(steps)
                 positions[moving] += ahead[:, None] * states[moving, None, 3:6]
         count = len(ids)
-        return Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count], self._margin[:count])
+        found = Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count], self._margin[:count])
+        if not further.any():
+            return found
+        further[trusted] = 0.0
+        return found._replace(
+            d_min=found.d_min + further, d_safe=found.d_safe + further, radius=found.radius + further
+        )
 
     def last_heard(self) -> list[tuple[int, int, Array, Array]]:
         """System id, time (µs), position (3,) and velocity (3,) of everybody's last known state."""

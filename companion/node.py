@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -11,14 +12,14 @@ import numpy as np
 from companion.bearings import turned
 from companion.certified.flight import CertifiedFlight
 from companion.certified.keeper import Why
-from companion.config import CompanionConfig
+from companion.config import CompanionConfig, MethodName
 from companion.dials import Dials
 from companion.errors import CompanionError, SurfaceError
 from companion.forces import Obstacles
 from companion.guard import Guard
 from companion.heading import Heading
-from companion.horizon import Array, Motion
-from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase, Pilot
+from companion.horizon import Array, Horizon, Motion
+from companion.pilot import NAV_LAND, NAV_TAKEOFF, STEERED, Phase, Pilot
 from companion.plan_log import PlanLog
 from companion.planner import Aim, Plan, Planner, standing
 from companion.reception import LINKS, accepts
@@ -103,6 +104,7 @@ class Companion:
         self._goal: Array | None = None
         self._held: Array | None = None
         self.watch = Watch(config)
+        self._owed: dict[str, Reaction] = {}
         self._next_look = self._looked_late = 0
         self._settling = Settling(config)
         self._certified = (
@@ -113,6 +115,8 @@ class Companion:
         self._heading = Heading(config.heading, config.horizon)
         self._boot: int | None = None
         self._next_plan = self._next_setpoint = 0
+        self._fastest = hypot(*config.limits.v_max)
+        self._flown = 0
         self._plans = self._relaxed = 0
         self._plan_ns = array("I")
         self._plan_at = array("q")
@@ -128,14 +132,28 @@ class Companion:
             keeper = self._certified.keeper
             failures, anchored = keeper.held[Why.UNSOLVED], keeper.anchored_anew
         return Tally(
-            self._plans, self._relaxed, failures, self._kept, anchored, self._plan_ns[:], self._plan_at[:]
+            self._plans, self._relaxed, failures, self.held, anchored, self._plan_ns[:], self._plan_at[:]
         )
 
     @property
-    def _kept(self) -> int:
+    def held(self) -> int:
         """How often an old plan was kept."""
         certified = self._certified
         return self.guard.held if certified is None else sum(certified.keeper.held.values())
+
+    @property
+    def flown(self) -> Horizon | None:
+        """What it flies; None while it steers nothing."""
+        return self.guard.horizon
+
+    @property
+    def last_spent(self) -> int | None:
+        """The stopwatch's reading (ns) of the last plan."""
+        return self._plan_ns[-1] if self._plan_ns else None
+
+    def use(self, methods: tuple[MethodName, ...]) -> None:
+        """From the next plan on."""
+        self.planner.use(methods)
 
     def shed(self) -> Sequence[int]:
         """Take the stopwatch's readings (ns) away, and the plan log with them: for who runs for days."""
@@ -192,7 +210,7 @@ class Companion:
             return _NOTHING
         self.world.say(now, self.voice)
         said: list[Message] = [*self.voice.due(now)]
-        said += self._dials.due(now, self._plan_ns, self._kept, self.world.target.age(now))
+        said += self._dials.due(now, self._plan_ns, self.held, self.world.target.age(now))
         return {link: said if link in self.config.voice.links else [] for link in ("autopilot", "ground")}
 
     def _has_to_act(self, now: int) -> bool:
@@ -261,11 +279,15 @@ class Companion:
         if view.local is not self._frame:
             # Where the vehicle was in the old frame must not be flown to in the new one.
             self._frame, self.guard.horizon = view.local, None
+        if self._certified is None and now - self._flown > self.config.guard.hold_us:
+            # It hung, and the autopilot did as it saw fit: the old plan leads from where nobody is any more.
+            self.guard.horizon = None
+        self._flown = now
         if not self.pilot.streaming or view.own is None or view.local is None:
             self.guard.horizon = None
             return
         stale = view.own.age > self.config.guard.own_stale_us
-        measured = Motion(view.own.position, view.own.velocity, _ZERO)
+        measured = Motion(view.own.position, self._bounded(view.own.velocity), _ZERO)
         if self.guard.horizon is None:
             if stale or view.yaw is None:
                 return
@@ -290,6 +312,12 @@ class Companion:
             self.guard.start(now, measured)
             return
         self._plan(now, view, measured)
+
+    def _bounded(self, velocity: Array) -> Array:
+        """A measured ``velocity`` (3,) as a plan may begin with it: whatever the own autopilot, or who speaks
+        in its name, says of its speed, nothing faster than the limits is asked for."""
+        speed = float(np.sqrt(velocity @ velocity))
+        return velocity if speed <= self._fastest else velocity * (self._fastest / speed)
 
     def _fly_certified(
         self, now: int, view: View, measured: Motion, flight: CertifiedFlight, *, stale: bool
@@ -364,9 +392,24 @@ class Companion:
             aim = self._destination(now, view, measured)
         except SurfaceError:
             return None
+        if aim is not None and self.watch.blinkered:
+            aim = self._cautious(aim, measured)
         if aim is None or self.config.traffic is None:
             return aim
         return aim._replace(destination=self.world.sensed.aside(now, aim.destination, measured.position))
+
+    def _cautious(self, aim: Aim, measured: Motion) -> Aim:
+        """The same way, but no further in a horizon than ``guard.cautious_speed`` goes."""
+        speed = self.config.guard.cautious_speed
+        if speed is None:
+            return aim
+        drift = aim.target_end - aim.target
+        way = aim.destination - drift - measured.position
+        far = float(np.linalg.norm(way))
+        most = speed * 1e-6 * self.config.horizon.dt_us * (self.config.horizon.steps + 1)
+        if far <= most:
+            return aim
+        return aim._replace(destination=measured.position + drift + most / far * way)
 
     def _destination(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to: the own goal, or the surface around the target where it will be at the end of the
@@ -418,10 +461,17 @@ class Companion:
         for concern, begins in self.watch.look(situation):
             if concern.name != "target":  # of that the world tells
                 self.voice.report(concern.severity, concern.text, begins=begins)
-            if begins and concern.reaction is Reaction.RETURN:
-                self.pilot.come_back()
-            if begins and concern.reaction is Reaction.LAND:
+            if begins and concern.reaction is not Reaction.TELL:
+                self._owed[concern.name] = concern.reaction
+            elif not begins:
+                self._owed.pop(concern.name, None)
+        if self._owed and self.pilot.phase in STEERED:
+            # What began on the way up, or while somebody else had the vehicle, follows now.
+            if Reaction.LAND in self._owed.values():
                 self.pilot.alight()
+            else:
+                self.pilot.come_back()
+            self._owed.clear()
 
     def _place_to_hold(self, measured: Motion) -> Array:
         """Where it was when it was told to stay or to come back, or when the target was lost."""

@@ -1,9 +1,9 @@
 """The way into the air and back: connect → arm → take-off → escort → settle → land, by MAVLink commands, each
 until acknowledged.
 
-Nothing starts without an operator's go (a NAV_TAKEOFF addressed to the companion), and while the autopilot is
-not in the mode in which our set-points steer, none are sent. Who takes the vehicle over by its mode keeps it
-until they give it back so, or a new go is given.
+Nothing starts without an operator's go (a NAV_TAKEOFF addressed to the companion), which does not keep for
+long, and while the autopilot is not in the mode in which our set-points steer, none are sent. Who takes the
+vehicle over by its mode, on the way up and down too, keeps it until a new go is given.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from companion.autopilots import Profile, Step
 from companion.calls import Calls
 from companion.config import CompanionConfig
-from companion.custody import Custody, Owner
+from companion.custody import Custody, Owner, Passage
 from companion.horizon import Array
 from companion.takeoff import DO_SET_MODE, NAV_TAKEOFF, Takeoff
 from companion.vehicle import UNDEFINED, Vehicle
@@ -29,6 +29,10 @@ REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
 OPERATORS_GO = "the operator's go"
 """What it waits for when all else is ready."""
 _NAN = float("nan")
+_KEEPS = 10_000_000
+"""µs within which a go must have armed the vehicle; later on nobody may be expecting it."""
+_BESIDE = 30.0
+"""m from the box, on each axis, from where a vehicle may start."""
 _FAR = 20_000.0
 """m between the fleet origin and the autopilot's own: beyond, one of the two is wrong."""
 _NEEDED = tuple(
@@ -70,6 +74,8 @@ class Pilot:
         self.waiting_for = "a heartbeat of the autopilot"
         self._settling_since: int | None = None
         self._height: float | None = None
+        self._go_at: int | None = None
+        self._passage = Passage(0)
         self._calls = Calls(own)
         self._custody = Custody(self.vehicle)
         self._owner = Owner.OURS
@@ -125,7 +131,7 @@ class Pilot:
             return False
         if self.phase is Phase.YIELDED:
             self._start_anew()
-        self._height = height
+        self._height, self._go_at = height, None
         return True
 
     def hold(self) -> bool:
@@ -151,15 +157,20 @@ class Pilot:
 
     def land(self) -> bool:
         """The operator's order to land. A vehicle under way first comes to a hover clear of the others,
-        because an autopilot that lands looks out for nobody."""
-        if self.phase is Phase.CONNECT:
-            # Nothing is in the air yet, and an earlier go is taken back.
-            self._height = None
+        because an autopilot that lands looks out for nobody. Whether it is taken: not for a vehicle that
+        somebody else has, nor for one in the air that is not as we would leave it."""
         if self.phase in STEERED:
             self.phase = Phase.SETTLE
         elif self.phase is Phase.PREPARE:
-            self.phase = Phase.LAND
-        return True
+            self._alight()
+        elif self.phase is Phase.CONNECT:
+            # An earlier go is taken back.
+            self._height = None
+            if self.vehicle.flies:
+                if not self.vehicle.left_by_us:
+                    return False
+                self._alight()
+        return self.phase is not Phase.YIELDED
 
     def alight(self) -> None:
         """Something is so wrong that it has to land, by settling if that can be; whoever has taken the
@@ -175,7 +186,12 @@ class Pilot:
     def settled(self) -> None:
         """The vehicle hovers clear of the others: land now."""
         if self.phase is Phase.SETTLE:
-            self.phase = Phase.LAND
+            self._alight()
+
+    def _alight(self) -> None:
+        self.phase = Phase.LAND
+        self._calls.forget()
+        self._passage = Passage(self.vehicle.mode)
 
     def step(self, now: int, view: View) -> list[Message]:
         """Commands to send now."""
@@ -186,26 +202,41 @@ class Pilot:
             self._settle(now, view)
         if self._owner is Owner.LOST:
             return self._ask_back(now)
-        if self.phase is Phase.YIELDED:
-            self._look_for_a_return()
+        if self.phase is Phase.YIELDED and self.vehicle.alive and not self.vehicle.armed:
+            # Who disarms it ends the flight.
+            self._start_anew()
         if self.phase is Phase.CONNECT:
             return self._connect(now, view)
         if self.phase is Phase.PREPARE:
             return self._prepare(now, view)
-        if self.phase is Phase.LAND:
-            if self.vehicle.heartbeat is not None and not self.vehicle.armed:
-                self.phase = Phase.DONE
+        return self._land(now) if self.phase is Phase.LAND else []
+
+    def _land(self, now: int) -> list[Message]:
+        """Told once: an autopilot that lands and then does something else was told so by somebody."""
+        vehicle, profile = self.vehicle, self.profile
+        if vehicle.heartbeat is not None and not vehicle.armed:
+            self.phase = Phase.DONE
+            return []
+        if profile is not None and vehicle.alive and vehicle.flies:
+            # Without set-points it may hold until it is told.
+            before = profile.loss_modes | {profile.guided_custom_mode}
+            if self._passage.strays(vehicle.mode, profile.land_modes, before):
+                self._yield()
                 return []
-            return self._calls.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
-        return []
+        if self._passage.entered:
+            return []
+        return self._calls.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
+
+    def _yield(self) -> None:
+        """Somebody has it."""
+        self._owner, self.phase = Owner.OURS, Phase.YIELDED
+        self._calls.forget()
 
     def _keep(self, now: int) -> None:
         """See whose the vehicle is. Somebody who took it over keeps it: nothing is ordered against them."""
         before, self._owner = self._owner, self._custody.owner(now)
         if self._owner is Owner.TAKEN:
-            self._owner = Owner.OURS
-            self._yielded_from, self.phase = self.phase, Phase.YIELDED
-            self._calls.forget()
+            self._yield()
         elif self._owner is Owner.LOST and before is not Owner.LOST:
             self._calls.forget()
 
@@ -215,17 +246,10 @@ class Pilot:
             return []
         return self._calls.call(now, DO_SET_MODE, (*self.profile.mode_params, 0.0, 0.0, 0.0, 0.0))
 
-    def _look_for_a_return(self) -> None:
-        """Who took the vehicle over may give it back by its mode switch; who disarms it ends the flight."""
-        if self.guided:
-            self.phase = self._yielded_from
-            self._custody.begin()
-        elif self.vehicle.alive and not self.vehicle.armed:
-            self._start_anew()
-            self._height = None
-
     def _start_anew(self) -> None:
+        """As at the beginning: a new go is needed."""
         self.phase, self._owner, self._settling_since = Phase.CONNECT, Owner.OURS, None
+        self._height = None
         self._calls.forget()
 
     def _settle(self, now: int, view: View) -> None:
@@ -233,7 +257,7 @@ class Pilot:
         since = self._settling_since = now if self._settling_since is None else self._settling_since
         blind = view.own is None or view.own.age > self._config.guard.own_stale_us
         if blind or now - since > self._config.guard.settle_us:
-            self.phase = Phase.LAND
+            self._alight()
 
     def _requests(self, now: int, view: View) -> list[Message]:
         """For the messages that are needed; they change nothing of what the vehicle does."""
@@ -241,19 +265,27 @@ class Pilot:
         if self.vehicle.heartbeat is not None:
             for command, params in sorted(_NEEDED, key=lambda call: self._calls.sent_at(*call)):
                 calls += self._calls.call(now, command, params)
-            if view.local is None:
-                calls += self._calls.call(
-                    now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-                )
+            # Again from time to time: an autopilot that began anew elsewhere has another origin.
+            calls += self._calls.call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
         return calls
 
     def _connect(self, now: int, view: View) -> list[Message]:
         self.waiting_for = self._missing(view)
+        self._expire(now)
         calls = self._requests(now, view)
         if not self.waiting_for and view.own is not None and view.local is not None:
             self._takeoff.begin(view.own)
+            self._passage = Passage(self.vehicle.mode)
             self.phase = Phase.PREPARE
         return calls
+
+    def _expire(self, now: int) -> None:
+        """A go that has not armed the vehicle yet does not keep for ever."""
+        if self._height is None:
+            return
+        self._go_at = now if self._go_at is None else self._go_at
+        if now - self._go_at > _KEEPS:
+            self._start_anew()
 
     def _unseen(self, view: View) -> str:
         """What has not been heard that every plan needs."""
@@ -276,6 +308,8 @@ class Pilot:
         vehicle = self.vehicle
         if unseen := self._unseen(view):
             return unseen
+        if astray := self._astray(view):
+            return astray
         if vehicle.armed and vehicle.landed_state == UNDEFINED:
             # A vehicle that may be flying must not be told to take off.
             return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
@@ -287,14 +321,40 @@ class Pilot:
             return OPERATORS_GO
         return ""
 
+    def _astray(self, view: View) -> str:
+        """Whether it stands where nobody can mean it to start: then the fleet origin is wrong, or the
+        vehicle's."""
+        limits, guard = self._config.limits, self._config.guard
+        if view.own is None:
+            return ""
+        place = view.own.position
+        x, y, z = place.tolist()
+        off = np.maximum(np.array(limits.box_min) - place, place - np.array(limits.box_max))
+        far = guard.fence_radius is not None and x * x + y * y > guard.fence_radius**2
+        if far or not float(off.max()) <= _BESIDE:
+            return f"a start near the box: it is at {x:.0f} m east, {y:.0f} m north, {z:.0f} m up"
+        status, low = self.vehicle.status, guard.battery_low
+        left = None if status is None else status.battery_remaining
+        return "" if left is None or left >= low else f"a battery above {100 * low:.0f} %"
+
     def _prepare(self, now: int, view: View) -> list[Message]:
         profile, height, takeoff = self.profile, self._height, self._takeoff
         if profile is None or height is None or view.own is None:
             return []
         if takeoff.disarmed(profile):
-            # A new go is needed.
-            self._height, self.phase = None, Phase.CONNECT
-            self._calls.forget()
+            self._start_anew()
+            return []
+        if not self.vehicle.armed:
+            self._expire(now)
+        if self.vehicle.alive:
+            ways = profile.takeoff_modes | {profile.guided_custom_mode}
+            if takeoff.risen(view.own, height):
+                ways |= {profile.hold_mode}
+            if self._passage.strays(self.vehicle.mode, ways):
+                self._yield()
+                if not self.vehicle.armed:
+                    self._start_anew()
+        if self.phase is not Phase.PREPARE:
             return []
         step = takeoff.step(profile)
         sent = takeoff.advance(now, profile, view.own, height)

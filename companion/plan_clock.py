@@ -32,6 +32,15 @@ class PlanClock:
         self._epoch: int | None = None
         self._begins: int | None = None
 
+    @property
+    def brief(self) -> bool:
+        """Whether its sender's clock is a simulation's, see ``SenderClock``."""
+        return self._clock.brief
+
+    @brief.setter
+    def brief(self, value: bool) -> None:
+        self._clock.brief = value
+
     def begins(self, now: int, epoch: int, dt: int) -> int | None:
         """When a plan of steps ``dt`` that arrives at ``now`` with ``epoch`` begins; None while it is not
         clear what to make of that. A plan that its sender holds, and tells of again, began when it did."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.config import CompanionConfig
+from companion.config import CompanionConfig, MethodName
 from companion.dqmpc import Dqmpc, Problem
 from companion.forces import Obstacles, limit, repulsion
 from companion.horizon import Array, Horizon, roll_out
@@ -58,6 +58,10 @@ class Planner:
         self._gradient: Array = np.zeros(3)
         self._force: Array = np.zeros((config.horizon.steps + 1, 3))
         self._smooth_at: int | None = None
+
+    def use(self, methods: tuple[MethodName, ...]) -> None:
+        """From the next plan on, with nothing latched."""
+        self._methods = build(self.config.model_copy(update={"methods": methods}))
 
     def plan(
         self, now: int, position: Array, velocity: Array, prediction: Array, aim: Aim, obstacles: Obstacles

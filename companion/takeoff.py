@@ -12,6 +12,8 @@ from mavlink_bridge.messages import Message
 DO_SET_MODE, ARM_DISARM, NAV_TAKEOFF = 176, 400, 22
 _STILL, _CALM = 0.3, 2_000_000
 """m/s and µs: slower than this for so long in the air, a take-off is over."""
+_NEARLY = 0.7
+"""Share of the height asked for."""
 _NAN = float("nan")
 
 
@@ -44,6 +46,11 @@ class Takeoff:
     def disarmed(self, profile: Profile) -> bool:
         """Whether it is disarmed again, by itself or by somebody, who will not expect it to arm."""
         return Step.ARM in profile.steps[: self._step] and not self._vehicle.armed
+
+    def risen(self, own: State, height: float) -> bool:
+        """Whether it is so near ``height`` (m above the ground) that the way up may have ended."""
+        climbed = float(own.position[2]) - self._ground
+        return not self._flying_already and climbed > _NEARLY * height
 
     def advance(self, now: int, profile: Profile, own: State, height: float) -> list[Message]:
         """Commands to send now on the way to ``height`` (m above the ground)."""

@@ -35,7 +35,7 @@ class Vehicle:
         self._extended: ExtendedSysState | None = None
         self._beaten: Heartbeat | None = None
         self._extended_seen: ExtendedSysState | None = None
-        self._now = self._beat_at = self._extended_at = 0
+        self.now = self._beat_at = self._extended_at = 0
 
     def hear(self, message: Message) -> None:
         """One of its messages."""
@@ -55,7 +55,7 @@ class Vehicle:
 
     def tick(self, now: int) -> None:
         """It is ``now`` (µs)."""
-        self._now = now
+        self.now = now
         if self.heartbeat is not self._beaten:
             self._beaten, self._beat_at = self.heartbeat, now
         if self._extended is not self._extended_seen:
@@ -64,7 +64,7 @@ class Vehicle:
     @property
     def alive(self) -> bool:
         """Whether its heart beats: whether what it said of its mode still counts."""
-        return self.heartbeat is not None and self._now - self._beat_at <= HEARTBEAT_LOST
+        return self.heartbeat is not None and self.now - self._beat_at <= HEARTBEAT_LOST
 
     @property
     def armed(self) -> bool:
@@ -83,6 +83,21 @@ class Vehicle:
         return beat is not None and profile is not None and is_guided(profile, beat)
 
     @property
+    def mode(self) -> int:
+        """Its custom_mode, as last heard; 0 before."""
+        return 0 if self.heartbeat is None else self.heartbeat.custom_mode
+
+    @property
+    def flies(self) -> bool:
+        """Whether it may be in the air."""
+        return self.armed and self.landed_state != ON_GROUND
+
+    @property
+    def left_by_us(self) -> bool:
+        """Whether it is in the mode in which our set-points steer, or in the one in which we leave it."""
+        return self.in_guided_mode or (self.profile is not None and self.mode == self.profile.hold_mode)
+
+    @property
     def healthy(self) -> bool:
         """Whether its checks before arming have passed."""
         return self.status is not None and bool(self.status.health & PREARM_OK)
@@ -90,6 +105,6 @@ class Vehicle:
     @property
     def landed_state(self) -> int:
         """MAV_LANDED_STATE as last heard, UNDEFINED if that is too long ago."""
-        if self._extended is None or self._now - self._extended_at > HEARTBEAT_LOST:
+        if self._extended is None or self.now - self._extended_at > HEARTBEAT_LOST:
             return UNDEFINED
         return self._extended.landed_state

@@ -84,6 +84,11 @@ class Watch:
         order = list(Reaction)
         return max((c.reaction for c in self.concerns.values()), key=order.index, default=Reaction.TELL)
 
+    @property
+    def blinkered(self) -> bool:
+        """Whether what it knows of the others may be old, or what it does late."""
+        return "lateness" in self.concerns or any(name.startswith(_NEIGHBOUR) for name in self.concerns)
+
     # Each: a concern, or nothing
 
     def _judge(self, s: Situation) -> list[Concern]:
@@ -177,9 +182,10 @@ class Watch:
     def _others(self, s: Situation) -> list[Concern]:
         limit = self._config.guard.neighbour_lost_us
         lost = sorted(system for system, age in s.neighbours.items() if age > limit)
-        return [Concern(f"neighbour {system}", f"Neighbour {system} is not heard") for system in lost]
+        return [Concern(f"{_NEIGHBOUR}{system}", f"Neighbour {system} is not heard") for system in lost]
 
 
+_NEIGHBOUR = "neighbour "
 _ON_THE_GROUND = (Phase.CONNECT, Phase.DONE)
 _REMEMBERED = 5_000_000
 """µs for which what happens at one moment stays a concern."""

@@ -119,7 +119,8 @@ class World:
 
     @simulated.setter
     def simulated(self, value: bool) -> None:
-        self._own.brief = value
+        # The others' clocks follow the same simulation's, each by what it sees of it.
+        self._own.brief = self.neighbours.brief = value
 
     @property
     def clock_steps(self) -> int:

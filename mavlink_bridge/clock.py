@@ -61,32 +61,61 @@ class WallClock:
             time.sleep(left * 1e-6)
 
 
+class Account(Protocol):
+    """Where simulated time is booked that is given up: ``lost``, µs. One for all who live in the same
+    time."""
+
+    lost: int
+
+
+class _Own:
+    lost = 0
+
+
 class PacedClock:
     """Simulated time: from 0 on, ``speed`` times as fast as ``clock``. Between two waits it goes no further
     than ``stride`` (µs): what whoever runs by it cannot keep up with is given up, and counted in ``lost``
     (µs), so that nobody ever has to make up for more than a stride at once.
+
+    Copies of it in several processes show one time as long as they share an ``account``: what one of them
+    gives up is given up for all, and who is ahead then waits for the others. It is the clock's own if None.
     """
 
-    def __init__(self, clock: Clock, speed: float, stride: int) -> None:
+    def __init__(self, clock: Clock, speed: float, stride: int, account: Account | None = None) -> None:
         self._clock, self._speed, self._stride = clock, speed, stride
         self._start = clock.now()
         self._most = stride
-        self.lost = 0
+        self._latest = 0
+        self._account: Account = _Own() if account is None else account
+
+    @property
+    def start(self) -> int:
+        """What ``clock`` showed at 0."""
+        return self._start
+
+    @property
+    def lost(self) -> int:
+        """µs given up, by all."""
+        return self._account.lost
 
     def now(self) -> int:
         """Simulated time, µs."""
-        shown = int((self._clock.now() - self._start) * self._speed) - self.lost
+        passed = int((self._clock.now() - self._start) * self._speed)
+        shown = passed - self._account.lost
         if shown > self._most:
-            self.lost += shown - self._most
-            return self._most
-        return shown
+            # Never added to: two of several processes would book the same time twice.
+            self._account.lost = passed - self._most
+            shown = self._most
+        self._latest = max(self._latest, shown)
+        return self._latest
 
     def wait_until(self, instant: int) -> None:
         """Until it is ``instant`` (µs, simulated)."""
         self._most = max(self._most, instant + self._stride)
         while self.now() < instant:
             # Again and again, as what is lost meanwhile makes it later; a µs more, for the rounding.
-            self._clock.wait_until(self._start + int((instant + self.lost) / self._speed) + 1)
+            lost = self._account.lost
+            self._clock.wait_until(self._start + int((instant + lost) / self._speed) + 1)
         self._most = self.now() + self._stride
 
 

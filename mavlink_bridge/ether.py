@@ -60,14 +60,18 @@ class _Path:
         self, channel: Channel, sender: str, receiver: str, queue: _Queue, seed: int, tick: int
     ) -> None:
         self.channel, self.sender, self.receiver = channel.name, sender, receiver
-        self.faults = faults = channel.between(sender, receiver)
+        self.take(channel.between(sender, receiver))
         self.link = channel.members[receiver]
         self.queue = queue
         self.shut = 0
         self.random = Random(crc32(f"{seed}\0{channel.name}\0{sender}\0{receiver}".encode())).random
         self.held: tuple[str, int, int, Datagram] | None = None
         self.lost: bool | None = None
-        self.way = max(faults.delay, tick)
+        self.way = max(self.faults.delay, tick)
+
+    def take(self, faults: Faults) -> None:
+        """Have these from now on."""
+        self.faults = faults
         # No chance: what most datagrams of most runs go through.
         self.plain = not any((faults.jitter, faults.loss, faults.duplication, faults.reordering))
 
@@ -210,6 +214,16 @@ class Ether:
             or (inside is not None and cut.members != inside)
         ]
         self._shut()
+
+    def lose(self, channels: tuple[str, ...], share: float) -> None:
+        """From now on this ``share`` (0…1) is lost on all channels whose names begin so, each datagram by
+        itself."""
+        if not 0.0 <= share <= 1.0:
+            raise BridgeError(f"loss = {share} is not in 0…1")
+        for path in self._all_paths():
+            if path.channel.startswith(channels):
+                path.take(path.faults._replace(loss=share, burst=0.0))
+                path.lost = None
 
     def _all_paths(self) -> Iterable[_Path]:
         return (path for ways in self._paths.values() for way in ways for path in way)

@@ -23,9 +23,10 @@ class Profile(NamedTuple):
 
     ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer. ``streams_first``: set-points must
     flow before the mode is granted. ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level,
-    not above home. ``hold_params``: p1…p3 of DO_SET_MODE for the mode, ``hold_name``, in which it stays where
-    it is by itself. ``loss_modes``: what custom_mode may be when set-points were missing for too long, and
-    nobody chose it.
+    not above home. ``hold_params``: p1…p3 of DO_SET_MODE for the mode, ``hold_mode`` and ``hold_name``, in
+    which it stays where it is by itself. ``loss_modes``: what custom_mode may be when set-points were missing
+    for too long, and nobody chose it. ``takeoff_modes`` and ``land_modes``: those into which NAV_TAKEOFF,
+    where it changes the mode, and NAV_LAND lead.
     """
 
     name: str
@@ -37,8 +38,11 @@ class Profile(NamedTuple):
     streams_first: bool
     takeoff_absolute: bool
     hold_params: tuple[float, float, float]
+    hold_mode: int
     hold_name: str
+    land_modes: frozenset[int]
     loss_modes: frozenset[int] = frozenset()
+    takeoff_modes: frozenset[int] = frozenset()
 
 
 def is_guided(profile: Profile, heartbeat: Heartbeat) -> bool:

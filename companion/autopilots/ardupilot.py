@@ -15,5 +15,7 @@ ARDUPILOT = Profile(
     streams_first=False,
     takeoff_absolute=False,
     hold_params=(1.0, 17.0, 0.0),
+    hold_mode=17,
     hold_name="BRAKE",
+    land_modes=frozenset((9,)),
 )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from companion.autopilots import Profile, Step
 
+_HOLD = 4 << 16 | 3 << 24
+
 PX4 = Profile(
     name="PX4",
     autopilot=12,
@@ -14,7 +16,11 @@ PX4 = Profile(
     streams_first=True,
     takeoff_absolute=True,
     hold_params=(1.0, 4.0, 3.0),
+    hold_mode=_HOLD,
     hold_name="HOLD",
-    # COM_OBL_RC_ACT: position (or descend), hold, return, land.
-    loss_modes=frozenset((3 << 16, 4 << 16 | 3 << 24, 4 << 16 | 5 << 24, 4 << 16 | 6 << 24)),
+    # Auto land, and precision landing.
+    land_modes=frozenset((4 << 16 | 6 << 24, 4 << 16 | 9 << 24)),
+    # COM_OBL_RC_ACT may choose position, return or land as well: those a pilot chooses, too.
+    loss_modes=frozenset((_HOLD,)),
+    takeoff_modes=frozenset((4 << 16 | 2 << 24,)),
 )

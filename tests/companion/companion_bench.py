@@ -24,6 +24,7 @@ from mavlink_bridge.messages import (
     CommandAck,
     CommandInt,
     CommandLong,
+    ExtendedSysState,
     GlobalPosition,
     GpsGlobalOrigin,
     Heartbeat,
@@ -85,6 +86,7 @@ class PerfectAutopilot:
             mode = ARMED * self.armed
             answers.append(Heartbeat(AUTOPILOT, 2, self.profile.autopilot, mode, self.mode, 4))
             answers.append(SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, 12.0, self.battery))
+            answers.append(ExtendedSysState(AUTOPILOT, 0, 2 if self.position[2] > self.home[2] + 0.1 else 1))
         if now % 20_000 == 0 and not self.mute:
             answers += [self.local(boot), self.attitude(boot)]
         return b"".join(map(self._codec.encode, answers))
@@ -117,8 +119,9 @@ class PerfectAutopilot:
         elif message.command == TAKEOFF:
             height = p[6] - FLEET.altitude if self.profile.takeoff_absolute else self.home[2] + p[6]
             self._climb = height
+            self.mode = min(self.profile.takeoff_modes, default=self.mode)
         elif message.command == LAND:
-            self.landing, self.mode = True, 9
+            self.landing, self.mode = True, min(self.profile.land_modes)
         elif message.command == REQUEST and p[0] == 49:
             answers.append(GpsGlobalOrigin(AUTOPILOT, FLEET.latitude, FLEET.longitude, FLEET.altitude, 0))
         return answers

@@ -287,3 +287,23 @@ def test_each_neighbour_keeps_its_own_plan():
     for k, system in enumerate(obstacles.ids):
         assert system == 20 + k
         np.testing.assert_allclose(obstacles.positions[k], k * X + AHEAD * (k * V), atol=0.01)
+
+
+FLOWN_ON = 3_000_000
+WARY = CONFIG.model_copy(update={"guard": CONFIG.guard.model_copy(update={"flown_on_us": FLOWN_ON})})
+
+
+@LAWS
+@given(vectors(3.0), st.integers(0, 20_000_000), numbers(0.0, 1.0))
+def test_a_silent_neighbour_is_wherever_it_stopped_or_was_flown_on_to(v, age, share):
+    stale = WARY.guard.plan_stale_us
+    before, found = (hearing(position(X, v), config=config).obstacles(NOW + age) for config in (CONFIG, WARY))
+    flown = 1e-6 * (stale + share * (min(max(age, stale), FLOWN_ON) - stale))
+    if age <= stale:
+        np.testing.assert_array_equal(found.positions, before.positions)
+        assert found.d_min[0] == before.d_min[0]
+        return
+    # Wherever on that way it is, it is kept away from as far as if it were known to be there.
+    off = np.linalg.norm(found.positions[0, 0] - (X + flown * v))
+    assert off + before.d_min[0] <= found.d_min[0] + 2 * GRAIN + 0.05 * np.linalg.norm(v)
+    assert found.d_safe[0] - found.d_min[0] == pytest.approx(before.d_safe[0] - before.d_min[0])

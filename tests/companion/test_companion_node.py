@@ -335,6 +335,35 @@ def test_out_of_the_tube_the_plan_starts_anew_where_the_vehicle_is(flying):
     assert np.linalg.norm(place(setpoints(sent)[-1]) - held) <= tube + 0.05
 
 
+def test_whatever_speed_it_is_measured_at_nothing_faster_than_the_limits_is_asked_for(flying):
+    """The own autopilot, or who speaks in its name, says that it is elsewhere and very fast."""
+    limits, autopilot, sent = flying.config.limits, flying.autopilot, []
+    autopilot.mute = True
+    for _ in range(200):
+        there = autopilot.local(flying.now - START)._replace(velocity_ned=(20.0, -15.0, 3.0))
+        x, y, z = there.position_ned
+        there = there._replace(position_ned=(x + 30.0, y, z))
+        sent += only(SetpointLocal, flying.step(flying.datagram("autopilot", there)), "autopilot")
+    assert sent
+    assert max(math.hypot(*m.velocity) for m in sent) <= math.hypot(*limits.v_max) + 1e-6
+
+
+def test_after_it_hung_the_plan_starts_anew_where_the_vehicle_is(flying):
+    """The autopilot has stopped meanwhile, or drifted: the old plan leads from elsewhere."""
+    flying.go_to([6.0, 3.0, 6.0])
+    flying.fly(1.0)
+    gap = flying.config.guard.hold_us + 100_000
+    flying.now += gap + -gap % 20_000
+    flying.autopilot.position = flying.autopilot.position - np.array([1.5, 1.5, 0.0])
+    flying.autopilot.velocity = np.zeros(3)
+    for tick in range(20):
+        # What waited for it is old.
+        flying.autopilot.mute = tick < 2
+        here = flying.autopilot.position.copy()
+        for sent in setpoints(flying.step()):
+            assert np.linalg.norm(place(sent) - here) < 0.2
+
+
 def test_taken_over_by_its_mode_switch_it_is_silent_and_then_starts_where_it_is(flying):
     autopilot, profile = flying.autopilot, flying.autopilot.profile
     flying.go_to([4.0, 0.0, 5.0])
@@ -351,7 +380,9 @@ def test_taken_over_by_its_mode_switch_it_is_silent_and_then_starts_where_it_is(
     flying.fly(1.0)
     here = autopilot.position.copy()
     autopilot.mode = profile.guided_custom_mode
-    first = setpoints(flying.fly(0.2))[0]
+    assert setpoints(flying.fly(1.0)) == []
+    flying.order(TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
+    first = setpoints(flying.fly(2.0))[0]
     np.testing.assert_allclose(place(first), here, atol=0.02)
     assert math.remainder(math.pi / 2 - first.yaw - 2.5, math.tau) == pytest.approx(0.0, abs=0.02)
 

@@ -44,15 +44,19 @@ def state(height=0.0, speed=0.0, age=5_000):
     return State(np.array([0.0, 0.0, GROUND + height]), np.array([0.0, 0.0, speed]), age)
 
 
-def beat(flavour, armed=False, guided=False, autopilot=None):
+def beat(flavour, armed=False, guided=False, autopilot=None, mode=0):
     profile = PROFILES[flavour]
-    mode = profile.guided_custom_mode if guided else 0
+    mode = profile.guided_custom_mode if guided else mode
     kind = profile.autopilot if autopilot is None else autopilot
     return Heartbeat(AUTOPILOT, 2, kind, ARMED * armed, mode, 4)
 
 
 def ack(command, result=0):
     return CommandAck(AUTOPILOT, command, result, 0, 0, *OWN)
+
+
+def landed(state_of_landing):
+    return ExtendedSysState(AUTOPILOT, 0, state_of_landing)
 
 
 NOTHING = View(None, None, None, None)
@@ -155,7 +159,7 @@ def test_connecting_waits_and_names_what_is_missing(name):
 def test_nothing_is_armed_without_a_go(flavour):
     rig = Rig(flavour)
     sent = rig.run(20.0, beat(flavour), HEALTHY, acks=True)
-    assert {command for command, _ in sent} == {INTERVAL}
+    assert {command for command, _ in sent} == {INTERVAL, REQUEST}
     assert rig.pilot.phase is Phase.CONNECT
 
 
@@ -251,11 +255,14 @@ def test_an_autopilot_that_answers_no_request_is_asked_for_every_stream():
     assert any(command == REQUEST and params[0] == 49.0 for command, params in sent)
 
 
-def test_a_command_without_effect_is_asked_again_though_acknowledged():
-    rig = Rig().prepared()
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_command_without_effect_is_asked_again_though_acknowledged(flavour):
+    rig = Rig(flavour).escorting()
+    rig.pilot.land()
+    rig.pilot.settled()
     rig.sent.clear()
-    rig.run(40.0, beat("ardupilot"), acks=True)
-    times = [now for now, command, _ in rig.sent if command == MODE]
+    rig.run(40.0, beat(flavour, armed=True, guided=True), acks=True)
+    times = [now for now, command, _ in rig.sent if command == LAND]
     assert len(times) == 3
     assert min(np.diff(times)) > 10_000_000
 
@@ -304,7 +311,7 @@ def test_an_order_to_land_takes_an_earlier_go_back():
     assert rig.pilot.go(HEIGHT)
     assert rig.pilot.land()
     rig.view = READY
-    assert {command for command, _ in rig.run(5.0, BEAT, HEALTHY, acks=True)} == {INTERVAL}
+    assert {command for command, _ in rig.run(5.0, BEAT, HEALTHY, acks=True)} == {INTERVAL, REQUEST}
     assert rig.pilot.phase is Phase.CONNECT
 
 
@@ -350,7 +357,8 @@ def test_landing_goes_through_settling_and_ends_disarmed(flavour):
     assert not rig.pilot.streaming
     sent = rig.run(1.0, flying)
     assert [command for command, _ in sent] == [LAND, LAND]
-    rig.run(2.0, beat(flavour, armed=True), acks=True)
+    landing = beat(flavour, armed=True, mode=min(PROFILES[flavour].land_modes))
+    assert rig.run(40.0, landing, acks=True) == []
     assert rig.pilot.phase is Phase.LAND
     rig.tick(beat(flavour))
     assert rig.pilot.phase is Phase.DONE
@@ -367,19 +375,152 @@ def test_only_who_settles_can_have_settled(phase):
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("landing", [False, True])
-def test_who_takes_the_vehicle_over_by_its_mode_switch_has_it_until_they_give_it_back(flavour, landing):
-    """Nothing is sent, nothing is ordered back."""
+def test_who_takes_the_vehicle_over_by_its_mode_switch_has_it_until_a_new_go(flavour, landing):
+    """Nothing is sent, nothing is ordered back; not when its mode is ours again either: that may be a ground
+    station that flies it."""
     rig = Rig(flavour).escorting()
-    before = Phase.ESCORT
     if landing:
         rig.pilot.land()
-        before = Phase.SETTLE
     assert rig.run(60.0, beat(flavour, armed=True, guided=False)) == []
     assert rig.pilot.phase is Phase.YIELDED
     assert not rig.pilot.streaming
-    rig.tick(beat(flavour, armed=True, guided=True))
-    assert rig.pilot.phase is before
-    assert rig.pilot.streaming
+    assert rig.run(60.0, beat(flavour, armed=True, guided=True)) == []
+    assert rig.pilot.phase is Phase.YIELDED
+    assert not rig.pilot.streaming
+    assert not rig.pilot.land()
+    assert not rig.pilot.come_back()
+    assert not rig.pilot.hold()
+
+
+# A pilot on the way up and down
+
+
+HOLD = {flavour: profile.hold_mode for flavour, profile in PROFILES.items()}
+MANUAL = {"ardupilot": (0, 2, 5, 6, 16), "px4": (1 << 16, 2 << 16, 3 << 16, 4 << 16 | 5 << 24)}
+
+
+def climbing(flavour, height):
+    """Armed, told to take off, ``height`` up."""
+    rig = Rig(flavour).prepared()
+    up = beat(flavour, armed=True, guided=flavour == "ardupilot")
+    rig.run(0.5, up, landed(1), acks=True)
+    rising = beat(flavour, armed=True, mode=min(PROFILES[flavour].takeoff_modes, default=4))
+    rig.view = READY._replace(own=state(height, 1.0))
+    rig.run(0.5, rising, landed(3), acks=True)
+    assert rig.pilot.phase is Phase.PREPARE
+    return rig
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("height", [0.3 * HEIGHT, 0.9 * HEIGHT])
+def test_who_takes_it_over_on_the_way_up_has_it(flavour, height):
+    for mode in MANUAL[flavour]:
+        rig = climbing(flavour, height)
+        assert rig.run(60.0, beat(flavour, armed=True, mode=mode), landed(2)) == []
+        assert rig.pilot.phase is Phase.YIELDED
+        assert not rig.pilot.streaming
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_pause_on_the_way_up_is_somebodys_will_and_the_end_of_it_is_not(flavour):
+    """PX4 holds when it has risen."""
+    rig = climbing(flavour, 0.5 * HEIGHT)
+    held = beat(flavour, armed=True, mode=HOLD[flavour])
+    assert rig.run(10.0, held, landed(2)) == []
+    assert rig.pilot.phase is Phase.YIELDED
+    rig = climbing("px4", 0.95 * HEIGHT)
+    held = beat("px4", armed=True, mode=HOLD["px4"])
+    rig.view = READY._replace(own=state(HEIGHT))
+    assert MODE in {command for command, _ in rig.run(5.0, held, landed(2))}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_who_takes_it_over_on_the_way_down_has_it(flavour):
+    for before in (0.0, 1.0):
+        for mode in MANUAL[flavour]:
+            rig = Rig(flavour).escorting()
+            rig.pilot.land()
+            rig.pilot.settled()
+            landing = beat(flavour, armed=True, mode=min(PROFILES[flavour].land_modes))
+            rig.run(before, landing, landed(2), acks=True)
+            assert rig.run(60.0, beat(flavour, armed=True, mode=mode), landed(2)) == []
+            assert rig.pilot.phase is Phase.YIELDED
+
+
+def test_a_mode_switched_away_on_the_ground_takes_the_go_back():
+    rig = Rig("ardupilot").prepared()
+    rig.run(0.2, beat("ardupilot", guided=True), HEALTHY, acks=True)
+    rig.run(0.2, beat("ardupilot"), HEALTHY, acks=True)
+    sent = rig.run(30.0, beat("ardupilot", guided=True), HEALTHY, acks=True)
+    assert not {command for command, _ in sent} & {ARM, MODE, TAKEOFF}
+    assert rig.pilot.waiting_for == "the operator's go"
+
+
+@pytest.mark.parametrize("mode", [0, 3 << 16, HOLD["px4"]])
+def test_what_happened_while_nothing_was_heard_may_have_been_a_pilot(mode):
+    rig = Rig("px4").escorting()
+    rig.pilot.streamed(rig.now)
+    rig.run(4.0)
+    assert rig.run(10.0, beat("px4", armed=True, mode=mode)) == []
+    assert rig.pilot.phase is Phase.YIELDED
+
+
+# A go does not keep
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_go_that_came_too_early_is_forgotten(flavour):
+    rig = Rig(flavour)
+    assert rig.pilot.go(HEIGHT)
+    rig.run(10.5, beat(flavour), ILL, acks=True)
+    sent = rig.run(30.0, beat(flavour), HEALTHY, acks=True)
+    assert not {command for command, _ in sent} & {ARM, MODE, TAKEOFF}
+    assert rig.pilot.waiting_for == "the operator's go"
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_vehicle_that_does_not_arm_is_not_told_to_for_ever(flavour):
+    rig = Rig(flavour).prepared()
+    guided = beat(flavour, guided=flavour == "ardupilot")
+    rig.run(11.0, guided, HEALTHY, ack(ARM, result=4))
+    rig.sent.clear()
+    rig.run(60.0, guided, HEALTHY, ack(ARM, result=4))
+    assert not {command for _, command, _ in rig.sent} & {ARM, MODE, TAKEOFF}
+
+
+# Where it may start
+
+
+@pytest.mark.parametrize(
+    ("place", "allowed"),
+    [
+        ((0.0, 0.0, 0.0), True),
+        ((45.0, 0.0, 0.0), True),
+        ((0.0, 0.0, -20.0), True),
+        ((400.0, 0.0, 0.0), False),
+        ((0.0, -400.0, 0.0), False),
+        ((0.0, 0.0, -458.0), False),
+        ((0.0, 0.0, 60.0), False),
+        ((math.nan, 0.0, 0.0), False),
+    ],
+)
+def test_a_vehicle_far_from_the_box_does_not_start(place, allowed):
+    rig = Rig("px4", READY._replace(own=State(np.array(place), np.zeros(3), 5_000)))
+    rig.run(0.2, beat("px4"), HEALTHY, acks=True)
+    assert rig.pilot.go(HEIGHT)
+    sent = rig.run(5.0, beat("px4"), HEALTHY, acks=True)
+    assert (ARM in {command for command, _ in sent}) == allowed
+    assert allowed or "a start near the box" in rig.pilot.waiting_for
+
+
+@pytest.mark.parametrize("left", [0.19, 0.02])
+def test_with_a_low_battery_nothing_starts(left):
+    rig = Rig("px4")
+    low = HEALTHY._replace(battery_remaining=left)
+    assert rig.pilot.go(HEIGHT)
+    sent = rig.run(5.0, beat("px4"), low, acks=True)
+    assert ARM not in {command for command, _ in sent}
+    assert rig.pilot.waiting_for == "a battery above 20 %"
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -389,7 +530,7 @@ def test_a_new_go_takes_the_vehicle_back_in_flight_and_asks_for_the_mode_alone(f
     assert rig.pilot.phase is Phase.YIELDED
     assert rig.pilot.go(HEIGHT)
     sent = rig.run(3.0, beat(flavour, armed=True), HEALTHY, IN_FLIGHT, acks=True)
-    assert {command for command, _ in sent} == {INTERVAL, MODE}
+    assert {command for command, _ in sent} == {INTERVAL, REQUEST, MODE}
     rig.run(0.2, beat(flavour, armed=True, guided=True))
     assert rig.pilot.phase is Phase.ESCORT
 
@@ -402,7 +543,7 @@ def test_who_disarms_it_ends_the_flight(flavour, guided):
     rig.run(0.1, beat(flavour, guided=guided))
     assert rig.pilot.phase is Phase.CONNECT
     sent = rig.run(3.0, beat(flavour, armed=True, guided=True), HEALTHY, IN_FLIGHT, acks=True)
-    assert {command for command, _ in sent} == {INTERVAL}
+    assert {command for command, _ in sent} == {INTERVAL, REQUEST}
     assert rig.pilot.waiting_for == "the operator's go"
     assert not rig.pilot.streaming
 
@@ -527,10 +668,6 @@ def test_disarmed_on_the_way_up_it_does_not_arm_again_without_a_new_go(flavour):
 
 
 # A vehicle that flies already
-
-
-def landed(state_of_landing):
-    return ExtendedSysState(AUTOPILOT, 0, state_of_landing)
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -164,6 +164,19 @@ def test_with_a_critical_battery_it_lands_where_it_is(flying):
     assert np.linalg.norm(flying.autopilot.position[:2] - here[:2]) < 1.0
 
 
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+@pytest.mark.parametrize("left", [0.15, 0.05])
+def test_what_begins_on_the_way_up_is_not_forgotten_at_the_top(flavour, left):
+    bench = Bench(flavour)
+    bench.fly(1.0)
+    bench.order(TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
+    while bench.phase is not Phase.PREPARE or not bench.autopilot.armed:
+        bench.step()
+    bench.autopilot.battery = left
+    sent = bench.fly(15.0)
+    assert LAND in commands(sent)
+
+
 def test_an_operator_may_go_on_in_spite_of_a_low_battery(flying):
     flying.go_to([6.0, 3.0, 6.0])
     flying.fly(5.0)
@@ -203,3 +216,18 @@ def test_the_ground_is_told_of_what_begins_and_of_what_is_over():
     bench.autopilot.battery = 0.5
     texts = [m.text for m in only(StatusText, bench.fly(3.0), "ground")]
     assert texts == ["Over: Battery 15 %"]
+
+
+def test_who_misses_a_neighbour_flies_about_slowly():
+    guard = GUARD.model_copy(update={"cautious_speed": 1.0})
+    bench = Bench(guard=guard.model_dump()).take_off(5.0)
+    bench.fly(1.0, bench.datagram("swarm", seen_at(12, [0.0, 15.0, 5.0])))
+    bench.fly(GUARD.neighbour_lost_us * 1e-6 + 0.5)
+    assert bench.companion.watch.blinkered
+    bench.go_to([8.0, 0.0, 5.0])
+    fastest = 0.0
+    for _ in range(40):
+        before = bench.autopilot.position.copy()
+        bench.fly(0.1)
+        fastest = max(fastest, float(np.linalg.norm(bench.autopilot.position - before)) / 0.1)
+    assert 0.4 < fastest < 2.0

@@ -109,3 +109,32 @@ def test_what_is_lost_is_what_is_missing() -> None:
     assert clock.lost == 19_000
     clock.wait_until(1_500)
     assert wall.now() == pytest.approx(10_250, abs=2)
+
+
+class Common:
+    """An account that several clocks share."""
+
+    lost = 0
+
+
+TOGETHER = st.lists(st.tuples(st.booleans(), st.integers(0, 10**6), st.integers(0, 10**5)), max_size=20)
+
+
+@given(SPEEDS, st.integers(1, 10**6), TOGETHER)
+def test_who_share_an_account_live_in_one_time(
+    speed: float, stride: int, turns: list[tuple[bool, int, int]]
+) -> None:
+    wall, account = SimulatedClock(10**15), Common()
+    one, other = (PacedClock(wall, speed, stride, account) for _ in range(2))
+    for first, busy, ahead in turns:
+        clock = one if first else other
+        wall.wait_until(wall.now() + busy)
+        before = clock.now(), account.lost
+        clock.wait_until(before[0] + ahead)
+        # What is lost is lost for both, once; time goes back for neither.
+        assert clock.now() >= before[0]
+        assert account.lost >= before[1]
+        assert one.lost == other.lost
+    for clock in (one, other):
+        clock.wait_until(max(one.now(), other.now()))
+    assert abs(one.now() - other.now()) <= stride

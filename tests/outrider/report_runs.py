@@ -69,6 +69,7 @@ def leave(
     np.savez_compressed(
         directory / "flight.npz",
         system=np.arange(11, 11 + vehicles),
+        start_us=np.int64(BOOT + round(1e6 * BEFORE)),
         time_s=time,
         position=position.astype(np.float32),
         velocity=velocity.astype(np.float32),
@@ -86,7 +87,8 @@ def leave(
         directory / "plans.npz", system=system, time_s=np.tile(plans, vehicles), gradient=gradient
     )
     spent = np.linspace(0.2, 0.4, len(system))
-    np.savez_compressed(directory / "plan_times.npz", system=system, plan_ms=spent)
+    due = np.tile(plans, vehicles)
+    np.savez_compressed(directory / "plan_times.npz", system=system, time_s=due, plan_ms=spent)
     if logs:
         _write_logs(directory, vehicles, seconds, lost, text, late or {})
     return Made(directory, time, position)

@@ -32,7 +32,7 @@ from outrider.hangar.figures import factor
 from outrider.hangar.modes import mode_name
 from outrider.hangar.request import Options, Request, checked
 from outrider.hangar.screen import Screen
-from outrider.hangar.squad import SPREAD, Squad
+from outrider.hangar.squad import SPREAD, Squad, boot_times
 from outrider.hangar.traffic import Traffic
 from outrider.hangar.watch import watching
 
@@ -45,11 +45,12 @@ class Field:
 
     def __init__(self, asked: Request, indices: Sequence[int], state: Path | None = None) -> None:
         self.cabinet = Cabinet(state, asked.flavour)
+        boots = boot_times(indices, asked.speed, PERIOD)
         vehicles = {
             index: asked.autopilot(index, 0, self.cabinet.saved(asked.systems[index])) for index in indices
         }
         self.board = Board(asked.count, 1)
-        self.squad = Squad(vehicles, asked.first_id, self.board, asked.speed)
+        self.squad = Squad(vehicles, boots, asked.first_id, self.board, asked.speed)
         self.now = 0
         self._codec = Codec()
 

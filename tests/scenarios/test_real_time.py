@@ -4,8 +4,10 @@ timing, as a busy machine is late."""
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,11 @@ from outrider.conductor import Stage
 from outrider.realtime.flight import RealTimeFlight
 from outrider.resources import config_root
 from outrider.summary import Cost, exit_status, summarise
+from outrider.viewing.line import Line, pair
+from outrider.viewing.moment import Moment
+from outrider.viewing.orders import Change
+from outrider.viewing.realtime import RealTimeView
+from outrider.viewing.wishes import Wishes, encoded
 
 LOGS = config_root() / "logs"
 SMALL: dict[str, Any] = {
@@ -113,3 +120,39 @@ def test_an_interrupt_lands_and_leaves_whole_logs(tmp_path: Path) -> None:
     assert exit_status(summarise(outcome, Cost(1.0, 1.0), tmp_path)) == 1
     for system in outcome.systems:
         assert read_tlog(tmp_path / f"vehicle-{system}.tlog").report.skipped_bytes == 0
+
+
+@pytest.mark.slow
+def test_a_flight_in_real_time_with_a_view(tmp_path: Path) -> None:
+    """Somebody looks on, changes methods, loss and target in mid-flight, and is gone before the end."""
+    ours, theirs = (Line(end) for end in pair())
+    place = (1.0, 2.0, 4.0)
+    seen: list[Moment] = []
+
+    class Watched(RealTimeView):
+        def changes(self, seconds: float | None) -> Iterator[Change]:
+            seen.extend(pickle.loads(data) for data in theirs.receive())
+            if seconds is not None and seconds > 0.5:
+                theirs.send(encoded(Wishes(methods="swivel", loss=0.5, target=place, moves=1)))
+            if seconds is not None and seconds > 1.5:
+                theirs.close()
+            return super().changes(seconds)
+
+    view = Watched(ours)
+    flight = RealTimeFlight(scenario("antipodal-8", SMALL), FIREFLY, 1, LOGS, tmp_path, view=view)
+    flight.run()
+    outcome = flight.outcome
+    assert outcome.failure is None
+    # Not one for each sample; and every vehicle was there, with its plan and attitude.
+    assert len(seen) > 5
+    last = seen[-1]
+    assert np.isfinite(last.position).all()
+    assert np.isfinite(last.plan).all()
+    np.testing.assert_allclose(np.linalg.norm(last.attitude, axis=1), 1.0, atol=1e-5)
+    assert all(state.mode.startswith("escort") for state in last.states)
+    (_, change), *more = view.orders.given
+    assert not more
+    assert change == Change("swivel", 0.5, place)
+    np.testing.assert_allclose(outcome.truth.samples().target[-1], place)
+    assert outcome.messages.dropped > 0
+    ours.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Final, Optional, cast
 
@@ -28,6 +29,7 @@ _EXTRAS: Final = {
     "jsbsim": "sitl",
     "mcap": "export",
     "pyarrow": "export",
+    "viser": "view",
 }
 """What only an extra of the package installs."""
 # Click's UsageError: typer has no name of its own for it, and newer ones bring their own click.
@@ -59,6 +61,7 @@ def swarm(
     realtime: Annotated[
         bool, typer.Option("--realtime", help="Ask for real-time priority; implies --real-time.")
     ] = False,
+    view: Annotated[bool, typer.Option("--view", help="Watch it in the browser (docs/view.md).")] = False,
     out: Annotated[Optional[Path], typer.Option(help="Run directory; new or empty.")] = None,  # noqa: UP045
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
@@ -73,16 +76,50 @@ def swarm(
         method, avoidance, planar, vehicles, loss, delay_ms, sensors, replan_hz, wind, physics
     )
     prepared = flying.prepare(scenario, options)
-    directory = flying.run_directory(out, prepared.scenario, seed)
-    with progress(prepared.scenario.duration_s) as watch:
-        pace = flying.Pace(real_time or realtime, realtime)
-        summary = flying.fly(prepared, seed, directory, watch, pace)
-    write(directory / NAME, make(directory).text)
-    if as_json:
-        sys.stdout.write(json.dumps(summary) + "\n")
-    else:
-        show(summary)
+    with ExitStack() as open_:
+        shown = None
+        if view:
+            from outrider.viewing.show import showing
+
+            shown = open_.enter_context(showing())
+        directory = flying.run_directory(out, prepared.scenario, seed)
+        with progress(prepared.scenario.duration_s) as watch:
+            pace = flying.Pace(real_time or realtime, realtime)
+            summary = flying.fly(prepared, seed, directory, watch, pace, shown)
+        write(directory / NAME, make(directory).text)
+        if as_json:
+            sys.stdout.write(json.dumps(summary) + "\n")
+            sys.stdout.flush()
+        else:
+            show(summary)
+        if shown is not None:
+            shown.stay(directory)
     raise typer.Exit(exit_status(summary))
+
+
+@app.command()
+def view(
+    sources: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="RUN_DIR|ENDPOINT…", help="What a flight left; or what is listened to: udpin:…, mcast:, …"
+        ),
+    ],
+    host: Annotated[str, typer.Option(help="Interface to serve the page at.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Or the next that is free.")] = 8080,
+    target: Annotated[int, typer.Option(min=1, max=255, help="System id of what is escorted.")] = 10,
+    html: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Write the run as one file that plays anywhere, and end."),
+    ] = None,
+    seconds: Annotated[Optional[float], typer.Option(min=0.0, help="End by itself after that.")] = None,  # noqa: UP045
+) -> None:
+    """Show vehicles in the browser, in three dimensions: a run that is played, or a live flight that is
+    listened to; nothing is sent there."""
+    from outrider.viewing.command import Terms
+    from outrider.viewing.command import view as viewing
+
+    raise typer.Exit(viewing(sources, Terms(host, port, target, html, seconds)))
 
 
 @app.command()

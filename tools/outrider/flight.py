@@ -35,13 +35,15 @@ _LONGEST = 10_000_000_000
 """µs; the conductor ends every flight long before."""
 
 Progress = Callable[[Stage, float], None]
+Onlooker = Callable[["Flight", int], None]
+"""Hears of every sample (µs), after all nodes have stepped."""
 
 
 class Flight:
     """Builds the nodes of a scenario for one seed, and runs them.
 
     ``progress`` hears the stage and simulated seconds; with a ``run_directory`` each vehicle leaves a tlog
-    there. ``stopwatch`` (ns) measures planning.
+    there. ``stopwatch`` (ns) measures planning; the ``onlooker`` may change what is public.
     """
 
     def __init__(
@@ -54,6 +56,7 @@ class Flight:
         reverse_nodes: bool = False,
         run_directory: Path | None = None,
         stopwatch: Callable[[], int] = time.thread_time_ns,
+        onlooker: Onlooker | None = None,
     ) -> None:
         self.scenario, self.seed = scenario, seed
         self.fleet = fleet = Fleet(scenario, vehicle, seed, logs)
@@ -71,6 +74,7 @@ class Flight:
         self._progress = progress
         self._reverse = reverse_nodes
         self._directory = run_directory
+        self._onlooker = onlooker
         self._events = deque(events(scenario))
         self._vanished: set[int] = set()
         self._tally_at_start: list[Tally] = []
@@ -137,6 +141,8 @@ class Flight:
             self._begin(now)
         if conductor.clock_end is not None and not self._tally_at_end:
             self._tally_at_end = [c.tally for c in self.companions]
+        if self._onlooker is not None:
+            self._onlooker(self, now)
         return over
 
     def _begin(self, now: int) -> None:

@@ -17,20 +17,33 @@ from outrider.errors import Fault, InputError
 
 
 class StepsFile:
-    """Collects the times (µs) of steps, and writes them to ``path`` when it is closed."""
+    """Collects the times (µs) of steps, and writes them to ``path`` when it is closed. Steps come at the same
+    gap as a rule: it keeps each gap once, with how often it came in succession, so that it takes next to
+    nothing of a day."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._times = array("q")
+        self._first: int | None = None
+        self._last = 0
+        self._gaps, self._counts = array("q"), array("q")
 
     def add(self, now: int) -> None:
         """A step at ``now`` (µs)."""
-        self._times.append(now)
+        if self._first is None:
+            self._first = self._last = now
+            return
+        gap, self._last = now - self._last, now
+        if self._gaps and self._gaps[-1] == gap:
+            self._counts[-1] += 1
+        else:
+            self._gaps.append(gap)
+            self._counts.append(1)
 
     def close(self) -> None:
         """Write them: the first time, and the gaps, which compress to almost nothing."""
-        times = np.array(self._times, dtype=np.int64)
-        np.savez_compressed(self._path, first=times[:1], gaps=np.diff(times))
+        first = np.array([] if self._first is None else [self._first], dtype=np.int64)
+        gaps = np.repeat(np.array(self._gaps, dtype=np.int64), np.array(self._counts, dtype=np.int64))
+        np.savez_compressed(self._path, first=first, gaps=gaps)
 
 
 def read_steps(path: Path) -> NDArray[np.int64]:

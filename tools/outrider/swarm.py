@@ -7,7 +7,7 @@ import sys
 import time
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import yaml
 
@@ -28,6 +28,9 @@ from outrider.summary import WALL_FIELDS, Cost, Value, summarise, write
 from outrider.targets import load as load_log
 from outrider.yaml_file import load
 from sitl.config import VehicleConfig
+
+if TYPE_CHECKING:
+    from outrider.viewing.show import Show
 
 __all__ = [
     "LOCK_STEP",
@@ -86,10 +89,15 @@ def prepare(name: str, options: Options) -> Prepared:
 
 
 def fly(
-    prepared: Prepared, seed: int, directory: Path, progress: Progress, pace: Pace = LOCK_STEP
+    prepared: Prepared,
+    seed: int,
+    directory: Path,
+    progress: Progress,
+    pace: Pace = LOCK_STEP,
+    show: Show | None = None,
 ) -> dict[str, Value]:
-    """Fly it, and leave logs, the resolved configuration, the summary and the picture in ``directory``.
-    OutriderError if somebody stops it."""
+    """Fly it, and leave logs, the resolved configuration, the summary and the picture in ``directory``;
+    ``show`` it meanwhile. OutriderError if somebody stops it."""
     with interruptible(f"{directory} keeps the configuration and the logs up to there, but no summary"):
         scenario = prepared.scenario
         resolved = {"seed": seed, "scenario": scenario.model_dump(mode="json")}
@@ -97,9 +105,11 @@ def fly(
             yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True), encoding="utf-8"
         )
         if pace.real_time:
-            outcome, cost = _flown_in_real_time(prepared, seed, progress, directory, pace)
+            outcome, cost = _flown_in_real_time(prepared, seed, progress, directory, pace, show)
         else:
-            outcome, cost = _flown(prepared, seed, progress, directory)
+            outcome, cost = _flown(prepared, seed, progress, directory, show)
+        if show is not None:
+            show.orders.write(directory)
         summary = summarise(outcome, cost, directory)
         write(summary, directory / "summary.json")
         write_plans(outcome, directory / "plans.npz")
@@ -124,21 +134,36 @@ def measured(prepared: Prepared, seed: int) -> tuple[Outcome, dict[str, Value]]:
     return outcome, {key: value for key, value in summary.items() if key not in WALL_FIELDS}
 
 
-def _flown(prepared: Prepared, seed: int, progress: Progress, directory: Path | None) -> tuple[Outcome, Cost]:
+def _flown(
+    prepared: Prepared, seed: int, progress: Progress, directory: Path, show: Show | None
+) -> tuple[Outcome, Cost]:
     wall, cpu = time.perf_counter(), time.process_time()
-    flight = Flight(*prepared, seed, config_root() / "logs", progress=progress, run_directory=directory)
+    flight = Flight(
+        *prepared,
+        seed,
+        config_root() / "logs",
+        progress=progress,
+        run_directory=directory,
+        onlooker=None if show is None else show.lock_step(prepared, seed),
+    )
     flight.run()
     return flight.outcome, Cost(time.perf_counter() - wall, time.process_time() - cpu)
 
 
 def _flown_in_real_time(
-    prepared: Prepared, seed: int, progress: Progress, directory: Path, pace: Pace
+    prepared: Prepared, seed: int, progress: Progress, directory: Path, pace: Pace, show: Show | None
 ) -> tuple[Outcome, Cost]:
     from outrider.realtime.flight import RealTimeFlight
 
     wall, cpu = time.perf_counter(), _cpu_of_all()
     flight = RealTimeFlight(
-        *prepared, seed, config_root() / "logs", directory, progress, priority=pace.priority
+        *prepared,
+        seed,
+        config_root() / "logs",
+        directory,
+        progress,
+        priority=pace.priority,
+        view=None if show is None else show.real_time(prepared, seed),
     )
     flight.run()
     if flight.priority_told:

@@ -29,7 +29,19 @@ SHORT = 1.0
 """s; a log may end this much before the piece that is wanted of it does."""
 
 
-class Target(Protocol):
+class Placed(Protocol):
+    """What has a known truth."""
+
+    def begin(self, now: int) -> None:
+        """The goal event: jump, or start the record."""
+        ...
+
+    def position(self, now: int) -> Array | None:
+        """True position (3,), fleet-local ENU, at ``now`` (µs); None when it is not there."""
+        ...
+
+
+class Target(Placed, Protocol):
     """A node with a known truth."""
 
     @property
@@ -46,12 +58,8 @@ class Target(Protocol):
         """As every node."""
         ...
 
-    def begin(self, now: int) -> None:
-        """The goal event: jump, or start the record."""
-        ...
-
-    def position(self, now: int) -> Array | None:
-        """True position (3,), fleet-local ENU, at ``now`` (µs); None when it is not there."""
+    def move(self, now: int, place: Array) -> None:
+        """It is suddenly at ``place`` (3,) at ``now``, and goes its way from there."""
         ...
 
 
@@ -79,6 +87,11 @@ class Standing:
         self._move(now)
         return self._place
 
+    def move(self, now: int, place: Array) -> None:
+        """Stand there from now on."""
+        self._move(now)
+        self._jump(now, np.array(place))
+
     def _move(self, now: int) -> None:
         while self._jumps and self._jumps[0][0] <= now:
             self._jump(*self._jumps.popleft())
@@ -103,6 +116,7 @@ class Walking:
 
     def __init__(self, config: PathTarget, fleet: FleetFrame) -> None:
         self._walk = Walk(ClosedPath(np.array(config.through)), config.speed, config.setting_out)
+        self._aside: Array | None = None
         self._beacon = Beacon(TARGET_SYSTEM, LINK, config.rate_hz, fleet)
 
     def begin(self, now: int) -> None:
@@ -111,17 +125,25 @@ class Walking:
 
     def motion(self, now: int) -> Motion:
         """True position and velocity at ``now`` (µs)."""
-        return self._walk.motion(now)
+        motion = self._walk.motion(now)
+        if self._aside is None:
+            return motion
+        return motion._replace(position=motion.position + self._aside)
 
     def position(self, now: int) -> Array | None:
         """Where it is."""
-        return self._walk.motion(now).position
+        return self.motion(now).position
+
+    def move(self, now: int, place: Array) -> None:
+        """The whole path moves along."""
+        self._aside = (0.0 if self._aside is None else self._aside) + place - self.motion(now).position
+        self._beacon.hasten(now)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Its position and velocity, at its rate."""
         if not self._beacon.due(now):
             return []
-        return self._beacon.say(now, self._walk.motion(now))
+        return self._beacon.say(now, self.motion(now))
 
 
 class Recording(NamedTuple):
@@ -144,6 +166,8 @@ class Recorded:
         self._fleet = fleet
         self._start: int | None = None
         self._next = 0
+        self._aside: Array | None = None
+        self._codec = Codec()
 
     def begin(self, now: int) -> None:
         """The record starts now."""
@@ -156,7 +180,14 @@ class Recorded:
         since = 0 if self._start is None else now - self._start
         if since > times[-1]:
             return None
-        return np.array([np.interp(since, times, places[:, i]) for i in range(3)])
+        there = np.array([np.interp(since, times, places[:, i]) for i in range(3)])
+        return there if self._aside is None else there + self._aside
+
+    def move(self, now: int, place: Array) -> None:
+        """The rest of the record moves along; it is no longer byte for byte what was recorded."""
+        here = self.position(now)
+        if here is not None:
+            self._aside = (0.0 if self._aside is None else self._aside) + place - here
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Every frame whose time has come, byte for byte."""
@@ -165,8 +196,21 @@ class Recorded:
             return out
         times, frames = self.recording.times, self.recording.frames
         while self._next < len(frames) and times[self._next] <= now - self._start:
-            out.append(Datagram(LINK, frames[self._next]))
+            out.append(Datagram(LINK, self._told(frames[self._next])))
             self._next += 1
+        return out
+
+    def _told(self, frame: bytes) -> bytes:
+        """The frame, with the place in it that the target was moved to."""
+        if self._aside is None:
+            return frame
+        out = b""
+        for message in self._codec.feed(frame, whole=True):
+            if isinstance(message, GlobalPosition):
+                there = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
+                latitude, longitude, altitude = self._fleet.to_geodetic(there + self._aside)
+                message = message._replace(latitude=latitude, longitude=longitude, altitude=altitude)
+            out += self._codec.encode(message)
         return out
 
 

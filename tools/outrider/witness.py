@@ -9,7 +9,7 @@ import numpy as np
 from mavlink_bridge.frames import ned_to_enu, yaw_to_enu
 from outrider.moving import MovingObstacle
 from outrider.moving import places as moving_places
-from outrider.targets import Target
+from outrider.targets import Placed, Target
 from outrider.truth import NOWHERE, ROW, SAMPLE, Array, Truth
 from sitl.node import Autopilot
 
@@ -58,7 +58,7 @@ class Witness:
         return True
 
 
-def places(target: Target, times: Iterable[int]) -> Array:
+def places(target: Placed, times: Iterable[int]) -> Array:
     """Where the target is (n, 3) at ``times`` (µs, not decreasing), ENU; NaN where it is not there."""
     found = [target.position(time) for time in times]
     return np.array([NOWHERE if place is None else place for place in found])

@@ -36,8 +36,9 @@ class Radio(Settings):
     plan_stale_us: int
 
 
-RADIOS = {57600: Radio(state_us=200_000, plan_us=500_000, plan_stale_us=1_100_000)}
-"""By the baud that eight vehicles share. Who misses one plan still has the one before, of 1.6 s."""
+RADIOS = {57600: Radio(state_us=400_000, plan_us=540_000, plan_stale_us=1_200_000)}
+"""By the baud that eight vehicles share with their target, signed or not (``airtime``). Who misses one plan
+still has the one before, of 1.6 s."""
 
 
 class FlyConfig(Settings):

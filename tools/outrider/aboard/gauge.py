@@ -4,28 +4,30 @@ memory, and how they stand against the limits."""
 from __future__ import annotations
 
 from collections import Counter
-from math import dist, hypot, isfinite
+from math import dist, hypot, inf, isfinite, pi
 
-from companion.config import LimitsConfig
+from companion.config import HeadingConfig, LimitsConfig
 from companion.setpoint import FRAME_LOCAL_NED, is_finite
 from mavlink_bridge.messages import SetpointLocal, Vector
 
 TOGETHER = 100_000
 """µs. What is further apart is no step but a gap."""
+_IN_A_ROW = 35_000
+"""µs. After any pause the yaw begins anew where the vehicle's nose points."""
 
 
 class SetpointGauge:
-    """Told each set-point with its time (µs). None may be faster than ``fastest`` (m/s) and accelerate harder
-    than ``hardest`` (m/s²), nor jump by more than that explains."""
+    """Told each set-point with its time (µs). None may be faster than ``fastest`` (m/s), accelerate harder
+    than ``hardest`` (m/s²) or turn faster than ``turning`` (rad/s), nor jump by more than that explains."""
 
-    def __init__(self, fastest: float, hardest: float) -> None:
+    def __init__(self, fastest: float, hardest: float, turning: float = inf) -> None:
         self.count = self.gaps = 0
         self.finite = True
-        self.step = self.speed = self.acceleration = self.jump = 0.0
-        self._fastest, self._hardest = fastest, hardest
+        self.step = self.speed = self.acceleration = self.jump = self.swing = self.spin = 0.0
+        self._fastest, self._hardest, self._turning = fastest, hardest, turning
         self.masks: Counter[int] = Counter()
         self.frames: Counter[int] = Counter()
-        self._last: tuple[int, Vector] | None = None
+        self._last: tuple[int, Vector, float] | None = None
 
     def take(self, now: int, message: SetpointLocal) -> None:
         """One that leaves, or would, at ``now``."""
@@ -38,14 +40,18 @@ class SetpointGauge:
         self.speed = max(self.speed, hypot(*message.velocity))
         self.acceleration = max(self.acceleration, hypot(*message.acceleration))
         if self._last is not None:
-            before, place = self._last
+            before, place, yaw = self._last
             if now - before > TOGETHER:
                 self.gaps += 1
             else:
                 step = dist(place, message.position)
                 self.step = max(self.step, step)
                 self.jump = max(self.jump, step - self._fastest * (now - before) * 1e-6)
-        self._last = now, message.position
+                if now - before <= _IN_A_ROW:
+                    swing = abs((message.yaw - yaw + pi) % (2.0 * pi) - pi)
+                    self.swing = max(self.swing, swing - self._turning * (now - before) * 1e-6)
+        self.spin = max(self.spin, abs(message.yaw_rate))
+        self._last = now, message.position, message.yaw
 
     @property
     def facts(self) -> dict[str, object]:
@@ -73,15 +79,20 @@ class SetpointGauge:
             f"faster than {self._fastest:.1f} m/s": self.speed > self._fastest + _ROUNDED,
             f"more than {self._hardest:.1f} m/s²": self.acceleration > self._hardest + _ROUNDED,
             f"a jump of {self.jump:.2f} m": self.jump > _CORRECTED,
+            f"a jump of {self.swing:.2f} rad": self.swing > _TURNED,
+            f"turning faster than {self._turning:.1f} rad/s": self.spin > self._turning + _ROUNDED,
         }
         return [what for what, is_so in wrong.items() if is_so]
 
 
-def gauge_for(limits: LimitsConfig) -> SetpointGauge:
-    """For a companion with these limits."""
-    return SetpointGauge(hypot(*limits.v_max), limits.a_total)
+def gauge_for(limits: LimitsConfig, heading: HeadingConfig | None = None) -> SetpointGauge:
+    """For a companion with these limits; without ``heading`` its yaw is left to itself, as it jumps where a
+    flight goes on that a pilot has turned."""
+    return SetpointGauge(hypot(*limits.v_max), limits.a_total, inf if heading is None else heading.rate_max)
 
 
 _ROUNDED = 1e-3
+_TURNED = 0.02
+"""rad: the own clock may run a hundredth beside the log's."""
 _CORRECTED = 0.15
 """m by which the estimate of the own position may be corrected from one set-point to the next."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 SAYINGS: Final = 8
 """So many of the last texts of a vehicle are kept."""
 _TEXT: Final = 256
-_FLAGS: Final = 8
-"""Bytes: one number."""
+_FLAGS: Final = 16
+"""Bytes: two numbers."""
 
 
 class Gauges(NamedTuple):
@@ -59,7 +59,7 @@ class Board:
         numbers = vehicles * _VEHICLE + squads * _SQUAD
         texts = vehicles * SAYINGS + squads
         self._memory = mmap.mmap(-1, _FLAGS + 8 * numbers + texts * _TEXT)
-        self._flags: NDArray[np.int64] = np.frombuffer(self._memory, dtype=np.int64, count=1)
+        self._flags: NDArray[np.int64] = np.frombuffer(self._memory, dtype=np.int64, count=2)
         every = np.frombuffer(self._memory, dtype=np.float64, offset=_FLAGS, count=numbers)
         self._vehicles: NDArray[np.float64] = every[: vehicles * _VEHICLE].reshape(vehicles, _VEHICLE)
         self._squads: NDArray[np.float64] = every[vehicles * _VEHICLE :].reshape(squads, _SQUAD)
@@ -74,6 +74,15 @@ class Board:
     @stop.setter
     def stop(self, value: bool) -> None:
         self._flags[0] = value
+
+    @property
+    def lost(self) -> int:
+        """Simulated time (µs) that squads could not keep up with: lost to all of them."""
+        return int(self._flags[1])
+
+    @lost.setter
+    def lost(self, value: int) -> None:
+        self._flags[1] = value
 
     def show(self, index: int, gauges: Gauges) -> None:
         """Vehicle ``index`` is like this."""

@@ -9,11 +9,12 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Final
 
+from mavlink_bridge.clock import PacedClock, WallClock
 from mavlink_bridge.links.link import Link
 from outrider.errors import OutriderError
 from outrider.hangar.board import Board
 from outrider.hangar.request import Request
-from outrider.hangar.worker import PERIOD, Worker
+from outrider.hangar.worker import PERIOD, STRIDE, Worker
 from outrider.sweeps.execution import cores
 from sitl.saved import Saved
 
@@ -49,8 +50,10 @@ class Crew:
         for now in (0, PERIOD):
             first.step(now, [])
         fork = multiprocessing.get_context("fork")
+        # One time for all: vehicles of two processes meet in the same air.
+        clock = PacedClock(WallClock(), self._asked.speed, STRIDE, self.board)
         for number, worker in enumerate(self._workers):
-            process = fork.Process(target=self._child, args=(worker,), name=f"squad-{number}")
+            process = fork.Process(target=self._child, args=(worker, clock), name=f"squad-{number}")
             process.start()
             self._processes.append(process)
         self._close(None)
@@ -74,9 +77,9 @@ class Crew:
                 process.join()
         self._close(None)
 
-    def _child(self, worker: Worker) -> None:
+    def _child(self, worker: Worker, clock: PacedClock) -> None:
         self._close(worker)
-        worker.main()
+        worker.main(clock)
 
     def _close(self, spared: Worker | None) -> None:
         """All links but those of one worker."""

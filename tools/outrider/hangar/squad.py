@@ -28,7 +28,14 @@ class Seat:
         self.boot = boot
         self.shown = boot
         self.said = 0
+        self.booted = False
         self.traffic = Traffic()
+
+
+def boot_times(indices: Sequence[int], speed: float, period: int) -> dict[int, int]:
+    """When (µs) each of the vehicles of one squad boots, by index: at steps of that ``period`` (µs)."""
+    spread = round(SPREAD * min(speed, 1.0))
+    return {index: spread * number // len(indices) // period * period for number, index in enumerate(indices)}
 
 
 class Squad:
@@ -36,14 +43,17 @@ class Squad:
 
     name = "squad"
 
-    def __init__(self, vehicles: Mapping[int, Autopilot], first_id: int, board: Board, speed: float) -> None:
-        """``vehicles`` by their index among all, which is their row on the ``board``;
-        ``first_id``: the system id of index 0; ``speed`` of time."""
-        spread = round(SPREAD * min(speed, 1.0))
-        self.seats = [
-            Seat(index, node, first_id + index, spread * number // len(vehicles))
-            for number, (index, node) in enumerate(vehicles.items())
-        ]
+    def __init__(
+        self,
+        vehicles: Mapping[int, Autopilot],
+        boots: Mapping[int, int],
+        first_id: int,
+        board: Board,
+        speed: float,
+    ) -> None:
+        """``vehicles`` by their index among all, which is their row on the ``board``, and when they boot
+        (µs); ``first_id``: the system id of index 0; ``speed`` of time."""
+        self.seats = [Seat(index, node, first_id + index, boots[index]) for index, node in vehicles.items()]
         self._board = board
         self._shown = round(SHOWN * 1e6 * speed)
 
@@ -60,7 +70,11 @@ class Squad:
             for datagram in arrived:
                 seat.traffic.receive(datagram.data)
             try:
-                said = seat.node.step(now, arrived)
+                # A process that comes late must not make its vehicles younger than their clocks say.
+                late = not seat.booted and now > seat.boot
+                said = seat.node.step(seat.boot, []) if late else []
+                seat.booted = True
+                said += seat.node.step(now, arrived)
             except Exception as error:
                 raise OutriderError(f"vehicle {seat.system}: {type(error).__name__}: {error}") from error
             for datagram in said:

@@ -21,7 +21,7 @@ from outrider.hangar.board import Board, Pace
 from outrider.hangar.cabinet import Cabinet
 from outrider.hangar.clients import Clients
 from outrider.hangar.request import Request
-from outrider.hangar.squad import Squad
+from outrider.hangar.squad import Squad, boot_times
 
 PERIOD: Final = 10_000
 """µs (simulated) between two steps from real time to 10 times that."""
@@ -51,13 +51,14 @@ class Worker:
         self._state = state
         self._parent = os.getpid()
 
-    def main(self) -> None:
-        """The process, from fork to exit. The parent alone is told by signals when to end, and tells it."""
+    def main(self, clock: PacedClock) -> None:
+        """The process, from fork to exit, under ``clock``. The parent alone is told by signals when to end,
+        and tells it."""
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         sharpen_timers()
         try:
-            self._run()
+            self._run(clock)
         except Exception as error:
             if os.environ.get("OUTRIDER_TRACEBACK"):
                 traceback.print_exc()
@@ -68,17 +69,17 @@ class Worker:
     def _over(self) -> bool:
         return self._board.stop or os.getppid() != self._parent
 
-    def _run(self) -> None:
+    def _run(self, clock: PacedClock) -> None:
         asked, wall = self._asked, WallClock()
         cabinet = Cabinet(self._state, asked.flavour)
+        boots = boot_times(self._indices, asked.speed, period(asked.speed))
         vehicles = {
-            index: asked.autopilot(index, wall.now(), cabinet.saved(asked.systems[index]))
-            for index in self._indices
+            index: asked.autopilot(index, clock.start + boot, cabinet.saved(asked.systems[index]))
+            for index, boot in boots.items()
         }
         clients = Clients(self.links, wall)
-        squad = Squad(vehicles, asked.first_id, self._board, asked.speed)
+        squad = Squad(vehicles, boots, asked.first_id, self._board, asked.speed)
         with IdleCollector() as garbage:
-            clock = PacedClock(wall, asked.speed, STRIDE)
             loop = RealTime(
                 Scheduled(squad, period(asked.speed)),
                 self.links,

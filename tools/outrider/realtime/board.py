@@ -11,6 +11,8 @@ import mmap
 import numpy as np
 from numpy.typing import NDArray
 
+from outrider.realtime.window import Window
+
 _COLUMNS = 8
 _TEXT = 240
 
@@ -20,10 +22,11 @@ class Board:
 
     Times are µs, 0 for not yet. ``goal``: the goal event; ``end``: the end of the clock; ``stop``: all shall
     end; ``gone`` (K,): the companions that shall end; ``thaws`` (K,): how often each was let go on after it
-    had been stopped.
+    had been stopped. ``window``: where all show themselves to a view, if there is one.
     """
 
-    def __init__(self, vehicles: int) -> None:
+    def __init__(self, vehicles: int, window: Window | None = None) -> None:
+        self.window = window
         numbers = 8 * (3 + vehicles * (_COLUMNS + 4))
         self._memory = mmap.mmap(-1, numbers + vehicles * _TEXT)
         flags = np.frombuffer(self._memory, dtype=np.int64, count=3 + 4 * vehicles)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import signal
 from collections import deque
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,11 +28,13 @@ from outrider.outcome import Messages, Outcome, Punctuality
 from outrider.realtime.board import Board
 from outrider.realtime.crew import Crew
 from outrider.realtime.muster import muster, operators_turn, rough
-from outrider.realtime.traces import Trace, put_together
+from outrider.realtime.traces import Moved, Trace, put_together
+from outrider.realtime.window import Window
 from outrider.realtime.wiring import wire
 from outrider.realtime.workers import Remains
 from outrider.scenario import Scenario
-from outrider.truth import SAMPLE
+from outrider.truth import SAMPLE, Array
+from outrider.viewing.realtime import RealTimeView, Seen
 from sitl.config import VehicleConfig
 
 _START, _START_WITH_PRIORITY = 1_000_000, 3_000_000
@@ -58,6 +60,7 @@ class RealTimeFlight:
         progress: Progress = lambda _stage, _seconds: None,
         *,
         priority: bool = False,
+        view: RealTimeView | None = None,
     ) -> None:
         self.scenario, self.seed = scenario, seed
         self.fleet = Fleet(scenario, vehicle, seed, logs)
@@ -66,6 +69,7 @@ class RealTimeFlight:
         self._directory = directory
         self._progress = progress
         self._priority = priority
+        self._view = view
         self._clock = WallClock()
         self._interrupts = 0
 
@@ -75,7 +79,8 @@ class RealTimeFlight:
         first = self.fleet.autopilot(0)
         for now in (0, self.fleet.vehicle.physics_period):
             first.step(now, [])
-        board = Board(self.scenario.size)
+        window = None if self._view is None else Window(self.scenario.size)
+        board = Board(self.scenario.size, window)
         wiring = wire(self.scenario.size, self._clock, len(self.scenario.moving), len(self.fleet.helmed))
         with TemporaryDirectory() as folder, self._interruptible():
             scratch = Path(folder)
@@ -88,7 +93,7 @@ class RealTimeFlight:
                 operator = self.fleet.operator()
                 behind = rough(self.fleet, operator, {"ground": None})
                 conductor = Conductor(self.scenario, self.fleet.starts, operator, start)
-                leader = _Leader(self.fleet, conductor, crew, board, self._progress)
+                leader = _Leader(self.fleet, conductor, crew, board, self._progress, self._view)
                 every = Scheduled(
                     behind, self.scenario.timing.companion_us, operators_turn(self.fleet, start)
                 )
@@ -98,7 +103,7 @@ class RealTimeFlight:
                 remains = crew.join()
             counters = behind.ether.counters
             self.outcome = self._gather(
-                scratch, conductor, remains, Messages(counters.sent, counters.dropped, 0)
+                scratch, conductor, leader.moves, remains, Messages(counters.sent, counters.dropped, 0)
             )
 
     @contextmanager
@@ -116,7 +121,12 @@ class RealTimeFlight:
                 signal.signal(which, handler)
 
     def _gather(
-        self, scratch: Path, conductor: Conductor, remains: Mapping[str, Remains], operators: Messages
+        self,
+        scratch: Path,
+        conductor: Conductor,
+        moves: Sequence[tuple[int, Array]],
+        remains: Mapping[str, Remains],
+        operators: Messages,
     ) -> Outcome:
         scenario, systems = self.scenario, self.fleet.systems
         faults = [f"{name}: {found.error}" for name, found in remains.items() if found.error]
@@ -130,7 +140,8 @@ class RealTimeFlight:
             raise OutriderError(_nothing(conductor, "an autopilot never began"))
         truth = truth_of(scenario)
         period, fleet = self.fleet.vehicle.physics_period, self.fleet
-        put_together(found_traces, period, fleet.target(), fleet.moving(), conductor.clock_start, truth)
+        target = Moved(fleet.target(), moves)
+        put_together(found_traces, period, target, fleet.moving(), conductor.clock_start, truth)
         self.priority_told = next((found.priority for found in remains.values() if found.priority), "")
         companions = [remains[names.companion(system)] for system in systems]
         return Outcome(
@@ -159,12 +170,22 @@ class _Leader:
     """Shows the conductor what the board shows, and lets happen to processes what the scenario says."""
 
     def __init__(
-        self, fleet: Fleet, conductor: Conductor, crew: Crew, board: Board, progress: Progress
+        self,
+        fleet: Fleet,
+        conductor: Conductor,
+        crew: Crew,
+        board: Board,
+        progress: Progress,
+        view: RealTimeView | None = None,
     ) -> None:
         self._fleet, self._conductor, self._crew, self._board = fleet, conductor, crew, board
         self._progress = progress
+        self._view = view
+        self.moves: list[tuple[int, Array]] = []
+        """When (µs) the target was moved by hand, and where to (3,)."""
         self._events: deque[Event] = deque(events(fleet.scenario))
         self._target = fleet.target()
+        self._moving = fleet.moving()
         self._began: int | None = None
         self._looked = 0
 
@@ -194,9 +215,27 @@ class _Leader:
         if start is None and conductor.clock_start is not None:
             board.goal = now
             self._target.begin(now)
+            for moving in self._moving:
+                moving.begin(now)
         if conductor.clock_end is not None and not board.end:
             board.end = conductor.clock_end
+        if self._view is not None and board.window is not None:
+            self._show(now, place, self._view, board.window)
         return over
+
+    def _show(self, now: int, place: Array | None, view: RealTimeView, window: Window) -> None:
+        """To the view; and what is wished there to those that it concerns."""
+        conductor, board = self._conductor, self._board
+        start = conductor.clock_start
+        seconds = None if start is None else 1e-6 * (now - start)
+        since = 1e-6 * (now - (self._began or now)) if seconds is None else seconds
+        moving = [one.motion(now).position for one in self._moving]
+        view.show(now, Seen(since, conductor.stage.value, board.positions, place, moving), window)
+        for change in view.changes(seconds):
+            window.wish(change)
+            if change.target is not None:
+                self._target.move(now, np.array(change.target))
+                self.moves.append((now, np.array(change.target)))
 
     def _blind(self, now: int) -> bool:
         """While somebody has not been seen yet; True ends the run: nothing comes of it any more."""

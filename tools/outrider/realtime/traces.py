@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from mavlink_bridge.frames import ned_to_enu
 from outrider.moving import MovingObstacle
 from outrider.moving import places as moving_places
-from outrider.targets import Target
+from outrider.targets import Placed, Target
 from outrider.truth import ROW, SAMPLE, Array, Truth
 from outrider.witness import places, rows
 from sitl.node import Autopilot
@@ -71,10 +72,27 @@ class TraceWriter:
             np.savez(file, **trace._asdict())
 
 
+class Moved:
+    """The clone of a ``target`` that was moved by hand: at times (µs), to places (3,)."""
+
+    def __init__(self, target: Target, moves: Sequence[tuple[int, Array]]) -> None:
+        self._target, self._moves = target, deque(moves)
+
+    def begin(self, now: int) -> None:
+        """As the target."""
+        self._target.begin(now)
+
+    def position(self, now: int) -> Array | None:
+        """As the target; asked for times that do not decrease."""
+        while self._moves and self._moves[0][0] <= now:
+            self._target.move(*self._moves.popleft())
+        return self._target.position(now)
+
+
 def put_together(
     traces: list[Trace],
     period: int,
-    target: Target,
+    target: Placed,
     moving: Sequence[MovingObstacle],
     goal: int | None,
     truth: Truth,

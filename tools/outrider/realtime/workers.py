@@ -25,13 +25,17 @@ from mavlink_bridge.priority import LEVEL, ask_for_priority, sharpen_timers
 from mavlink_bridge.realtime import RealTime
 from mavlink_bridge.runtime import Scheduled, Tap
 from outrider import names
+from outrider.bystander import Bystander
 from outrider.disturbances import Event, strike_autopilot, strike_computer
 from outrider.moving import MovingObstacle
 from outrider.realtime.board import Board
 from outrider.realtime.rough import Rough
 from outrider.realtime.traces import TraceWriter
+from outrider.realtime.window import EVERY, Window
 from outrider.recorder import Recorder
 from outrider.targets import Target
+from outrider.viewing.glimpse import glimpse
+from outrider.viewing.wishes import LOSSY
 from sitl.node import Autopilot
 
 TOLERANCE = 1_000
@@ -179,6 +183,8 @@ class AutopilotWorker(Worker):
         sample = self._trace.see(now)
         if sample is not None:
             self.board.show_vehicle(self._k, sample[0:3], sample[3:6], self._node.armed)
+            if self.board.window is not None:
+                self.board.window.show_attitude(self._k, self._node.state.attitude)
 
     def leave(self, path: Path) -> None:
         self._trace.save(self._trace_path)
@@ -195,6 +201,7 @@ class CompanionWorker(Worker):
         self._k, self._node = k, node
         self._system, self._logs = system, logs
         self._thaws = 0
+        self._next_glimpse = self._wishes = 0
         self._shown: tuple[bool, str] | None = None
         self._first: Tally | None = None
         self._last: Tally | None = None
@@ -220,6 +227,20 @@ class CompanionWorker(Worker):
         if shown != self._shown:
             self._shown = shown
             self.board.show_companion(self._k, *shown)
+        if self.board.window is not None and now >= self._next_glimpse:
+            self._next_glimpse = now + EVERY
+            self._look_on(now, self.board.window)
+
+    def _look_on(self, now: int, window: Window) -> None:
+        """Show the node to the view, and let it have what is wished there."""
+        window.show_companion(self._k, glimpse(self._node, now))
+        if window.wishes == self._wishes:
+            return
+        self._wishes = window.wishes
+        if window.methods and not isinstance(self._node, Bystander):
+            self._node.use(window.methods)
+        if window.loss is not None:
+            self.rough.ether.lose(LOSSY, window.loss)
 
     def leave(self, path: Path) -> None:
         now = self._node.tally
@@ -238,9 +259,16 @@ class PlayedWorker(Worker):
     def __init__(self, node: Target | MovingObstacle, seat: Seat) -> None:
         super().__init__(seat)
         self._node = node
+        self._moves = 0
 
     def begin(self, now: int) -> None:
         self._node.begin(now)
+
+    def show(self, now: int) -> None:
+        window = self.board.window
+        if window is not None and window.moves != self._moves and not isinstance(self._node, MovingObstacle):
+            self._moves = window.moves
+            self._node.move(now, window.place)
 
 
 class _Radio:

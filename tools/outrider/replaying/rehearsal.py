@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 
 from companion.config import CompanionConfig
 from companion.understudy import Understudy
+from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
+from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame, enu_to_ned
 from mavlink_bridge.header import header
 from mavlink_bridge.messages import (
@@ -21,6 +23,7 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog import Record
+from outrider.aboard.cockpit import Cockpit
 from outrider.beacon import Beacon
 from outrider.paths import Motion
 from outrider.replaying.casting import GLOBAL, Cast, Part, Survey
@@ -55,10 +58,13 @@ def rehearse(
     records: Iterable[Record],
     on_step: Callable[[int, int], None] = lambda _now, _records: None,
     fleet: FleetFrame | None = None,
+    follow: bool = False,
 ) -> Rehearsed:
     """Step an understudy every 10 ms of the log's time with what was recorded until then. Without a target in
     ``cast`` it is a point that stands where the own vehicle was first. ``on_step`` hears the time (µs) and
-    how many records have been read. The ``fleet`` frame is the log's own unless there is another."""
+    how many records have been read. The ``fleet`` frame is the log's own unless there is another. With
+    ``follow`` the understudy lives by the vehicle's clock, as ``outrider fly`` does: one that is a hundredth
+    slower than the recorder's would be believed ever older, and the plans begin ever further ahead of it."""
     fleet = seen.fleet if fleet is None else fleet
     system = next(n for n in (TARGET_SYSTEM, 1, 2, 3) if n not in seen.systems and n != cast.own)
     target = system if cast.target is None else cast.target
@@ -66,13 +72,17 @@ def rehearse(
     standing = None if cast.target is not None else Beacon(system, "target", _RATE_HZ, fleet)
     here = fleet.to_enu(*seen.place) * (1.0, 1.0, 0.0)
     found, reader, stand_in = Rehearsed(), Codec(), _StandIn(cast.own, seen, fleet)
+    wall = SimulatedClock(seen.begin)
+    followed = FollowedClock(wall, seen.begin) if follow else None
+    cockpit = Cockpit(companion, wall, followed, None)
     for now, batch in steps(records):
+        wall.wait_until(now)
         inbox = []
         for record in batch:
             inbox += _given(cast.part(record.frame), record, reader, found, stand_in)
         if standing is not None and standing.due(now):
             inbox += standing.say(now, Motion(here, here * 0.0))
-        companion.step(now, inbox)
+        cockpit.step(now if followed is None else followed.now() // 4 * 4, inbox)
         found.would += [(now, message) for message in companion.would]
         companion.would.clear()
         if companion.lacking:

@@ -1,0 +1,99 @@
+"""What companions say on the swarm link, counted in simulated time, and what a radio has room for."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from companion_bench import TARGET, Bench, seen_at
+from said import Run
+
+from companion.pilot import Phase
+from mavlink_bridge.key import Key
+from mavlink_bridge.links.endpoints import Serial, UdpIn
+from mavlink_bridge.messages import Source
+from outrider.aboard.airtime import FLEET, SHARE, carried, doubts, room, said, said_by_target
+from outrider.aboard.fly_config import RADIOS, FleetOrigin, FlyConfig
+from outrider.errors import InputError
+
+HERE = FleetOrigin(latitude=47.4, longitude=8.5, altitude=500.0)
+FAST = FlyConfig(system=1, target=100, origin=HERE)
+RADIO = FlyConfig(system=1, target=100, origin=HERE, radio=57600)
+KEY = Key(b"k" * 32)
+SECONDS = 8
+
+
+def counted(config: FlyConfig, key: Key | None) -> int:
+    """Bytes on the swarm link in ``SECONDS``, of a companion beside a target that flies a circle."""
+    rates = config.settings.rates.model_dump() | {"replan_us": 100_000}
+    bench = Bench("px4", key=key, others=key, task="escort", rates=rates)
+    bench.target = seen_at(TARGET, (9.0, 0.0, 2.0))
+    bench.fly(1.0)
+    bench.take_off()
+    step, sizes = bench.companion.step, []
+
+    def weighed(now, inbox):
+        leaving = step(now, inbox)
+        sizes.extend(len(datagram.data) for datagram in leaving if datagram.link == "swarm")
+        assert all(datagram.data[0] == 0xFD for datagram in leaving)
+        return leaving
+
+    bench.companion.step = weighed
+    for tick in range(100 * SECONDS):
+        turn = 0.004 * tick
+        place = (9.0 * math.cos(turn), 9.0 * math.sin(turn), 3.0 + math.sin(turn))
+        north, east, down = 3.6 * math.cos(turn), -3.6 * math.sin(turn), -0.4 * math.cos(turn)
+        bench.target = seen_at(TARGET, place, (north, east, down))._replace(source=Source(TARGET, 1))
+        bench.step()
+    assert bench.phase is Phase.ESCORT
+    return sum(sizes)
+
+
+@pytest.mark.parametrize("key", [None, KEY], ids=["plain", "signed"])
+@pytest.mark.parametrize("config", [FAST, RADIO], ids=["network", "radio"])
+def test_who_flies_says_what_is_stated_and_hardly_less(config: FlyConfig, key: Key | None) -> None:
+    stated = SECONDS * said(config.settings, key is not None)
+    # The time may begin and end with one of each kind.
+    assert 0.9 * stated < counted(config, key) <= stated + 3 * 160
+
+
+@pytest.mark.parametrize("signed", [False, True])
+@pytest.mark.parametrize("baud", RADIOS)
+def test_a_radio_carries_eight_vehicles_and_their_target(baud: int, signed: bool) -> None:
+    """Bits with start and stop bit, all senders together: the bar of eight at 57 600 baud."""
+    config = FlyConfig(system=1, target=100, origin=HERE, radio=baud).settings
+    bits = 10 * (FLEET * said(config, signed) + said_by_target(signed))
+    assert bits <= SHARE * baud
+    assert carried(baud, config, signed) >= FLEET
+
+
+@pytest.mark.parametrize("radio", RADIOS.values())
+def test_who_misses_a_plan_still_has_the_one_before(radio) -> None:
+    horizon = FAST.companion.horizon
+    assert 2 * radio.plan_us < radio.plan_stale_us < (horizon.steps + 1) * horizon.dt_us
+
+
+def test_plans_that_nobody_shares_take_no_room() -> None:
+    silent = FAST.companion.model_copy(update={"shares_plan": False})
+    assert said(silent, False) < 0.3 * said(FAST.companion, False)
+
+
+def test_only_a_serial_line_is_doubted() -> None:
+    assert doubts(UdpIn("127.0.0.1", 14550), FAST.settings, True) == ""
+    assert doubts(Serial("/dev/ttyUSB0", 57600), RADIO.settings, True) == ""
+    assert doubts(Serial("/dev/ttyUSB0", 921600), FAST.settings, True) == ""
+    assert "radio: 57600" in doubts(Serial("/dev/ttyUSB0", 57600), FAST.settings, False)
+    with pytest.raises(InputError, match=f"{room(9600):.0f} bytes/s"):
+        doubts(Serial("/dev/ttyUSB0", 9600), FAST.settings, False)
+
+
+def test_it_is_said_before_anything_is_opened(run: Run, tmp_path: Path) -> None:
+    ways = ("--autopilot=udpin:127.0.0.1:0", "--config=px4", "--seconds=0")
+    ended = run("fly", *ways, f"--swarm={tmp_path}/no-such-port,9600")
+    assert (ended.status, ended.err.count("\n")) == (2, 1)
+    assert "too few for two vehicles" in ended.err
+    ended = run("fly", *ways, f"--swarm={tmp_path}/no-such-port,57600")
+    assert ended.status == 2
+    assert "enough for 2 vehicles" in ended.err.splitlines()[0]
+    assert "cannot open the port" in ended.err.splitlines()[1]

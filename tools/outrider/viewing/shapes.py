@@ -1,0 +1,138 @@
+"""Meshes of a metre's size: vertices (V, 3) and faces (F, 3)."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+_ROTORS = 6
+
+
+class Mesh(NamedTuple):
+    """Vertices (V, 3) and the corners (F, 3) of triangles, seen from outside counter-clockwise."""
+
+    vertices: Array
+    faces: NDArray[np.int64]
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    """All of them as one."""
+    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
+    faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]
+    return Mesh(np.vstack([mesh.vertices for mesh in meshes]), np.vstack(faces))
+
+
+def prism(
+    corners: int, radius: float, height: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> Mesh:
+    """Upright, about ``at``."""
+    turn = 2.0 * pi * np.arange(corners) / corners
+    circle = radius * np.stack([np.cos(turn), np.sin(turn), np.zeros(corners)], axis=1)
+    up = np.array([0.0, 0.0, 0.5 * height])
+    vertices = np.vstack([circle - up, circle + up, -up, up]) + at
+    here, following = np.arange(corners), (np.arange(corners) + 1) % corners
+    low, high = np.full(corners, 2 * corners), np.full(corners, 2 * corners + 1)
+    faces = np.vstack(
+        [
+            np.stack([here, following, following + corners], axis=1),
+            np.stack([here, following + corners, here + corners], axis=1),
+            np.stack([following, here, low], axis=1),
+            np.stack([here + corners, following + corners, high], axis=1),
+        ]
+    )
+    return Mesh(vertices, faces)
+
+
+def bar(begin: Array, end: Array, width: float) -> Mesh:
+    """A level beam between two places."""
+    along = (end - begin) / np.linalg.norm(end - begin)
+    side = 0.5 * width * np.cross((0.0, 0.0, 1.0), along)
+    up = np.array([0.0, 0.0, 0.5 * width])
+    corners = [
+        place + a * side + b * up for place in (begin, end) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    ]
+    quads = ((0, 1, 2, 3), (7, 6, 5, 4), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+    faces = [face for a, b, c, d in quads for face in ((a, c, b), (a, d, c))]
+    return Mesh(np.array(corners), np.array(faces))
+
+
+def cone(length: float, radius: float, at: float) -> Mesh:
+    """Along x, with its base at x = ``at``."""
+    count = 16
+    turn = 2.0 * pi * np.arange(count) / count
+    base = np.stack([np.full(count, at), radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+    vertices = np.vstack([base, [[at + length, 0.0, 0.0]], [[at, 0.0, 0.0]]])
+    here, following = np.arange(count), (np.arange(count) + 1) % count
+    faces = np.vstack(
+        [
+            np.stack([here, following, np.full(count, count)], axis=1),
+            np.stack([following, here, np.full(count, count + 1)], axis=1),
+        ]
+    )
+    return Mesh(vertices, faces)
+
+
+def rotors() -> Mesh:
+    """Six discs, from tip to tip a metre; z is up."""
+    turn = pi * (np.arange(_ROTORS) + 0.5) / 3.0
+    return joined(*(prism(20, 0.16, 0.035, (0.34 * np.cos(a), 0.34 * np.sin(a), 0.05)) for a in turn))
+
+
+def frame() -> Mesh:
+    """What carries them, and a nose along x."""
+    turn = pi * (np.arange(_ROTORS) + 0.5) / 3.0
+    ends = 0.34 * np.stack([np.cos(turn), np.sin(turn), np.zeros(_ROTORS)], axis=1)
+    arms = (bar(np.zeros(3), end, 0.04) for end in ends)
+    return joined(prism(12, 0.11, 0.1), cone(0.3, 0.08, 0.2), *arms)
+
+
+def annulus(radius: float, width: float) -> Mesh:
+    """A flat ring; both sides are to be drawn."""
+    count = 64
+    turn = 2.0 * pi * np.arange(count) / count
+    circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(count)], axis=1)
+    vertices = np.vstack([(radius - width) * circle, radius * circle])
+    here, following = np.arange(count), (np.arange(count) + 1) % count
+    faces = np.vstack(
+        [
+            np.stack([here, here + count, following + count], axis=1),
+            np.stack([here, following + count, following], axis=1),
+        ]
+    )
+    return Mesh(vertices, faces)
+
+
+def ball(radius: float) -> Mesh:
+    """Of latitudes and longitudes."""
+    rows, columns = 12, 24
+    polar = pi * np.arange(rows + 1) / rows
+    turn = 2.0 * pi * np.arange(columns) / columns
+    vertices = radius * np.stack(
+        [
+            np.outer(np.sin(polar), np.cos(turn)),
+            np.outer(np.sin(polar), np.sin(turn)),
+            np.outer(np.cos(polar), np.ones(columns)),
+        ],
+        axis=2,
+    ).reshape(-1, 3)
+    faces = []
+    for row in range(rows):
+        for column in range(columns):
+            following = (column + 1) % columns
+            a, b = row * columns + column, row * columns + following
+            faces += [(a, a + columns, b + columns), (a, b + columns, b)]
+    return Mesh(vertices, np.array(faces))
+
+
+def tile() -> Mesh:
+    """A disc of a metre's diameter whose normal is z; both sides are to be drawn."""
+    count = 32
+    turn = 2.0 * pi * np.arange(count) / count
+    vertices = np.vstack([np.zeros(3), 0.5 * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)])
+    here = np.arange(count)
+    faces = np.stack([np.zeros(count, dtype=np.int64), here + 1, (here + 1) % count + 1], axis=1)
+    return Mesh(vertices, faces)

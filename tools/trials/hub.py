@@ -1,0 +1,64 @@
+"""What joins the companions: all that one says goes to all others, unless the link is cut."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Sequence
+from typing import Final
+
+from trials.plan import HOST
+
+_LONGEST: Final = 65536
+_BUFFER: Final = 1 << 20
+
+
+class Hub:
+    """A UDP port for each of ``systems``: who spoke there last is that vehicle's companion."""
+
+    def __init__(self, systems: Sequence[int]) -> None:
+        self.cut = False
+        self._ports = {system: _bound() for system in systems}
+        self._there: dict[int, tuple[str, int]] = {}
+
+    def endpoint(self, system: int) -> str:
+        """For that companion."""
+        return f"udpout:{HOST}:{self._ports[system].getsockname()[1]}"
+
+    @property
+    def sockets(self) -> list[socket.socket]:
+        """Readable: something has come."""
+        return list(self._ports.values())
+
+    def turn(self) -> None:
+        """Pass on what has come."""
+        for system, port in self._ports.items():
+            while True:
+                try:
+                    data, self._there[system] = port.recvfrom(_LONGEST)
+                except ConnectionError:
+                    continue  # a companion that is gone
+                except OSError:
+                    break
+                if not self.cut:
+                    self._pass_on(data, system)
+
+    def close(self) -> None:
+        """All ports."""
+        for port in self._ports.values():
+            port.close()
+
+    def _pass_on(self, data: bytes, sender: int) -> None:
+        for system, place in self._there.items():
+            if system != sender:
+                try:
+                    self._ports[system].sendto(data, place)
+                except OSError:
+                    continue
+
+
+def _bound() -> socket.socket:
+    port = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    port.bind((HOST, 0))
+    port.setblocking(False)
+    port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+    return port

@@ -1,0 +1,39 @@
+"""The ground: hears what the companions tell it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mavlink_bridge.clock import WallClock
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.links.endpoints import UdpIn
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.udp import UdpListener
+from mavlink_bridge.messages import StatusText
+from trials.plan import HOST
+
+_TEXT = 253
+
+
+class Station:
+    """``texts`` of each of ``systems``, in the order of their coming."""
+
+    def __init__(self, systems: Sequence[int]) -> None:
+        self.link, self.endpoint = listener()
+        self.texts: dict[int, list[str]] = {system: [] for system in systems}
+        self._codec = Codec(
+            lambda identifier, system, _component: identifier == _TEXT and system in self.texts
+        )
+
+    def turn(self) -> None:
+        """Hear what has come."""
+        for data in self.link.receive():
+            for message in self._codec.feed(data, whole=True):
+                if isinstance(message, StatusText):
+                    self.texts[message.source.system].append(message.text)
+
+
+def listener() -> tuple[Link, str]:
+    """A UDP port, and the endpoint for who speaks to it."""
+    link = UdpListener(UdpIn(HOST, 0), WallClock())
+    return link, f"udpout:{HOST}:{link.address[1]}"
