@@ -31,12 +31,16 @@ _ENOUGH: Final = 4
 _STEP: Final = 500_000
 """µs of the wall: a stamp off the line by more tells of a clock that was set, stopped or began anew."""
 _STALL: Final = 50_000
-"""The same of a simulation, whose clock stands whenever its machine has something else to do."""
-_EVIDENCE: Final = 10_000_000
-"""µs of the wall after which it is decided what it is."""
-_REAL: Final = 0.2
-"""A clock whose rate is off by more is a simulation's. That is wide: to take a simulation for real grounds
-it, to take a queue that grows for a simulation hides that all is old."""
+"""The same where the rate is off by more than ``_SPED``: a simulation stands whenever its machine has
+something else to do."""
+_SPED: Final = 0.02
+_EVIDENCE, _MORE = 10_000_000, 30_000_000
+"""µs of the wall after which it is decided what it is; and for a rate between ``_QUARTZ`` and ``_PACED``: a
+simulation on a busy machine or a queue that grows, and no queue grows evenly for so long."""
+_QUARTZ, _PACED = 0.005, 0.2
+"""A clock whose rate is off by no more than the first is real, by more than the second a simulation's."""
+_BENT: Final = 0.125
+"""Even: all stamps within this share of what the rate has made of the time."""
 _SLEW: Final = 0.5
 """A clock that is ahead goes on at this share of its rate: it never stands."""
 _WITNESSES: Final = 5
@@ -58,11 +62,11 @@ class FollowedClock:
     wall, it goes on as before and follows them from there: ``steps`` counts that. So it does where a
     simulation has lost time. ``rate``: of it against ``clock``. May be fed by one thread and read by others.
 
-    ``simulated`` says what it follows, if that is known beforehand; otherwise ten seconds of stamps do, and
-    after them it runs on as ``clock`` does unless they are a simulation's.
+    ``simulated`` says what it follows. None: that is found out, by ten to thirty seconds of stamps, and after
+    them it runs on as ``clock`` does unless they are a simulation's.
     """
 
-    def __init__(self, clock: Clock, begin: int = 0, *, simulated: bool | None = None) -> None:
+    def __init__(self, clock: Clock, begin: int = 0, *, simulated: bool | None = True) -> None:
         self._clock = clock
         self._lock = Lock()
         self._wall, self._shown = clock.now(), float(begin)
@@ -102,7 +106,7 @@ class FollowedClock:
                 self._lay(wall, stamp)
                 return
             ahead = stamp + self._base - self._line(wall)
-            stall = (_STALL if self.simulated else _STEP) * max(1.0, self.rate)
+            stall = (_STALL if abs(self.rate - 1.0) > _SPED else _STEP) * max(1.0, self.rate)
             if self._known and abs(ahead) > stall:
                 self._strayed += 1
                 if self._strayed >= _WITNESSES:
@@ -126,15 +130,20 @@ class FollowedClock:
 
     @property
     def _off(self) -> bool:
-        return abs(self.rate - 1.0) > _REAL
+        return abs(self.rate - 1.0) > _PACED
 
     def _decide(self, wall: int) -> None:
-        """From here on it is the one or the other."""
+        """When there is enough evidence: from here on it is the one or the other."""
         evidence = self._evidence
-        if self._verdict is not None or evidence[-1].wall - evidence[0].wall < _EVIDENCE:
+        span = evidence[-1].wall - evidence[0].wall
+        if self._verdict is not None or span < _EVIDENCE:
             return
-        self.judged = _slope_above(evidence)
-        self._verdict = self._off and abs(self.judged - 1.0) > _REAL
+        rate = _slope_above(evidence)
+        off = abs(rate - 1.0)
+        if _QUARTZ < off <= _PACED and span < _MORE:
+            return
+        self.judged = rate
+        self._verdict = off > _PACED or (off > _QUARTZ and _even(evidence, rate))
         evidence.clear()
         if not self._verdict:
             shown = float(self._read(wall))
@@ -191,6 +200,12 @@ class FollowedClock:
         shown = float(self._read(wall))
         self._wall, self._shown, self.rate = wall, height + base, rate
         self._surplus = max(0.0, shown - self._shown)
+
+
+def _even(pieces: Sequence[_Seen], rate: float) -> bool:
+    """Whether all ``pieces`` are near one line of that rate, for how far it is from the wall's."""
+    off = [piece.stamp - rate * (piece.wall - pieces[0].wall) for piece in pieces]
+    return max(off) - min(off) <= _BENT * abs(rate - 1.0) * (pieces[-1].wall - pieces[0].wall)
 
 
 def _slope_above(pieces: Sequence[_Seen]) -> float:

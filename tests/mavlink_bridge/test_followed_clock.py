@@ -58,7 +58,7 @@ class Sender:
 def test_it_shows_what_the_sender_shows_at_any_rate(rate, seed, jitter):
     wall = SimulatedClock(123 * SECOND)
     sender = Sender(rate, jitter=jitter, seed=seed)
-    clock = FollowedClock(wall, begin=1000, simulated=True)
+    clock = FollowedClock(wall, begin=1000)
     sender.follow(wall, clock, 8.0)
     begin = sender.time(wall.now()) - clock.now()
     off = []
@@ -72,7 +72,7 @@ def test_it_shows_what_the_sender_shows_at_any_rate(rate, seed, jitter):
 @pytest.mark.parametrize("rate", [1.0, 10.0])
 def test_it_never_goes_back_and_goes_on_when_the_sender_began_anew(rate):
     wall = SimulatedClock(SECOND)
-    clock = FollowedClock(wall, simulated=True)
+    clock = FollowedClock(wall)
     shown = []
     sender = Sender(rate)
     sender.follow(wall, clock, 5.0, lambda _t: shown.append(clock.now()))
@@ -88,7 +88,7 @@ def test_it_never_goes_back_and_goes_on_when_the_sender_began_anew(rate):
 
 def test_one_stamp_that_is_damaged_changes_nothing():
     wall = SimulatedClock(SECOND)
-    clock = FollowedClock(wall, simulated=True)
+    clock = FollowedClock(wall)
     sender = Sender(1.0)
     sender.follow(wall, clock, 4.0)
     before = clock.now()
@@ -109,7 +109,7 @@ def test_without_a_sender_it_runs_as_the_wall_does():
 @pytest.mark.parametrize("rate", [1.0, 10.0])
 def test_it_waits_as_long_as_the_sender_takes(rate):
     wall = SimulatedClock(SECOND)
-    clock = FollowedClock(wall, simulated=True)
+    clock = FollowedClock(wall)
     Sender(rate).follow(wall, clock, 6.0)
     began, shown = wall.now(), clock.now()
     clock.wait_until(shown + SECOND)
@@ -125,15 +125,15 @@ def test_it_waits_as_long_as_the_sender_takes(rate):
 @settings(max_examples=30, deadline=None)
 def test_a_simulation_is_told_by_its_rate_and_a_real_clock_is_the_walls_from_then_on(rate, seed, jitter):
     wall = SimulatedClock(SECOND)
-    clock = FollowedClock(wall)
+    clock = FollowedClock(wall, simulated=None)
     sender = Sender(rate, jitter=jitter, seed=seed)
     shown = []
     sender.follow(wall, clock, 9.9, lambda _t: shown.append((clock.now(), clock.known)))
     assert not any(known for _, known in shown)
-    sender.follow(wall, clock, 5.0, lambda _t: shown.append((clock.now(), clock.known)))
+    sender.follow(wall, clock, 22.0, lambda _t: shown.append((clock.now(), clock.known)))
     assert clock.known
     assert all(b >= a for (a, _), (b, _) in pairwise(shown))
-    assert clock.simulated == (abs(rate - 1.0) > 0.2)
+    assert clock.simulated == (abs(rate - 1.0) > 0.005)
     if not clock.simulated:
         assert clock.rate == 1.0
         offset = clock.now() - wall.now()
@@ -143,10 +143,26 @@ def test_a_simulation_is_told_by_its_rate_and_a_real_clock_is_the_walls_from_the
         assert {offset} == {shown for shown, _ in shown[-100:]}
 
 
+@pytest.mark.parametrize("growth", [0.01, 0.05])
+@pytest.mark.parametrize("end", [0.3, 1.0])
+def test_a_queue_that_grows_before_anybody_decides_is_no_simulation(growth, end):
+    """No queue grows for ever."""
+    wall = SimulatedClock(SECOND)
+    clock = FollowedClock(wall, simulated=None)
+    began = sent = SECOND
+    while wall.now() < 40 * SECOND:
+        while sent + min(growth * (sent - began), end * SECOND * growth / 0.05) <= wall.now():
+            clock.observe(wall.now(), sent)
+            sent += 20_000
+        wall.wait_until(wall.now() + 10_000)
+    assert clock.known
+    assert not clock.simulated
+
+
 def test_a_backlog_that_comes_at_once_is_no_simulation():
     """What waited somewhere before anybody listened."""
     wall = SimulatedClock(20 * SECOND)
-    clock = FollowedClock(wall)
+    clock = FollowedClock(wall, simulated=None)
     for k in range(50):
         clock.observe(wall.now(), 15 * SECOND + k * 100_000)
         wall.wait_until(wall.now() + 10_000)

@@ -19,7 +19,7 @@ def ages(delay, seconds=45.0):
     """True and shown age (µs) of the own state, after a quarter of a minute without delay; ``delay(s)``: of
     the link, s."""
     wall = SimulatedClock(1_000 * SECOND)
-    clock, track = FollowedClock(wall, wall.now()), Track(CompanionConfig().own)
+    clock, track = FollowedClock(wall, wall.now(), simulated=None), Track(CompanionConfig().own)
     sent, found = wall.now(), []
     began = wall.now() + 15 * SECOND
     while wall.now() < began + seconds * SECOND:
@@ -49,6 +49,6 @@ def test_the_own_state_looks_as_old_as_it_is(delay):
 
 
 def test_what_the_clock_is_taken_for_is_said():
-    assert "5.01 times" in judgement(5.01, simulated=True)
+    assert "5.010 times" in judgement(5.01, simulated=True)
     assert "real" in judgement(1.0001, simulated=False)
     assert "clock: autopilot" in judgement(0.95, simulated=False)

@@ -125,7 +125,7 @@ def test_no_go_is_taken_before_the_clock_is_known_nor_beside_a_twin() -> None:
         assert (answer.result == 0) == (node.pilot.phase is Phase.ESCORT)
         return answer.result == 0
 
-    young = Cockpit(node, air.clock, FollowedClock(air.clock), None, air.twin)
+    young = Cockpit(node, air.clock, FollowedClock(air.clock, simulated=None), None, air.twin)
     assert (young.barred, taken(young)) == (CLOCK, False)
     cockpit = Cockpit(node, air.clock, None, None, air.twin)
     assert (cockpit.barred, taken(cockpit)) == ("", True)

@@ -56,7 +56,7 @@ class FlyConfig(Settings):
     clock: Literal["auto", "autopilot", "wall"] = Field(
         "auto",
         description="whose time it lives by: autopilot for a simulation, which may run ten times as fast; "
-        "wall for a real one; auto: found out in ten seconds before the go, a simulation by its rate",
+        "wall for a real one; auto: found out before the go, a simulation by its rate",
     )
     period_us: int = Field(
         10_000, ge=1_000, le=100_000, multiple_of=4, description="of its steps, µs of that clock"

@@ -27,7 +27,7 @@ _AGAIN = 10.0
 """s after which an autopilot's words are told again that it keeps repeating."""
 _REPEATED = ("autopilot", "refused")
 _WAITING = (Phase.CONNECT, Phase.PREPARE)
-_PLAIN = 0.002
+_PLAIN = 0.005
 """A clock that is off by more is no quartz."""
 
 
@@ -208,7 +208,7 @@ class News:
 def judgement(rate: float, *, simulated: bool) -> str:
     """What the autopilot's clock was found to be, in words."""
     if simulated:
-        return f"a simulation's, {rate:.2f} times as fast as the wall's: it is followed"
+        return f"a simulation's, {rate:.3f} times as fast as the wall's: it is followed"
     if abs(rate - 1.0) < _PLAIN:
         return "a real one: the wall's time counts"
     return (
