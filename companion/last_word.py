@@ -104,7 +104,7 @@ class LastWord:
             self.failed = late
             return f"did not take {name}" if late else ""
         beat = vehicle.heartbeat
-        held = beat is not None and beat.custom_mode == _hold_mode(self._profile)
+        held = beat is not None and beat.custom_mode == self._profile.hold_mode
         return f"holds ({name})" if held and self._asked else "not ours"
 
     @property
@@ -115,9 +115,3 @@ class LastWord:
     def _steered(self) -> bool:
         """Whether our set-points steer it."""
         return self._vehicle.armed and self._vehicle.in_guided_mode
-
-
-def _hold_mode(profile: Profile) -> int:
-    """How HEARTBEAT tells of it: PX4's custom_mode is two bytes, main and sub mode."""
-    _, main, sub = profile.hold_params
-    return int(sub) << 24 | int(main) << 16 if profile is PX4 else int(main)

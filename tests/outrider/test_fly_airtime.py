@@ -89,7 +89,7 @@ def test_only_a_serial_line_is_doubted() -> None:
 
 
 def test_it_is_said_before_anything_is_opened(run: Run, tmp_path: Path) -> None:
-    ways = ("--autopilot=udpin:127.0.0.1:0", "--config=px4", "--seconds=0")
+    ways = ("--autopilot=udpin:127.0.0.1:0", "--config=px4", "--system=1", "--seconds=0")
     ended = run("fly", *ways, f"--swarm={tmp_path}/no-such-port,9600")
     assert (ended.status, ended.err.count("\n")) == (2, 1)
     assert "too few for two vehicles" in ended.err

@@ -41,6 +41,8 @@ class Plan:
             find("companions", self.flavour).read_text(encoding="utf-8")
         )
         document["target"] = TARGET
+        # At the wall's speed, too, it stands whenever the machine is busy.
+        document["clock"] = "autopilot"
         companion = document["companion"]
         companion["voice"] = {"texts": True, "values": True}
         # Five companions on two cores have no more plans in them than so many in a second of the wall.

@@ -52,7 +52,7 @@ def rehearsed(asked: Request, log: Path) -> int:
                 read_tlog(log),
                 told,
                 config.origin.frame,
-                follow=config.clock == "autopilot",
+                follow=config.clock != "wall",
             )
     except LogError as error:
         raise InputError(f"--autopilot: {error}") from None
