@@ -239,6 +239,9 @@ class GuardConfig(Settings):
     battery_critical: float = Field(0.1, ge=0.0, le=1.0, description="share left: it lands")
     fence_radius: float | None = Field(None, gt=0.0, description="m from the fleet origin: it comes back")
     fence_height: float | None = Field(None, gt=0.0, description="m above the fleet origin: it comes back")
+    displaced: Positive = Field(
+        5.0, description="m by which the own place may change with the autopilot's origin; beyond, it lands"
+    )
     tube: Positive = Field(1.0, description="m of tracking error at which the plan is anchored anew")
 
 

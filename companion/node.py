@@ -457,6 +457,8 @@ class Companion:
             self.guard.failing,
             late if self.pilot.streaming else 0,
             self.world.clock_steps,
+            self.world.moves,
+            self.world.displaced,
         )
         for concern, begins in self.watch.look(situation):
             if concern.name != "target":  # of that the world tells

@@ -38,7 +38,8 @@ class Concern(NamedTuple):
 class Situation(NamedTuple):
     """What concerns are judged by. ``late``: µs by which this step comes after the last one's due time;
     ``neighbours``: age (µs) by system id; ``holding``: what is flown; ``failing``: since when (µs) no plan
-    could be solved, None while they can; ``steps``: how often the autopilot's clock has been set."""
+    could be solved, None while they can; ``clock_steps``: how often the autopilot's clock has been set;
+    ``moves``: how often its origin has moved, the last time with the vehicle by ``displaced`` m."""
 
     now: int
     view: View
@@ -49,6 +50,8 @@ class Situation(NamedTuple):
     failing: int | None
     late: int
     clock_steps: int
+    moves: int = 0
+    displaced: float = 0.0
 
 
 class Change(NamedTuple):
@@ -69,6 +72,8 @@ class Watch:
         self._clock_steps = 0
         self._target_seen = False
         self._clock_until = 0
+        self._moves = 0
+        self._moved_until = 0
 
     def look(self, s: Situation) -> list[Change]:
         """What has changed since the last look."""
@@ -101,6 +106,7 @@ class Watch:
             self._fence(s),
             self._lateness(s),
             self._clock(s),
+            self._origin(s),
             *self._others(s),
         ]
         return [concern for concern in found if concern is not None]
@@ -178,6 +184,17 @@ class Watch:
             self._clock_steps = s.clock_steps
             self._clock_until = s.now + _REMEMBERED
         return Concern("clock", "The autopilot's clock has jumped") if s.now < self._clock_until else None
+
+    def _origin(self, s: Situation) -> Concern | None:
+        if s.moves != self._moves:
+            self._moves, self._moved_until = s.moves, s.now + _REMEMBERED
+        if s.now >= self._moved_until or s.phase in _ON_THE_GROUND:
+            return None
+        if not s.displaced <= self._config.guard.displaced:
+            return Concern(
+                "origin True", "Own position has jumped: landing", Reaction.LAND, Severity.CRITICAL
+            )
+        return Concern("origin False", "The autopilot's origin has moved")
 
     def _others(self, s: Situation) -> list[Concern]:
         limit = self._config.guard.neighbour_lost_us

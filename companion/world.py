@@ -78,6 +78,11 @@ class World:
         self._yaw: float | None = None
         self._yaw_time = 0
         self._yaw_rate = 0.0
+        self._left: State | None = None
+        self.moves = 0
+        """How often the autopilot's origin has moved in flight."""
+        self.displaced = 0.0
+        """m by which the last of these moved the vehicle itself in the fleet's frame; it should not have."""
         self.stamp = 0
         """The last time (µs since its boot) that the own autopilot told, 0 before the first."""
 
@@ -185,12 +190,14 @@ class World:
             self.stamp = message.time_boot
         if isinstance(message, LocalPosition):
             if self._local is not None:
+                place = self._local.position_to_fleet(message.position_ned)
                 self._own.measure(
-                    now,
-                    self._local.position_to_fleet(message.position_ned),
-                    self._local.velocity_to_fleet(message.velocity_ned),
-                    message.time_boot,
+                    now, place, self._local.velocity_to_fleet(message.velocity_ned), message.time_boot
                 )
+                if self._left is not None:
+                    self.moves += 1
+                    self.displaced = float(np.linalg.norm(place - self._left.position))
+                    self._left = None
         elif isinstance(message, Attitude):
             if self._local is not None:
                 self._yaw = self._local.yaw_to_fleet(message.yaw)
@@ -199,6 +206,7 @@ class World:
         elif isinstance(message, GpsGlobalOrigin):
             origin = (message.latitude, message.longitude, message.altitude)
             if origin != self._origin:
+                self._left = self._own.at(now)
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
                 # Where the vehicle was in the old frame must not be flown to in the new one.

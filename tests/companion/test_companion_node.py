@@ -411,6 +411,16 @@ def test_a_changed_origin_sends_nothing_far_away(flying):
         assert np.linalg.norm(message.position) < 10.0
 
 
+@pytest.mark.parametrize(("north", "lands"), [(2e-5, False), (1e-3, True)], ids=["2 m", "111 m"])
+def test_an_origin_that_takes_the_vehicle_along_is_not_believed(flying, north, lands):
+    """The vehicle says the same place in its own frame, whose origin moved: it cannot have."""
+    moved = GpsGlobalOrigin(AUTOPILOT, FLEET.latitude + north, FLEET.longitude, FLEET.altitude, 0)
+    flying.fly(0.5, flying.datagram("autopilot", moved))
+    assert "origin True" in flying.companion.watch.concerns or not lands
+    assert "origin False" in flying.companion.watch.concerns or lands
+    assert (flying.phase in (Phase.SETTLE, Phase.LAND, Phase.DONE)) == lands
+
+
 # What is shared
 
 

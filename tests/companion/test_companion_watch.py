@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from companion_bench import AUTOPILOT, FLEET, LAND, PREARM_OK, PROFILES, TAKEOFF, Bench, only, seen_at
@@ -97,6 +99,14 @@ LIMITS = {
     ),
     "a late step": ("lateness", {"late": GUARD.late_us}, {"late": GUARD.late_us + 1}, TELL),
     "a jump of the clock": ("clock", {"clock_steps": 0}, {"clock_steps": 1}, TELL),
+    "an origin that moved": ("origin", {}, {"moves": 1, "displaced": GUARD.displaced}, TELL),
+    "a jump with the origin": (
+        "origin",
+        {},
+        {"moves": 1, "displaced": GUARD.displaced + 0.1},
+        TO_LAND,
+    ),
+    "a jump to nowhere": ("origin", {}, {"moves": 1, "displaced": math.nan}, TO_LAND),
     "who took it over": ("custody", {"phase": Phase.ESCORT}, {"phase": Phase.YIELDED}, TELL),
 }
 
@@ -115,7 +125,10 @@ def test_a_concern_begins_at_its_limit_is_said_once_and_ends(name):
     # What began with the good one, if anything, was a milder form of the same.
     assert all(change.concern.name.split()[0] == concern for change in before)
     later = situation(
-        now=60 * SECOND, vehicle=vehicle(now=60 * SECOND), clock_steps=bad.get("clock_steps", 0)
+        now=60 * SECOND,
+        vehicle=vehicle(now=60 * SECOND),
+        clock_steps=bad.get("clock_steps", 0),
+        moves=bad.get("moves", 0),
     )
     assert {change.begins for change in watch.look(later)} == {False}
     assert watch.concerns == {}
