@@ -184,7 +184,8 @@ def test_blind_for_long_it_is_told_to_land(flying):
 
 
 def test_blind_and_thrown_out_of_its_mode_it_is_told_to_land_all_the_same():
-    """It hung, PX4 has left OFFBOARD meanwhile and does not take it back, and there is no position any more."""
+    """It hung, PX4 has left OFFBOARD meanwhile and does not take it back, and there is no position any
+    more."""
     flying = Bench("px4").take_off(5.0)
     flying.fly(0.5)
     flying.autopilot.mute = True
