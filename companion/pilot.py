@@ -200,6 +200,9 @@ class Pilot:
             self._keep(now)
         if self.phase is Phase.SETTLE:
             self._settle(now, view)
+        if self.phase not in STEERED:
+            # What is not wanted any more is not asked for, or who was thrown out of its mode never lands.
+            self._owner = Owner.OURS
         if self._owner is Owner.LOST:
             return self._ask_back(now)
         if self.phase is Phase.YIELDED and self.vehicle.alive and not self.vehicle.armed:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from companion_bench import AUTOPILOT, FLEET, LAND, PREARM_OK, PROFILES, TAKEOFF, Bench, only, seen_at
+from companion_bench import AUTOPILOT, FLEET, LAND, MODE, PREARM_OK, PROFILES, TAKEOFF, Bench, only, seen_at
 
 from companion.config import CompanionConfig
 from companion.guard import Holding
@@ -207,6 +207,22 @@ def test_blind_for_long_it_is_told_to_land(flying):
     assert LAND not in commands(sent)
     sent = flying.fly(1.5)
     assert LAND in commands(sent)
+
+
+def test_blind_and_thrown_out_of_its_mode_it_is_told_to_land_all_the_same():
+    """It hung, PX4 has left OFFBOARD meanwhile and does not take it back, and there is no position any
+    more."""
+    flying = Bench("px4").take_off(5.0)
+    flying.fly(0.5)
+    flying.autopilot.mute = True
+    flying.now += 1_500_000
+    sent = []
+    for _ in range(500):
+        flying.autopilot.mode = 4 << 16 | 3 << 24
+        sent += commands(flying.step())
+    assert MODE in sent
+    assert LAND in sent
+    assert MODE not in sent[sent.index(LAND) :]
 
 
 def test_a_neighbour_that_is_silent_is_said_and_still_kept_away_from(flying):

@@ -123,7 +123,7 @@ class Sorties:
         self._last_orders: dict[int, int] = {}
         self._rested = 0
         self._heard: deque[tuple[int, int, str]] = deque(maxlen=2000)
-        self.log: deque[str] = deque(maxlen=60)
+        self.log: deque[str] = deque(maxlen=400)
         self.begun: Counter[str] = Counter()
         self.judged: Counter[str] = Counter()
         self.concerns: Counter[str] = Counter()
@@ -308,7 +308,8 @@ class Sorties:
     def _brakes(self, craft: Craft, text: str, seconds: float) -> bool | None:
         if not self._steady(craft, text, seconds - 0.1):
             return None
-        return self._rows[craft.system][-1].braking
+        # In the last of them a plan may have come already that nobody has looked at yet.
+        return any(row.braking for row in self._since(craft, 0.3))
 
     def _hovers(self, craft: Craft, text: str, seconds: float) -> bool | None:
         """The set-points are at rest, or there are none."""
@@ -343,9 +344,11 @@ class Sorties:
         self.rests += 1
         for craft in self.field.crafts:
             row = self._rows[craft.system][-1]
-            self._must(
-                craft, row.phase is Phase.ESCORT and craft.companion.pilot.guided, "escorts after a rest"
+            pilot = craft.companion.pilot
+            how = (
+                f"{row.phase.value}, waits for {pilot.waiting_for!r}, in {craft.autopilot.mode}: {pilot.said}"
             )
+            self._must(craft, row.phase is Phase.ESCORT and pilot.guided, f"escorts after a rest: {how}")
             self._must(craft, not row.texts, f"nothing is amiss after a rest: {sorted(row.texts)}")
             off = craft.place - self.field.target.place
             far = math.hypot(math.hypot(off[0], off[1]) - RADIUS, off[2] - CONFIG.surface.height)
