@@ -273,10 +273,7 @@ class Sorties:
             )
             self._promise(craft, _DOWN, f"is down: {name}", lambda: self._is_down(craft))
         if text.endswith("coming back") and before.phase in (Phase.ESCORT, Phase.HOLD):
-            gone = (Phase.ESCORT, Phase.HOLD)
-            self._promise(
-                craft, 0.3, f"returns: {name}", lambda: self._rows[craft.system][-1].phase not in gone
-            )
+            self._promise(craft, 0.3, f"returns: {name}", lambda: self._returns(craft))
         if text.startswith((OLD, NO_PLAN)):
             self._promise(craft, 0.8, f"brakes: {name}", lambda: self._brakes(craft, text, 0.8))
             self._promise(craft, 2.5, f"hovers: {name}", lambda: self._hovers(craft, text, 2.5))
@@ -288,6 +285,12 @@ class Sorties:
             heard == text and system == craft.system and at >= since - 200_000
             for at, system, heard in self._heard
         )
+
+    def _returns(self, craft: Craft) -> bool | None:
+        """An operator may order otherwise."""
+        if self.field.loop.now - self._last_orders.get(craft.system, 0) < 2 * SECOND:
+            return None
+        return self._rows[craft.system][-1].phase not in (Phase.ESCORT, Phase.HOLD)
 
     def _is_down(self, craft: Craft) -> bool | None:
         if any(row.phase is Phase.YIELDED for row in self._rows[craft.system]):
