@@ -209,6 +209,9 @@ class GuardConfig(Settings):
     hold_us: Micros = Field(500_000, description="a plan is held for so long after the last good one")
     target_stale_us: Micros = 3_000_000
     plan_stale_us: Micros = Field(500_000, description="a shared horizon older than this is not used")
+    go_keeps_us: int = Field(
+        30_000_000, gt=0, le=600_000_000, description="a go that has not armed it by then is forgotten"
+    )
     landing_speed: Positive = Field(0.3, description="m/s; slower than this a vehicle may land")
     landing_clearance: Positive = Field(1.0, description="m, horizontally to the nearest neighbour, to land")
     settle_us: int = Field(30_000_000, ge=0, le=600_000_000, description="longest way from escort to landing")

@@ -29,8 +29,6 @@ REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
 OPERATORS_GO = "the operator's go"
 """What it waits for when all else is ready."""
 _NAN = float("nan")
-_KEEPS = 10_000_000
-"""µs within which a go must have armed the vehicle; later on nobody may be expecting it."""
 _BESIDE = 30.0
 """m from the box, on each axis, from where a vehicle may start."""
 _FAR = 20_000.0
@@ -287,7 +285,7 @@ class Pilot:
         if self._height is None:
             return
         self._go_at = now if self._go_at is None else self._go_at
-        if now - self._go_at > _KEEPS:
+        if now - self._go_at > self._config.guard.go_keeps_us:
             self._start_anew()
 
     def _unseen(self, view: View) -> str:

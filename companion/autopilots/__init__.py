@@ -24,8 +24,8 @@ class Profile(NamedTuple):
     ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer. ``streams_first``: set-points must
     flow before the mode is granted. ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level,
     not above home. ``hold_params``: p1…p3 of DO_SET_MODE for the mode, ``hold_mode`` and ``hold_name``, in
-    which it stays where it is by itself. ``loss_modes``: what custom_mode may be when set-points were missing
-    for too long, and nobody chose it. ``takeoff_modes`` and ``land_modes``: those into which NAV_TAKEOFF,
+    which it stays where it is by itself. ``fallen_modes``: what custom_mode may be when set-points were
+    missing for too long; ``loss_modes``: those of them that no pilot flies in. ``takeoff_modes`` and ``land_modes``: those into which NAV_TAKEOFF,
     where it changes the mode, and NAV_LAND lead.
     """
 
@@ -41,6 +41,7 @@ class Profile(NamedTuple):
     hold_mode: int
     hold_name: str
     land_modes: frozenset[int]
+    fallen_modes: frozenset[int] = frozenset()
     loss_modes: frozenset[int] = frozenset()
     takeoff_modes: frozenset[int] = frozenset()
 

@@ -20,7 +20,8 @@ PX4 = Profile(
     hold_name="HOLD",
     # Auto land, and precision landing.
     land_modes=frozenset((4 << 16 | 6 << 24, 4 << 16 | 9 << 24)),
-    # COM_OBL_RC_ACT may choose position, return or land as well: those a pilot chooses, too.
+    # COM_OBL_RC_ACT: position (or descend), hold, return, land.
+    fallen_modes=frozenset((3 << 16, _HOLD, 4 << 16 | 5 << 24, 4 << 16 | 6 << 24)),
     loss_modes=frozenset((_HOLD,)),
     takeoff_modes=frozenset((4 << 16 | 2 << 24,)),
 )

@@ -472,7 +472,7 @@ def test_what_happened_while_nothing_was_heard_may_have_been_a_pilot(mode):
 def test_a_go_that_came_too_early_is_forgotten(flavour):
     rig = Rig(flavour)
     assert rig.pilot.go(HEIGHT)
-    rig.run(10.5, beat(flavour), ILL, acks=True)
+    rig.run(30.5, beat(flavour), ILL, acks=True)
     sent = rig.run(30.0, beat(flavour), HEALTHY, acks=True)
     assert not {command for command, _ in sent} & {ARM, MODE, TAKEOFF}
     assert rig.pilot.waiting_for == "the operator's go"
@@ -482,7 +482,7 @@ def test_a_go_that_came_too_early_is_forgotten(flavour):
 def test_a_vehicle_that_does_not_arm_is_not_told_to_for_ever(flavour):
     rig = Rig(flavour).prepared()
     guided = beat(flavour, guided=flavour == "ardupilot")
-    rig.run(11.0, guided, HEALTHY, ack(ARM, result=4))
+    rig.run(31.0, guided, HEALTHY, ack(ARM, result=4))
     rig.sent.clear()
     rig.run(60.0, guided, HEALTHY, ack(ARM, result=4))
     assert not {command for _, command, _ in rig.sent} & {ARM, MODE, TAKEOFF}

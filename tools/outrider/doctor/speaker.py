@@ -146,7 +146,7 @@ class Speaker:
         match message:
             case Heartbeat():
                 profile = self.vehicle.profile
-                fell = profile is not None and message.custom_mode in profile.loss_modes
+                fell = profile is not None and message.custom_mode in profile.fallen_modes
                 failed = fell and message.system_status >= CRITICAL
                 self.guided_losses += guided and self.vehicle.armed and failed
             case StatusText():
