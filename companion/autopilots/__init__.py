@@ -25,8 +25,8 @@ class Profile(NamedTuple):
     flow before the mode is granted. ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level,
     not above home. ``hold_params``: p1…p3 of DO_SET_MODE for the mode, ``hold_mode`` and ``hold_name``, in
     which it stays where it is by itself. ``fallen_modes``: what custom_mode may be when set-points were
-    missing for too long; ``loss_modes``: those of them that no pilot flies in. ``takeoff_modes`` and ``land_modes``: those into which NAV_TAKEOFF,
-    where it changes the mode, and NAV_LAND lead.
+    missing for too long; ``loss_modes``: those of them that no pilot flies in. ``takeoff_modes`` and
+    ``land_modes``: those into which NAV_TAKEOFF, where it changes the mode, and NAV_LAND lead.
     """
 
     name: str
