@@ -90,8 +90,9 @@ def equipment() -> dict[str, str]:
 
 
 def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> dict[str, Any]:
-    """Fly a task, in JSON, for a ``sweep`` by ``run``, a ``module:function``: its ``entry``. Or ``restarted``:
-    this is not the worker ``me`` that was meant; or ``unable``: why no process can be started here."""
+    """Fly a task, in JSON, for a ``sweep`` by ``run``, a ``module:function``: its ``entry``. Or
+    ``restarted``: this is not the worker ``me`` that was meant; or ``unable``: why no process can be started
+    here."""
     if me != ME:
         return {"restarted": True}
     for _ in range(MOST_STARTS):

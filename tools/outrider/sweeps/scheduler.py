@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from threading import Thread
 from typing import Any
 
 import dask
@@ -11,34 +12,58 @@ import dask
 from outrider.errors import InputError
 
 CONNECT_S = 5.0
-_ADDRESS = re.compile(
-    r"(?:(?P<kind>tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.%]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})"
-)
+_ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})")
 # What Dask would say of workers that come and go the sweep says itself. Read when distributed is imported.
-dask.config.set({"logging.distributed": "critical", "logging.distributed.client": "critical"})
+dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}})
 
 
 def connected(address: str) -> Any:
     """A `distributed.Client` of the scheduler at ``address``. InputError if there is none."""
+    found = _ADDRESS.fullmatch(address)
+    if found is None or not 0 < int(found["port"]) < 65536:
+        raise InputError(f"--scheduler {address}: is no address; allowed: tcp://HOST:PORT, or tls://HOST:PORT")
+    if address.startswith("tls:") and not _has_tls():
+        raise InputError(
+            f"--scheduler {address}: there are no certificates for TLS here; allowed: Dask's own settings, as "
+            "DASK_DISTRIBUTED__COMM__TLS__CA_FILE"
+        )
+    ended: list[Any] = []
+    # In a thread, as Dask waits for ever for a first word that is none of its protocol.
+    thread = Thread(target=_connect, args=(address, ended), daemon=True)
+    thread.start()
+    thread.join(2 * CONNECT_S)
+    if ended and not isinstance(ended[0], Exception):
+        return ended[0]
+    if ended and isinstance(ended[0], OSError):
+        why = "nobody answers there"
+    elif ended:
+        why = f"no Dask scheduler answers there ({type(ended[0]).__name__}: {' '.join(str(ended[0]).split())})"
+    else:
+        why = "whoever answers there is no Dask scheduler"
+    raise InputError(
+        f"--scheduler {address}: {why}; allowed: the address that `dask scheduler` says when it starts"
+    )
+
+
+def _has_tls() -> bool:
+    from distributed.security import Security
+
+    return Security().get_connection_args("client")["ssl_context"] is not None  # type: ignore[no-untyped-call]
+
+
+def _connect(address: str, ended: list[Any]) -> None:
+    """Put into ``ended`` the client, or what it raised."""
     from distributed import Client
     from distributed.versions import VersionMismatchWarning
 
-    found = _ADDRESS.fullmatch(address)
-    if found is None or not 0 < int(found["port"]) < 65536:
-        raise InputError(
-            f"--scheduler {address}: is no address; allowed: tcp://HOST:PORT, or tls://HOST:PORT"
-        )
-    # Which worker has what is looked at when it comes.
+    # Which versions a worker has is looked at when it comes.
     warnings.simplefilter("ignore", VersionMismatchWarning)
     try:
-        return Client(  # type: ignore[no-untyped-call]
+        client = Client(  # type: ignore[no-untyped-call]
             address, timeout=CONNECT_S, set_as_default=False, name="outrider-sweep"
         )
-    except OSError as error:
-        why = "nobody answers there" if isinstance(error, TimeoutError) else " ".join(str(error).split())
     except Exception as error:
-        # Something else may listen there, and whatever it says is no scheduler.
-        why = f"no Dask scheduler answers there ({type(error).__name__}: {' '.join(str(error).split())})"
-    raise InputError(
-        f"--scheduler {address}: {why}; allowed: the address that `dask scheduler` prints when it starts"
-    )
+        # Whatever it is that speaks there.
+        ended.append(error)
+    else:
+        ended.append(client)
