@@ -16,7 +16,7 @@ HERE = str(Path(__file__).parent)
 
 
 class Machines:
-    """Use it as a context: it leaves no process behind. ``folder`` is where the runs of `sweep_runs` count."""
+    """Use it as a context: it leaves no process behind. In ``folder`` the runs of `sweep_runs` keep count."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -44,12 +44,18 @@ class Machines:
     def worker(self, threads: int = 1, path: str = "", port: int = 0) -> subprocess.Popen[bytes]:
         """Start one. ``path``: where it finds modules before all others."""
         options = [self.address, "--nthreads", str(threads), "--no-nanny", "--no-dashboard"]
-        options += ["--host", "127.0.0.1", "--worker-port", str(port)]
-        return self._start("worker", *options, path=path)
+        options += ["--host", "127.0.0.1", "--worker-port", str(port), "--local-directory", str(self._folder)]
+        process = self._start("worker", *options, path=path)
+        while "Registered to" not in self._said(process).read_text():
+            time.sleep(0.05)
+        return process
 
     def kill(self, process: subprocess.Popen[bytes]) -> None:
         process.send_signal(signal.SIGKILL)
         process.wait()
+
+    def _said(self, process: subprocess.Popen[bytes]) -> Path:
+        return self._folder / f"process-{self._processes.index(process)}.txt"
 
     def _start(self, *words: str, path: str = "") -> subprocess.Popen[bytes]:
         places = [place for place in (path, HERE, *sys.path) if place]
@@ -57,17 +63,11 @@ class Machines:
             **os.environ,
             "PYTHONPATH": os.pathsep.join(places),
             sweep_runs.FOLDER: str(self._folder),
-            "DASK_DISTRIBUTED__WORKER__USE_FILE_LOCKING": "False",
         }
-        process = subprocess.Popen(
-            [sys.executable, "-m", "dask", *words, "--local-directory", str(self._folder)]
-            if words[0] == "worker"
-            else [sys.executable, "-m", "dask", *words],
-            env=environment,
-            cwd=self._folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=(self._folder / f"{words[0]}-{len(self._processes)}.txt").open("wb"),
-        )
+        command = [sys.executable, "-m", "dask", *words]
+        with (self._folder / f"process-{len(self._processes)}.txt").open("wb") as said:
+            process = subprocess.Popen(
+                command, env=environment, cwd=self._folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said
+            )
         self._processes.append(process)
         return process

@@ -32,7 +32,9 @@ from outrider.sweeps.tasks import AbandonedError, Ended, Entry, Task
 
 PATIENCE_S = 300.0
 """So long a sweep waits when there is no worker."""
-_TICK_S, _LOOK_S, _FETCH_S, _GOODBYE_S = 0.5, 1.0, 2.0, 5.0
+_INTRODUCTION = "__import__('outrider.sweeps.crew', fromlist=['crew']).introduce()"
+"""As a text: a function that a Dask worker cannot find ends it, where there is no outrider, or an older one."""
+_TICK_S, _LOOK_S, _FETCH_S, _GOODBYE_S = 0.5, 1.0, 2.0, 3.0
 
 
 @dataclass
@@ -70,7 +72,7 @@ class Cluster:
         self._flights: dict[Key, _Flight] = {}
         self._answers: SimpleQueue[Future[Any]] = SimpleQueue()
         self._looked = self._served = -float("inf")
-        self._ever_served = self._said = False
+        self._flown = self._said = False
         self._client = connected(address)
 
     def __enter__(self) -> Cluster:
@@ -115,10 +117,10 @@ class Cluster:
         for address, threads in there.items():
             if address not in self._sites:
                 self._sites[address] = site = _Site(address, threads)
-                self._submit(site, None, crew.introduce)
+                self._submit(site, None, eval, _INTRODUCTION)
         if any(site.refused is None for site in self._sites.values()):
             self._served = now
-        elif self._sites and not self._ever_served:
+        elif self._sites and not self._flown:
             lines = (f"{site.address}: {site.refused}" for site in self._sites.values())
             raise InputError(*(f"--scheduler {self._address}: no worker can fly: {line}" for line in lines))
         elif now - self._served >= self._patience:
@@ -178,13 +180,14 @@ class Cluster:
             self._refuse(site, f"cannot fly: {answer['unable']}")
         elif task is not None:
             entry = Entry(**answer["entry"])
+            self._flown = True
             if entry.status == "lost":
                 backlog.lost(task)
             ended(entry)
         elif wrong := differences(answer["versions"], self._versions, "here"):
             self._refuse(site, f"{', '.join(wrong)}; allowed: the same there and here")
         else:
-            site.me, self._ever_served = answer["me"], True
+            site.me = answer["me"]
 
     def _lose(self, flight: _Flight, what: str, backlog: Backlog, ended: Ended) -> None:
         self._drop(flight)

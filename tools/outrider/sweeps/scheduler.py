@@ -21,11 +21,13 @@ def connected(address: str) -> Any:
     """A `distributed.Client` of the scheduler at ``address``. InputError if there is none."""
     found = _ADDRESS.fullmatch(address)
     if found is None or not 0 < int(found["port"]) < 65536:
-        raise InputError(f"--scheduler {address}: is no address; allowed: tcp://HOST:PORT, or tls://HOST:PORT")
+        raise InputError(
+            f"--scheduler {address}: is no address; allowed: tcp://HOST:PORT, or tls://HOST:PORT"
+        )
     if address.startswith("tls:") and not _has_tls():
         raise InputError(
-            f"--scheduler {address}: there are no certificates for TLS here; allowed: Dask's own settings, as "
-            "DASK_DISTRIBUTED__COMM__TLS__CA_FILE"
+            f"--scheduler {address}: there are no certificates for TLS here; allowed: Dask's own settings, "
+            "as DASK_DISTRIBUTED__COMM__TLS__CA_FILE"
         )
     ended: list[Any] = []
     # In a thread, as Dask waits for ever for a first word that is none of its protocol.
@@ -37,7 +39,9 @@ def connected(address: str) -> Any:
     if ended and isinstance(ended[0], OSError):
         why = "nobody answers there"
     elif ended:
-        why = f"no Dask scheduler answers there ({type(ended[0]).__name__}: {' '.join(str(ended[0]).split())})"
+        why = (
+            f"no Dask scheduler answers there ({type(ended[0]).__name__}: {' '.join(str(ended[0]).split())})"
+        )
     else:
         why = "whoever answers there is no Dask scheduler"
     raise InputError(
