@@ -274,12 +274,18 @@ def sweep(
         Optional[str],  # noqa: UP045
         typer.Option(metavar="ADDRESS", help="Fly on the workers of a Dask scheduler: tcp://HOST:PORT."),
     ] = None,
+    regressions: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(metavar="FOLDER", help="Write every run that failed there, as a scenario."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
     """Fly many seeds of a grid of scenarios or random scenes. What was killed can be gone on with."""
     from outrider.sweeps.command import sweep as sweeping
 
-    raise typer.Exit(sweeping(name, runs, jobs, out, as_json, wall_limit, scheduler=scheduler))
+    raise typer.Exit(
+        sweeping(name, runs, jobs, out, as_json, wall_limit, scheduler=scheduler, failures=regressions)
+    )
 
 
 @app.command()

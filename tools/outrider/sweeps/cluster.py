@@ -33,7 +33,7 @@ from outrider.sweeps.tasks import AbandonedError, Ended, Entry, Task
 PATIENCE_S = 300.0
 """So long a sweep waits when there is no worker."""
 _INTRODUCTION = "__import__('outrider.sweeps.crew', fromlist=['crew']).introduce()"
-"""As a text: a function that a Dask worker cannot find ends it, where there is no outrider, or an older one."""
+"""As a text: a function that a Dask worker cannot find ends it, and there may be no outrider there."""
 _TICK_S, _LOOK_S, _FETCH_S, _GOODBYE_S = 0.5, 1.0, 2.0, 3.0
 
 

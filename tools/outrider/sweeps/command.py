@@ -14,7 +14,7 @@ from typing import Any
 from outrider.errors import InputError
 from outrider.resources import find
 from outrider.sweeps import directory as places
-from outrider.sweeps import picture
+from outrider.sweeps import page, picture, regressions, tables
 from outrider.sweeps.cells import Cell, cells, task
 from outrider.sweeps.execution import Workers, cores, has_ended, header, work
 from outrider.sweeps.flying import RUN
@@ -41,13 +41,15 @@ def sweep(
     wall_limit_s: float = WALL_LIMIT_S,
     run: str = RUN,
     scheduler: str | None = None,
+    failures: Path | None = None,
 ) -> int:
     """Fly the sweep ``name``, a file or a shipped one, and show its summary; the exit status.
 
     0 all runs ended well; 1 a violation of d_min or a goal not reached; 3 a run raised or is lost for good,
     or the sweep was interrupted. InputError for what cannot be flown, before anything is. ``runs`` in place
     of the file's number of seeds; ``jobs`` workers, one for each core by default, or the workers of a Dask
-    ``scheduler``; ``run`` is what a worker calls, ``module:function``.
+    ``scheduler``; ``run`` is what a worker calls, ``module:function``. Runs that failed
+    are written to the folder ``failures`` as scenarios.
     """
     path = find("sweeps", name)
     spec = load(path, Sweep)
@@ -74,7 +76,12 @@ def sweep(
             )
             return INTERRUPTED
         wall = time.perf_counter() - began
-        return _conclude(spec, found, journal, folder, as_json, _Effort(waiting, watch, wall))
+        status = _conclude(spec, found, journal, folder, as_json, _Effort(waiting, watch, wall))
+        if failures is not None:
+            runs_of = {cell.key: _runs(journal, cell, spec) for cell in found}
+            files = regressions.write(failures, spec.name, found, runs_of)
+            sys.stderr.write(f"{len(files)} runs that failed are scenarios in {failures}\n")
+        return status
 
 
 def _workers(
@@ -112,6 +119,8 @@ def _conclude(
     summary = document(spec.name, spec.first_seed, reports)
     (folder / places.SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     picture.draw(spec.name, reports, runs, folder / places.PICTURE)
+    page.write(folder / page.PAGE, spec.name, reports, folder / places.PICTURE)
+    tables.write(folder, reports, runs)
     labels = {cell.key: cell.label for cell in found}
     if as_json:
         whole = {**summary, "sweep_dir": str(folder), "wall": effort.document(labels)}
