@@ -152,6 +152,7 @@ def test_what_was_flown_is_kept_and_gone_on_with_here(
     assert said.out == ""
     why = "stopped after" if who == "sweep" else f"the scheduler {mortal.address} has gone; stopped after"
     assert f"{why} " in said.err
+    assert "ERROR" not in said.err
     assert f"outrider sweep methods.yaml --out out --scheduler {mortal.address}" in said.err
     kept = len(Path("out/journal.jsonl").read_text().splitlines()) - 1
     assert 0 < kept < 200

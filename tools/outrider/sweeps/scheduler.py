@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import warnings
 from threading import Thread
 from typing import Any
 
-import dask
-
 from outrider.errors import InputError
 
 CONNECT_S = 5.0
 _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})")
-# What Dask would say of workers that come and go the sweep says itself. Read when distributed is imported.
-dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}})
 
 
 def connected(address: str) -> Any:
@@ -60,6 +57,9 @@ def _connect(address: str, ended: list[Any]) -> None:
     from distributed import Client
     from distributed.versions import VersionMismatchWarning
 
+    # What Dask would say of connections that come and go the sweep says itself.
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     # Which versions a worker has is looked at when it comes.
     warnings.simplefilter("ignore", VersionMismatchWarning)
     try:
