@@ -58,7 +58,7 @@ def with_uv(uv: str) -> None:
     """uv makes .venv, finds or fetches a Python, and shows its own progress."""
     say("setting up .venv with uv")
     environment = dict(os.environ, UV_PROJECT_ENVIRONMENT=VENV)
-    extras = [word for extra in ("sitl", "export", "view") for word in ("--extra", extra)]
+    extras = [word for extra in ("sitl", "export", "view", "cluster") for word in ("--extra", extra)]
     command = [uv, "sync", "--locked", *extras, "--project", ROOT]
     if subprocess.call(command, stdin=subprocess.DEVNULL, env=environment) != 0:
         raise SetupError("uv sync failed, see above")

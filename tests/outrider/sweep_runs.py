@@ -127,3 +127,29 @@ def _count(task: Task) -> int:
     with path.open("a") as file:
         file.write(f"{os.getpid()}\n")
     return len(path.read_text().splitlines())
+
+
+def kills_machine(task: Task) -> dict[str, Any]:
+    """`swap`; the first one with seed 5, of whatever cell, takes down what has started its process."""
+    if task.seed == 5 and _first("machine"):
+        os.kill(os.getppid(), signal.SIGKILL)
+        signal.pause()
+    return swap(task)
+
+
+def kills_other(task: Task) -> dict[str, Any]:
+    """`swap`; the first one with seed 5 ends the process whose id is in the file ``other``, by the signal
+    that is there too."""
+    if task.seed == 5 and _first("other-begun"):
+        other, which = (Path(os.environ[FOLDER]) / "other").read_text().split()
+        os.kill(int(other), int(which))
+        signal.pause()
+    return swap(task)
+
+
+def _first(name: str) -> bool:
+    try:
+        (Path(os.environ[FOLDER]) / name).touch(exist_ok=False)
+    except FileExistsError:
+        return False
+    return True

@@ -30,6 +30,8 @@ _EXTRAS: Final = {
     "mcap": "export",
     "pyarrow": "export",
     "viser": "view",
+    "dask": "cluster",
+    "distributed": "cluster",
 }
 """What only an extra of the package installs."""
 # Click's UsageError: typer has no name of its own for it, and newer ones bring their own click.
@@ -268,12 +270,22 @@ def sweep(
     jobs: Annotated[Optional[int], typer.Option(min=1, help="Processes; as many as cores.")] = None,  # noqa: UP045
     out: Annotated[Optional[Path], typer.Option(help="Directory; one begun is gone on with.")] = None,  # noqa: UP045
     wall_limit: Annotated[float, typer.Option(min=1.0, help="s of wall time for one run.")] = 1800.0,
+    scheduler: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(metavar="ADDRESS", help="Fly on the workers of a Dask scheduler: tcp://HOST:PORT."),
+    ] = None,
+    regressions: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(metavar="FOLDER", help="Write every run that failed there, as a scenario."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
     """Fly many seeds of a grid of scenarios or random scenes. What was killed can be gone on with."""
     from outrider.sweeps.command import sweep as sweeping
 
-    raise typer.Exit(sweeping(name, runs, jobs, out, as_json, wall_limit))
+    raise typer.Exit(
+        sweeping(name, runs, jobs, out, as_json, wall_limit, scheduler=scheduler, failures=regressions)
+    )
 
 
 @app.command()

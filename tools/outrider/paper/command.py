@@ -16,6 +16,7 @@ from outrider.sweeps import directory as places
 from outrider.sweeps.cells import Cell, task
 from outrider.sweeps.execution import cores, has_ended, header, work
 from outrider.sweeps.journal import Journal, opened
+from outrider.sweeps.pool import Pool
 from outrider.sweeps.progress import watching
 from outrider.sweeps.runs import run_of
 
@@ -43,8 +44,11 @@ def paper(
     with opened(folder / places.JOURNAL, header("paper", found)) as journal:
         tasks = [task(cell, seed) for seed in numbers for cell in found]
         waiting = [one for one in tasks if not has_ended(journal, one)]
-        with watching(len(tasks), len(tasks) - len(waiting)) as watch:
-            stopped = work(journal, waiting, watch, run, jobs or cores(), _WALL_LIMIT_S)
+        with (
+            watching(len(tasks), len(tasks) - len(waiting)) as watch,
+            Pool(run, jobs or cores(), _WALL_LIMIT_S) as pool,
+        ):
+            stopped = work(journal, waiting, watch, pool)
         if stopped:
             left = sum(not has_ended(journal, one) for one in tasks)
             sys.stderr.write(

@@ -7,17 +7,20 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any
 
+from outrider.errors import InputError
 from outrider.resources import find
 from outrider.sweeps import directory as places
-from outrider.sweeps import picture
+from outrider.sweeps import page, picture, regressions, tables
 from outrider.sweeps.cells import Cell, cells, task
-from outrider.sweeps.execution import cores, has_ended, header, work
+from outrider.sweeps.execution import Workers, cores, has_ended, header, work
 from outrider.sweeps.flying import RUN
 from outrider.sweeps.grid import Sweep
 from outrider.sweeps.journal import Journal, opened
+from outrider.sweeps.pool import Pool
 from outrider.sweeps.progress import Watch, duration, watching
 from outrider.sweeps.report import CellReport, cell_report, document, exit_status
 from outrider.sweeps.runs import Run, run_of
@@ -37,36 +40,63 @@ def sweep(
     as_json: bool = False,
     wall_limit_s: float = WALL_LIMIT_S,
     run: str = RUN,
+    scheduler: str | None = None,
+    failures: Path | None = None,
 ) -> int:
     """Fly the sweep ``name``, a file or a shipped one, and show its summary; the exit status.
 
     0 all runs ended well; 1 a violation of d_min or a goal not reached; 3 a run raised or is lost for good,
     or the sweep was interrupted. InputError for what cannot be flown, before anything is. ``runs`` in place
-    of the file's number of seeds; ``jobs`` workers, one for each core by default; ``run`` is what a worker
-    calls, ``module:function``.
+    of the file's number of seeds; ``jobs`` workers, one for each core by default, or the workers of a Dask
+    ``scheduler``; ``run`` is what a worker calls, ``module:function``. Runs that failed
+    are written to the folder ``failures`` as scenarios.
     """
     path = find("sweeps", name)
     spec = load(path, Sweep)
     if runs is not None:
         spec = spec.model_copy(update={"runs": runs})
     found = cells(spec, str(path))
-    folder = places.prepare(out, spec.name)
-    began = time.perf_counter()
-    with opened(folder / places.JOURNAL, header(spec.name, found)) as journal:
+    with ExitStack() as open_:
+        # Before there is a directory: a scheduler that does not answer leaves none.
+        workers = open_.enter_context(_workers(run, jobs, wall_limit_s, scheduler))
+        folder = places.prepare(out, spec.name)
+        began = time.perf_counter()
+        journal = open_.enter_context(opened(folder / places.JOURNAL, header(spec.name, found)))
         tasks = [task(cell, seed) for seed in spec.seeds for cell in found]
         waiting = [one for one in tasks if not has_ended(journal, one)]
         with watching(len(tasks), len(tasks) - len(waiting)) as watch:
-            stopped = work(journal, waiting, watch, run, jobs or cores(), wall_limit_s)
-        if stopped:
+            stopped = work(journal, waiting, watch, workers)
+        if stopped is not None:
             left = sum(not has_ended(journal, one) for one in tasks)
             words = ["outrider", "sweep", name, *([] if runs is None else ["--runs", str(runs)]), "--out"]
+            words += [str(folder), *([] if scheduler is None else ["--scheduler", scheduler])]
             sys.stderr.write(
-                f"stopped after {len(tasks) - left} of {len(tasks)} runs, which are kept; this goes on with "
-                f"the rest: {shlex.join([*words, str(folder)])}\n"
+                f"{stopped} after {len(tasks) - left} of {len(tasks)} runs, which are kept; this goes on "
+                f"with the rest: {shlex.join(words)}\n"
             )
             return INTERRUPTED
         wall = time.perf_counter() - began
-        return _conclude(spec, found, journal, folder, as_json, _Effort(waiting, watch, wall))
+        status = _conclude(spec, found, journal, folder, as_json, _Effort(waiting, watch, wall))
+        if failures is not None:
+            runs_of = {cell.key: _runs(journal, cell, spec) for cell in found}
+            files = regressions.write(failures, spec.name, found, runs_of)
+            sys.stderr.write(f"{len(files)} runs that failed are scenarios in {failures}\n")
+        return status
+
+
+def _workers(
+    run: str, jobs: int | None, wall_limit_s: float, scheduler: str | None
+) -> AbstractContextManager[Workers]:
+    if scheduler is None:
+        return Pool(run, jobs or cores(), wall_limit_s)
+    if jobs is not None:
+        raise InputError(
+            "--jobs does not go with --scheduler; allowed: one of them: a Dask worker flies as many runs at "
+            "a time as it has threads (dask worker --nthreads)"
+        )
+    from outrider.sweeps.cluster import Cluster
+
+    return Cluster(scheduler, run, wall_limit_s)
 
 
 class _Effort:
@@ -89,6 +119,8 @@ def _conclude(
     summary = document(spec.name, spec.first_seed, reports)
     (folder / places.SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     picture.draw(spec.name, reports, runs, folder / places.PICTURE)
+    page.write(folder / page.PAGE, spec.name, reports, folder / places.PICTURE)
+    tables.write(folder, reports, runs)
     labels = {cell.key: cell.label for cell in found}
     if as_json:
         whole = {**summary, "sweep_dir": str(folder), "wall": effort.document(labels)}

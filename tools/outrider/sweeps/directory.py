@@ -1,8 +1,8 @@
 """The directory of a sweep, and the commands that replay its runs.
 
-``journal.jsonl`` · ``summary.json`` · ``sweep.png`` · ``cells/``: scenarios as they are flown, so that a
-command names one exactly, whatever becomes of the shipped files · ``replays/``: where those commands put
-their runs.
+``journal.jsonl`` · ``summary.json``, ``.html``, ``.parquet`` · ``runs.parquet`` · ``sweep.png`` · ``cells/``:
+scenarios as they are flown, so that a command names one exactly, whatever becomes of the shipped files ·
+``replays/``: where those commands put their runs.
 """
 
 from __future__ import annotations

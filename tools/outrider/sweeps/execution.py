@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import hashlib
 import os
-import platform
-from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Callable, Iterable, Sequence
+from typing import Protocol
 
 from outrider.sweeps.cells import Cell
 from outrider.sweeps.journal import Header, Journal
-from outrider.sweeps.pool import Pool
 from outrider.sweeps.progress import Watch
-from outrider.sweeps.sources import digest, sources
-from outrider.sweeps.tasks import Entry, Task
-
-_PACKAGES = ("outrider", "numpy", "scipy", "numba", "piqp", "filterpy", "pymavlink", "pymap3d")
+from outrider.sweeps.sources import versions
+from outrider.sweeps.tasks import AbandonedError, Ended, Entry, Task
 
 
-def work(
-    journal: Journal, waiting: Sequence[Task], watch: Watch, run: str, jobs: int, wall_limit_s: float
-) -> bool:
-    """Run what is waiting; True if somebody pressed Ctrl-C."""
+class Workers(Protocol):
+    """Who runs tasks: a `Pool` of processes here, or a `Cluster` of machines."""
+
+    def work(self, tasks: Iterable[Task], ended: Ended, tick: Callable[[], None]) -> None:
+        """Run all tasks. ``ended`` hears of each run that has ended, of a lost one each time; ``tick`` is
+        called at least every second or so. AbandonedError if the rest cannot be run."""
+
+
+def work(journal: Journal, waiting: Sequence[Task], watch: Watch, workers: Workers) -> str | None:
+    """Run what is waiting; why it was stopped before the end, if it was: somebody pressed Ctrl-C, or there is
+    nobody left to run it."""
 
     def ended(entry: Entry) -> None:
         journal.append(entry)
@@ -32,11 +35,12 @@ def work(
         watch.tick()
 
     try:
-        with Pool(run, jobs, wall_limit_s) as pool:
-            pool.work(waiting, ended, tick)
+        workers.work(waiting, ended, tick)
     except KeyboardInterrupt:
-        return True
-    return False
+        return "stopped"
+    except AbandonedError as error:
+        return f"{error}; stopped"
+    return None
 
 
 def has_ended(journal: Journal, one: Task) -> bool:
@@ -48,14 +52,7 @@ def has_ended(journal: Journal, one: Task) -> bool:
 def header(name: str, found: Sequence[Cell]) -> Header:
     """The sweep is its cells: more runs of the same go on in the same journal."""
     of_cells = hashlib.sha256(" ".join(sorted(cell.key for cell in found)).encode()).hexdigest()
-    versions = {"python": platform.python_version(), "machine": platform.machine()}
-    versions["code"] = digest(sources())
-    for package in _PACKAGES:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            versions[package] = "none"
-    return Header(name, of_cells, versions)
+    return Header(name, of_cells, versions())
 
 
 def cores() -> int:

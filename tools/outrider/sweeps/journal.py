@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast, get_args
 
 from outrider.errors import InputError, OutriderError
+from outrider.sweeps.sources import differences
 from outrider.sweeps.tasks import Entry, Status
 
 FORMAT = 1
@@ -128,12 +129,7 @@ def _check(first: dict[str, Any], path: Path, header: Header) -> None:
         )
     before = first.get("versions")
     if before != header.versions:
-        before = before if isinstance(before, dict) else {}
-        changed = [
-            f"{name} {before.get(name)} (now {header.versions.get(name)})"
-            for name in sorted(before.keys() | header.versions.keys())
-            if before.get(name) != header.versions.get(name)
-        ]
+        changed = differences(before if isinstance(before, dict) else {}, header.versions, "now")
         raise InputError(
             f"{path}:1: was flown with {', '.join(changed)}; its runs and new ones cannot be mixed; allowed: "
             "the same versions, or another --out"

@@ -1,9 +1,12 @@
-"""Which code flies: a hash over our own sources, as a version that seldom changes says nothing."""
+"""Which code flies: a hash over our own sources, as a version that seldom changes says nothing, and the
+versions of what else results come from."""
 
 from __future__ import annotations
 
 import hashlib
+import platform
 from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -12,6 +15,33 @@ from outrider.resources import config_root
 
 _PACKAGES = ("companion", "mavlink_bridge", "outrider", "sitl")
 _LENGTH = 16
+_OTHERS = ("outrider", "numpy", "scipy", "numba", "piqp", "filterpy", "pymavlink", "pymap3d")
+
+
+def versions() -> dict[str, str]:
+    """All that results depend on beside the task."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    found["code"] = digest(sources())
+    for package in _OTHERS:
+        found[package] = version_of(package)
+    return found
+
+
+def differences(theirs: Mapping[str, str], ours: Mapping[str, str], word: str) -> list[str]:
+    """In which of `versions` two differ, as ``numpy 2.3.0 (WORD 2.4.1)``."""
+    return [
+        f"{name} {theirs.get(name)} ({word} {ours.get(name)})"
+        for name in sorted(theirs.keys() | ours.keys())
+        if theirs.get(name) != ours.get(name)
+    ]
+
+
+def version_of(package: str) -> str:
+    """``none`` if it is not installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "none"
 
 
 def sources() -> dict[str, Path]:

@@ -44,11 +44,15 @@ def _table(name: str, cells: Sequence[CellReport]) -> Table:
     table.add_column("", no_wrap=True)
     for cell in cells:
         table.add_column(Text(cell.label), justify="right", overflow="fold")
-    for words, text_of in _ROWS:
-        row = [text_of(cell) for cell in cells]
-        if any(row):
-            table.add_row(words, *row)
+    for words, texts in rows(cells):
+        table.add_row(words, *texts)
     return table
+
+
+def rows(cells: Sequence[CellReport]) -> list[tuple[str, list[str]]]:
+    """What each figure is, and its text for each cell; without those that say nothing of any."""
+    found = [(words, [text_of(cell) for cell in cells]) for words, text_of in _ROWS]
+    return [(words, texts) for words, texts in found if any(texts)]
 
 
 def _reason(cell: CellReport, one: Named) -> str:

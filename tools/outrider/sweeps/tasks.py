@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
+
+from outrider.errors import OutriderError
 
 Status = Literal["done", "fault", "lost"]
 
@@ -38,3 +41,10 @@ class Entry(NamedTuple):
     def run(self) -> tuple[str, int]:
         """What names the run."""
         return self.key, self.seed
+
+
+Ended = Callable[[Entry], None]
+
+
+class AbandonedError(OutriderError):
+    """There is nobody left to run tasks. What has ended is kept."""

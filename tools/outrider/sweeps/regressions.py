@@ -1,0 +1,48 @@
+"""Runs that failed as scenario files, to be flown again after every change."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from outrider.errors import InputError
+from outrider.sweeps.cells import Cell, scenario_of, scenario_text, task
+from outrider.sweeps.runs import Ending, Run
+
+_MARK = "# A run of a sweep that failed"
+
+
+def write(folder: Path, sweep: str, cells: Sequence[Cell], runs: Mapping[str, Sequence[Run]]) -> list[Path]:
+    """A file in ``folder`` for each run that did not end well: SWEEP-CELL-seedN.yaml, which begins with what
+    went wrong and the command that flies it. ``runs`` holds those of each cell by its key. InputError, and
+    nothing written, if a file is there that is none of these."""
+    files: dict[Path, str] = {}
+    for cell in cells:
+        for run in runs[cell.key]:
+            if run.ending is not Ending.FINE:
+                path = folder / f"{sweep}-{cell.slug}-seed{run.seed}.yaml"
+                files[path] = _text(path, sweep, cell, run)
+    for path in files:
+        if path.exists() and not path.read_bytes().startswith(_MARK.encode()):
+            raise InputError(f"--regressions: {path} is there, and none of a sweep; nothing is overwritten")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, text in files.items():
+            path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"--regressions {folder}: cannot be written to: {error.strerror}") from None
+    return list(files)
+
+
+def _text(path: Path, sweep: str, cell: Cell, run: Run) -> str:
+    words = [run.ending.value]
+    if run.separation is not None:
+        words.append(f"least separation {run.separation:g} m")
+    if run.what:
+        words.append(run.what)
+    # One line each, whatever an error or a label says.
+    why, label = (" ".join(text.split()) for text in (", ".join(words), cell.label))
+    command = shlex.join(["outrider", "swarm", path.name, "--seed", str(run.seed)])
+    head = f"{_MARK}: sweep {sweep}, {label}, seed {run.seed}: {why}\n# {command}\n"
+    return head + scenario_text(scenario_of(task(cell, run.seed)))
