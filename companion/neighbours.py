@@ -16,7 +16,8 @@ from companion.forces import Obstacles
 from companion.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.plan_clock import PlanClock
 from companion.reception import AUTOPILOT
-from companion.tracks import Track
+from companion.estimator import Measured
+from companion.tracks import Track, measured
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition, Tunnel
@@ -30,7 +31,7 @@ _STRAYED = 1.0
 """A neighbour further than this (m) from its own plan is not where it says: its track counts."""
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _read(payload: bytes) -> tuple[int, Horizon]:
     """Fingerprint and horizon of a plan on the wire. Where many companions share a process each plan is read
     once. Raises PlanWireError."""
@@ -40,13 +41,11 @@ def _read(payload: bytes) -> tuple[int, Horizon]:
     return plan.origin, horizon
 
 
-@lru_cache(maxsize=256)
-def _placed(fleet: FleetFrame, message: GlobalPosition) -> tuple[Array, Array]:
-    """Position and velocity (3,) of a message, fleet-local ENU; each worked out once in a process."""
+@lru_cache(maxsize=1024)
+def _placed(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measured | None:  # noqa: FBT001
+    """What a message measures, as ``measured`` has it; each worked out once in a process."""
     position = fleet.to_enu(message.latitude, message.longitude, message.altitude)
-    velocity = ned_to_enu(message.velocity_ned)
-    position.flags.writeable = velocity.flags.writeable = False
-    return position, velocity
+    return measured(position, ned_to_enu(message.velocity_ned), upward=upward)
 
 
 class Neighbours:
@@ -57,8 +56,11 @@ class Neighbours:
         self._system = system
         self._fleet = fleet
         self._tracks: dict[int, Track] = {}
-        # The tracks' last states as rows, in the order of the tracks: sampled together at every plan.
+        # The tracks' last states as rows, in the order of the tracks: sampled together at every plan, where
+        # those of the fresh ones are put down first.
         self._ids: tuple[int, ...] = ()
+        self._rows: dict[int, int] = {}
+        self._fresh: set[int] = set()
         self._states: Array = np.zeros((0, 6))
         self._times = np.zeros(0, dtype=np.int64)
         self._clocks: dict[int, PlanClock] = {}
@@ -98,24 +100,21 @@ class Neighbours:
         elif now - self._spoken.get(system, now - _VOICE) < _VOICE:
             # Its companion says it already, by another clock.
             return
-        position, velocity = _placed(self._fleet, message)
         track = self._tracks.get(system)
         if track is None or self._by_autopilot[system] != by_autopilot:
             track = Track(self._config.neighbour)
             track.brief = self._brief
-        track.measure(now, position, velocity, message.time_boot)
-        time = track.time
-        if time is None:
+        placed = _placed(self._fleet, message, self._config.neighbour.velocity_up)
+        track.take(now, placed, message.time_boot)
+        if track.time is None:
             return
-        known = system in self._tracks
-        self._tracks[system], self._by_autopilot[system] = track, by_autopilot
-        if not known:
-            self._ids = tuple(self._tracks)
+        if system not in self._rows:
+            self._rows[system] = len(self._ids)
+            self._ids += (system,)
             self._states = np.vstack([self._states, np.zeros(6)])
             self._times = np.append(self._times, now)
-        row = self._ids.index(system)
-        self._states[row] = track.last
-        self._times[row] = time
+        self._tracks[system], self._by_autopilot[system] = track, by_autopilot
+        self._fresh.add(system)
 
     def hear_plan(self, now: int, message: Tunnel) -> None:
         """A neighbour's horizon in a TUNNEL. One in another fleet frame, from the future or from long ago is
@@ -140,7 +139,9 @@ class Neighbours:
         if begins is None:
             self.refused_plans += 1
             return
-        self._table.put(system, Horizon(begins, horizon.dt, horizon.knots))
+        if begins != horizon.epoch:
+            horizon = Horizon(begins, horizon.dt, horizon.knots)
+        self._table.put(system, horizon)
 
     def obstacles(self, now: int) -> Obstacles:
         """All neighbours aligned with ``now + n·dt``, n = 0…N.
@@ -151,6 +152,7 @@ class Neighbours:
         """
         config = self._config
         steps = config.horizon.steps + 1
+        self._put_down()
         age = now - self._times
         ids, states = self._ids, self._states
         if not ids:
@@ -185,6 +187,7 @@ class Neighbours:
 
     def last_heard(self) -> list[tuple[int, int, Array, Array]]:
         """System id, time (µs), position (3,) and velocity (3,) of everybody's last known state."""
+        self._put_down()
         return [
             (system, int(time), state[0:3], state[3:6])
             for system, time, state in zip(self._ids, self._times, self._states, strict=True)
@@ -192,4 +195,15 @@ class Neighbours:
 
     def ages(self, now: int) -> dict[int, int]:
         """Age (µs) of every neighbour's track."""
-        return {system: now - int(time) for system, time in zip(self._ids, self._times, strict=True)}
+        self._put_down()
+        return dict(zip(self._ids, (now - self._times).tolist(), strict=True))
+
+    def _put_down(self) -> None:
+        """The states of those who were heard since."""
+        if not self._fresh:
+            return
+        rows = [self._rows[system] for system in self._fresh]
+        tracks = [self._tracks[system] for system in self._fresh]
+        self._states[rows] = [track.last for track in tracks]
+        self._times[rows] = [track.time or 0 for track in tracks]
+        self._fresh.clear()

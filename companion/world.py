@@ -83,7 +83,11 @@ class World:
 
     def hear(self, now: int, link: str, message: Message) -> None:
         """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
-        if link == "target" or isinstance(message, CameraTrackingGeo):
+        if link == "swarm" and isinstance(message, GlobalPosition):
+            self.neighbours.hear_position(now, message)
+        elif link == "swarm" and isinstance(message, Tunnel):
+            self.neighbours.hear_plan(now, message)
+        elif link == "target" or isinstance(message, CameraTrackingGeo):
             self.target.hear(now, link, message)
         elif isinstance(message, ObstacleDistance):
             self._hear_distances(now, message)
@@ -93,11 +97,6 @@ class World:
         elif link == "autopilot":
             if message.source.system == self._system:
                 self._hear_own(now, message)
-        elif link == "swarm":
-            if isinstance(message, GlobalPosition):
-                self.neighbours.hear_position(now, message)
-            elif isinstance(message, Tunnel):
-                self.neighbours.hear_plan(now, message)
 
     def at(self, now: int) -> View:
         """The view at ``now`` (µs); a target unheard of for too long is none."""
