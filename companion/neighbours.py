@@ -8,6 +8,7 @@ its n = 0 position for the whole horizon (Sec. IV-A), or carried on at constant 
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import compress
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from companion.forces import Obstacles
 from companion.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.plan_clock import PlanClock
 from companion.reception import AUTOPILOT
+from companion.earshot import Earshot
 from companion.estimator import Measured
-from companion.tracks import Track, measured
+from companion.tracks import State, Track, measured
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition, Tunnel
@@ -74,6 +76,9 @@ class Neighbours:
         self._spoken: dict[int, int] = {}
         self._by_autopilot: dict[int, bool] = {}
         self._brief = False
+        # What is larger than a vehicle, and flies by no limits.
+        self._things = {one.system for one in config.moving}
+        self.earshot = Earshot(config)
 
     @property
     def brief(self) -> bool:
@@ -143,8 +148,15 @@ class Neighbours:
             horizon = Horizon(begins, horizon.dt, horizon.knots)
         self._table.put(system, horizon)
 
-    def obstacles(self, now: int) -> Obstacles:
-        """All neighbours aligned with ``now + n·dt``, n = 0…N.
+    def listen(self, now: int, own: State | None) -> None:
+        """Find out whom to ignore for a while, the ``own`` state being what it is at ``now`` (µs)."""
+        self._put_down()
+        familiar = [system in self._clocks and system not in self._things for system in self._ids]
+        self.earshot.look(own, self._ids, self._states, now - self._times, familiar)
+
+    def obstacles(self, now: int, own: Array | None = None) -> Obstacles:
+        """All neighbours aligned with ``now + n·dt``, n = 0…N; only those that may act on a plan that begins
+        at ``own`` (3,), if that is said.
 
         One that falls silent stays an obstacle where it was last, carried on for a bounded time: it may well
         be there. With ``guard.flown_on_us`` it may have stopped, or its autopilot flown on: it is an obstacle
@@ -155,6 +167,14 @@ class Neighbours:
         self._put_down()
         age = now - self._times
         ids, states = self._ids, self._states
+        if own is not None and ids:
+            near = self.earshot.near(own, states, age)
+            for system in self._things:
+                if system in self._rows:
+                    near[self._rows[system]] = True
+            if not near.all():
+                ids = tuple(compress(ids, near.tolist()))
+                age, states = age[near], states[near]
         if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
         carried = np.minimum(np.maximum(age, 0), config.neighbour.extrapolate_us) * 1e-6

@@ -129,8 +129,9 @@ class World:
     def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
         """Neighbours and what else moves, the target where it is one, and what stands near the own
         ``prediction`` (N + 1, 3), aligned with ``now + n·dt``."""
-        obstacles = self.neighbours.obstacles(now)
         config, field = self.config, self.config.field
+        certified = config.avoidance == "certified"
+        obstacles = self.neighbours.obstacles(now, None if certified else prediction[0])
         if len(self._moving):
             obstacles = self._moving.among(obstacles, prediction, field.d_min, field.d_safe, field.margin(1))
         if view.target is not None and config.target_d_min is not None and config.target_d_safe is not None:
