@@ -8,8 +8,8 @@ made until S from now, and for P after that, end. So it is ignored for no longer
 
     S = (d − reach(c) − v·age) / c − P − H
 
-P are two of its messages' periods: one may be lost, and still it is heard in time. S is bounded, too: ages that
-are shown stay those of a neighbour that is heard.
+P are two of its messages' periods: one may be lost, and still it is heard in time. Nobody is ignored for longer
+than ``_LONGEST`` after it was heard: ages that are shown stay those of a neighbour that is there.
 
 Only those are ignored who share a plan, and so fly by limits as ours are; strangers, and who was measured to be
 faster than the limits, are always heard, and so is everybody where the own place is not known. The certified
@@ -28,9 +28,7 @@ from companion.horizon import Array
 from companion.tracks import State
 
 _LONGEST = 700_000
-"""µs; an autopilot is taken for its vehicle's only voice after a second without its companion's."""
-_WORTH_WHILE = 100_000
-"""µs between two looks."""
+"""µs of age; an autopilot is taken for its vehicle's only voice after a second without its companion's."""
 _OFF_PLAN = 1.0
 """m by which a plan that counts may begin beside its sender's track."""
 
@@ -63,17 +61,18 @@ class Earshot:
         self._until.clear()
         if self._always or own is None or own.age > self._config.guard.own_stale_us or not len(states):
             return
-        apart, speed, own_speed = self._apart(own.position, states), _norm(states[:, 3:6]), _speed(own)
-        if own_speed > self._fastest:
+        if float(np.sqrt(own.velocity @ own.velocity)) > self._fastest:
             return
+        apart, speed = _norm(states[:, 0:3] - own.position), _norm(states[:, 3:6])
         closing = 2.0 * self._fastest
+        age = 1e-6 * np.maximum(ages, 0)
         # What is known of the own place may be old as well.
-        spare = apart - self._reach(closing) - 1e-6 * self._fastest * (np.maximum(ages, 0) + max(own.age, 0))
-        silence = np.minimum(spare / closing - self._silence - self._ahead, self._longest)
+        spare = apart - self._reach(closing) - self._fastest * (age + 1e-6 * max(own.age, 0)) - _OFF_PLAN
+        silence = np.minimum(spare / closing - self._silence - self._ahead, self._longest - age)
         silence[speed > self._fastest] = 0.0
         until = self.now + (1e6 * silence).astype(np.int64)
         for name, end, known in zip(ids, until.tolist(), familiar, strict=True):
-            if known and end >= self.now + _WORTH_WHILE:
+            if known and end > self.now:
                 self._until[name] = end
 
     def near(self, here: Array, states: Array, ages: Array) -> Array:
@@ -81,10 +80,8 @@ class Earshot:
         of ``ages`` (M,) µs are within the bound for S = P = 0."""
         closing = self._fastest + np.maximum(_norm(states[:, 3:6]), self._fastest)
         gone = 1e-6 * np.clip(ages, 0, self._shown) * (closing - self._fastest)
-        return self._apart(here, states) <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN
-
-    def _apart(self, here: Array, states: Array) -> Array:
-        return _norm(states[:, 0:3] - here)
+        apart = _norm(states[:, 0:3] - here)
+        return apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN
 
     def _reach(self, closing: Array | float) -> Array:
         """How near (m, between centres) two have to come before one acts on the other when they close at
@@ -102,7 +99,3 @@ _FADING = 1.0
 
 def _norm(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.vecdot(vectors, vectors)), dtype=np.float64)
-
-
-def _speed(state: State) -> float:
-    return float(np.sqrt(state.velocity @ state.velocity))

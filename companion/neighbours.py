@@ -13,12 +13,12 @@ from itertools import compress
 import numpy as np
 
 from companion.config import CompanionConfig
+from companion.earshot import Earshot
+from companion.estimator import Measured
 from companion.forces import Obstacles
 from companion.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.plan_clock import PlanClock
 from companion.reception import AUTOPILOT
-from companion.earshot import Earshot
-from companion.estimator import Measured
 from companion.tracks import State, Track, measured
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
@@ -44,7 +44,7 @@ def _read(payload: bytes) -> tuple[int, Horizon]:
 
 
 @lru_cache(maxsize=1024)
-def _placed(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measured | None:  # noqa: FBT001
+def _placed(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measured | None:
     """What a message measures, as ``measured`` has it; each worked out once in a process."""
     position = fleet.to_enu(message.latitude, message.longitude, message.altitude)
     return measured(position, ned_to_enu(message.velocity_ned), upward=upward)
