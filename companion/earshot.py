@@ -1,19 +1,19 @@
-"""Whom not to listen to for a moment: who is so far off that nothing it may say in the meantime could matter.
+"""Whom not to listen to for a moment: who is so far off that nothing it may say meanwhile could matter.
 
-The bound. A vehicle acts on a plan where, at some time within the horizon H, it is nearer than ``reach``: what
-the field, the band and the angles reach when closing at c, the sum of both speeds. Neither is faster than the
-norm of ``limits.v_max``, or than it is measured to be. A neighbour whose last state is ``age`` old, at a
-distance d from here, is nearer by c·(S + P + H) and its own speed times ``age`` at most when plans that are
-made until S from now, and for P after that, end. So it is ignored for no longer than
+The bound. A vehicle acts on a plan where, at some time within the horizon H, it is nearer than ``reach``:
+what the field, the band and the angles reach when closing at c, the sum of both speeds. Neither is faster
+than the norm of ``limits.v_max``, or than it is measured to be. A neighbour whose last state is ``age`` old,
+at a distance d from here, is nearer by c·(S + P + H) and its own speed times ``age`` at most when plans that
+are made until S from now, and for P after that, end. So it is ignored for no longer than
 
     S = (d − reach(c) − v·age) / c − P − H
 
-P are two of its messages' periods: one may be lost, and still it is heard in time. Nobody is ignored for longer
-than ``_LONGEST`` after it was heard: ages that are shown stay those of a neighbour that is there.
+P are two of its messages' periods: one may be lost, and still it is heard in time. Nobody is ignored for
+longer than ``_LONGEST`` after it was heard: ages that are shown stay those of a neighbour that is there.
 
-Only those are ignored who share a plan, and so fly by limits as ours are; strangers, and who was measured to be
-faster than the limits, are always heard, and so is everybody where the own place is not known. The certified
-mode hears all: there what somebody promised counts, not where it is.
+Only those are ignored who share a plan, and so fly by limits as ours are; strangers, and who was measured to
+be faster than the limits, are always heard, and so is everybody where the own place is not known. The
+certified mode hears all: there what somebody promised counts, not where it is.
 """
 
 from __future__ import annotations
@@ -22,11 +22,13 @@ from collections.abc import Iterable
 from math import hypot
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.config import CompanionConfig
 from companion.horizon import Array
 from companion.tracks import State
 
+Ages = NDArray[np.int64]
 _LONGEST = 700_000
 """µs of age; an autopilot is taken for its vehicle's only voice after a second without its companion's."""
 _OFF_PLAN = 1.0
@@ -54,7 +56,7 @@ class Earshot:
         return self._until.get(sender, 0) > self.now
 
     def look(
-        self, own: State | None, ids: Iterable[int], states: Array, ages: Array, familiar: Iterable[bool]
+        self, own: State | None, ids: Iterable[int], states: Array, ages: Ages, familiar: Iterable[bool]
     ) -> None:
         """Find out whom to ignore from ``now`` on. ``states`` (M, 6) are the others' last positions and
         velocities, fleet-local ENU, ``ages`` (M,) µs; ``familiar``: who shares a plan."""
@@ -75,13 +77,14 @@ class Earshot:
             if known and end > self.now:
                 self._until[name] = end
 
-    def near(self, here: Array, states: Array, ages: Array) -> Array:
+    def near(self, here: Array, states: Array, ages: Ages) -> NDArray[np.bool_]:
         """Which (M,) of the others can act on a plan that is made ``here`` (3,) now: all whose states (M, 6)
         of ``ages`` (M,) µs are within the bound for S = P = 0."""
         closing = self._fastest + np.maximum(_norm(states[:, 3:6]), self._fastest)
         gone = 1e-6 * np.clip(ages, 0, self._shown) * (closing - self._fastest)
         apart = _norm(states[:, 0:3] - here)
-        return apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN
+        near: NDArray[np.bool_] = apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN
+        return near
 
     def _reach(self, closing: Array | float) -> Array:
         """How near (m, between centres) two have to come before one acts on the other when they close at

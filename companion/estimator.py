@@ -57,8 +57,8 @@ class Belief(NamedTuple):
 
 
 class Estimator:
-    """Steps from belief to belief: a function of its arguments alone, so that of many who hear the same sender in
-    one process the first takes the step for all."""
+    """Steps from belief to belief: ``after`` is a function of its arguments alone, so that of many who hear
+    the same sender in one process the first takes the step for all."""
 
     def __init__(self, config: TrackConfig) -> None:
         self._noise = Noise(config.sigma_position, config.sigma_velocity, config.sigma_acceleration)

@@ -15,8 +15,8 @@ each other is a clock that began anew, as soon as a second of it has been heard 
 somewhere comes in a burst instead.
 
 A track keeps its own time, which runs as the sender's clock does and is only read with an offset: it is the
-sender's where stamps were of use from the first. So what a track makes of a message does not depend on when it
-came, nor on who heard it; and where the stamps step, or are of no use, the track's time goes on.
+sender's where stamps were of use from the first. So what a track makes of a message does not depend on when
+it came, nor on who heard it; and where the stamps step, or are of no use, the track's time goes on.
 """
 
 from __future__ import annotations
@@ -92,6 +92,30 @@ class SenderClock:
     whenever its machine is busy; a delay that grows is then not seen.
     """
 
+    __slots__ = (
+        "_base",
+        "_begun",
+        "_delay",
+        "_lately",
+        "_least",
+        "_line",
+        "_newest",
+        "_pieces",
+        "_rate",
+        "_received",
+        "_repeated",
+        "_repeats",
+        "_stamp",
+        "_suspected",
+        "_suspects",
+        "_timed",
+        "_tolerance",
+        "brief",
+        "heard",
+        "laid",
+        "skew",
+    )
+
     def __init__(self, delay: int, latest: int) -> None:
         self.skew = 0
         self.heard = 0
@@ -153,7 +177,9 @@ class SenderClock:
         return min(stamp + self._base + self.skew, received - self._delay)
 
     def _by_arrival(self, received: int) -> Dated:
-        self._timed = True
+        if not self._timed:
+            # Not ours: so it is one for many who hear the same after the same time.
+            self._timed, self.skew = True, received - self._delay
         return Dated(received - self._delay - self.skew, False)
 
     def _begin(self, last: _Suspect, lag: int, heard: int) -> Dated:

@@ -44,6 +44,14 @@ class State(NamedTuple):
 class Track:
     """Filters the measurements of one sender. Times are the companion's own µs."""
 
+    __slots__ = (
+        "_absurd",
+        "_clock",
+        "_config",
+        "_rewind",
+        "_undated",
+    )
+
     def __init__(self, config: TrackConfig) -> None:
         self._config = config
         self._clock = SenderClock(config.delay_us, config.rewind_us)
@@ -152,8 +160,8 @@ class Track:
 
 
 def measured(position: Array, velocity: Array | None, *, upward: bool) -> Measured | None:
-    """A measurement of position (3,) m and velocity (3,) m/s or None, fleet-local ENU; None for an absurd one.
-    ``upward``: its sender counts the vertical speed the wrong way."""
+    """A measurement of position (3,) m and velocity (3,) m/s or None, fleet-local ENU; None for an absurd
+    one. ``upward``: its sender counts the vertical speed the wrong way."""
     a, b, c = position.tolist()
     if velocity is None:
         return (a, b, c) if a * a + b * b + c * c <= _FAR**2 else None

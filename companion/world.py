@@ -94,9 +94,8 @@ class World:
         elif isinstance(message, AdsbVehicle):
             own = self._own.at(now)
             self.sensed.hear_traffic(now, message, _ORIGIN if own is None else own.position)
-        elif link == "autopilot":
-            if message.source.system == self._system:
-                self._hear_own(now, message)
+        elif link == "autopilot" and message.source.system == self._system:
+            self._hear_own(now, message)
 
     def at(self, now: int) -> View:
         """The view at ``now`` (µs); a target unheard of for too long is none."""

@@ -29,6 +29,7 @@ CONFIG = CompanionConfig(methods=("tangential", "approach_angle"))
 FASTEST = hypot(*CONFIG.limits.v_max)
 STEPS, DT = CONFIG.horizon.steps + 1, 1e-6 * CONFIG.horizon.dt_us
 AHEAD = DT * np.arange(STEPS)[:, None]
+BALL = MovingSphere(kind="sphere", system=OTHER, radius=5.0)
 FAR = 200.0
 CERTAINLY = 60.0
 """m: nearer than this nobody is ignored, whatever it does."""
@@ -168,11 +169,11 @@ def test_nobody_comes_near_unheard(direction, speed):
     [
         ("a stranger that shares no plan", CONFIG, {"plan": False}),
         ("who is faster than the limits", CONFIG, {"velocity": np.array([0.0, 12.0, 0.0])}),
-        ("what is no vehicle", CONFIG.model_copy(update={"moving": (MovingSphere(kind="sphere", system=OTHER, radius=5.0),)}), {}),
+        ("what is no vehicle", CONFIG.model_copy(update={"moving": (BALL,)}), {}),
         ("anybody, who is too fast itself", CONFIG, {"own": np.array([0.0, 12.0, 0.0])}),
         ("anybody, with certified plans", CONFIG.model_copy(update={"avoidance": "certified"}), {}),
     ],
-)  # fmt: skip
+)
 def test_always_heard_is(who, config, changes):
     arguments = {"velocity": ZERO, **changes}
     place = np.array([FAR, 0.0, 0.0])

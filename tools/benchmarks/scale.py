@@ -1,8 +1,9 @@
 """What a vehicle more costs in lock-step: time of a plan, real-time factor on one core, memory.
 
-``python -m benchmarks.scale [--far] [--seconds S] [VEHICLES…]``, by default 2 to 200 vehicles. Each swarm has a
-process of its own, is in the air from the beginning and flies for S seconds (10): ``antipodal``, where all can
-hear all that matters, or ``--far``, where neighbours on the ring are 100 m apart and nobody is within earshot.
+``python -m benchmarks.scale [--far] [--seconds S] [VEHICLES…]``, by default 2 to 200 vehicles. Each swarm
+has a process of its own, is in the air from the beginning and flies for S seconds (10): ``antipodal``, which
+leads all of them through the middle, or ``--far``, where neighbours on the ring are 100 m apart and nobody is
+within earshot.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import resource
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
 from multiprocessing import get_context
 from typing import NamedTuple
 
@@ -71,10 +73,8 @@ def fly(vehicles: int, apart: float, seconds: float) -> Cost:
 
     vehicle = load(find("vehicles", "firefly"), VehicleConfig)
     flight = Flight(Scenario.model_validate(document), vehicle, 1, config_root() / "logs", onlooker=look)
-    try:
+    with suppress(_EnoughError):
         flight.run()
-    except _EnoughError:
-        pass
     spent = time.process_time() - first[0][1]
     plans = np.concatenate([np.asarray(companion.tally.plan_ns) for companion in flight.companions])
     links = [companion.counters["swarm"] for companion in flight.companions]
