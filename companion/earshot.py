@@ -18,7 +18,7 @@ certified mode hears all: there what somebody promised counts, not where it is.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from math import hypot
 
 import numpy as np
@@ -47,6 +47,8 @@ class Earshot:
             _LONGEST, config.neighbour.extrapolate_us, config.guard.neighbour_lost_us // 4
         )
         self._shown = max(config.neighbour.extrapolate_us, config.guard.flown_on_us)
+        self._closing = 2.0 * self._fastest
+        self._certainly = float(self._reach(self._closing)) + self._closing * self._ahead
         self._always = config.avoidance == "certified"
         self._until: dict[int, int] = {}
         self.now = 0
@@ -56,35 +58,43 @@ class Earshot:
         return self._until.get(sender, 0) > self.now
 
     def look(
-        self, own: State | None, ids: Iterable[int], states: Array, ages: Ages, familiar: Iterable[bool]
+        self,
+        own: State | None,
+        ids: Sequence[int],
+        states: Array,
+        ages: Ages,
+        familiar: Callable[[int], bool],
     ) -> None:
         """Find out whom to ignore from ``now`` on. ``states`` (M, 6) are the others' last positions and
-        velocities, fleet-local ENU, ``ages`` (M,) µs; ``familiar``: who shares a plan."""
+        velocities, fleet-local ENU, ``ages`` (M,) µs; ``familiar`` tells who shares a plan."""
         self._until.clear()
         if self._always or own is None or own.age > self._config.guard.own_stale_us or not len(states):
             return
         if float(np.sqrt(own.velocity @ own.velocity)) > self._fastest:
             return
-        apart, speed = _norm(states[:, 0:3] - own.position), _norm(states[:, 3:6])
-        closing = 2.0 * self._fastest
+        apart = _norm(states[:, 0:3] - own.position)
+        if apart.max() <= self._certainly:
+            return
         age = 1e-6 * np.maximum(ages, 0)
         # What is known of the own place may be old as well.
-        spare = apart - self._reach(closing) - self._fastest * (age + 1e-6 * max(own.age, 0)) - _OFF_PLAN
-        silence = np.minimum(spare / closing - self._silence - self._ahead, self._longest - age)
-        silence[speed > self._fastest] = 0.0
+        spare = apart - self._certainly - self._fastest * (age + 1e-6 * max(own.age, 0)) - _OFF_PLAN
+        silence = np.minimum(spare / self._closing - self._silence, self._longest - age)
+        silence[_norm(states[:, 3:6]) > self._fastest] = 0.0
         until = self.now + (1e6 * silence).astype(np.int64)
-        for name, end, known in zip(ids, until.tolist(), familiar, strict=True):
-            if known and end > self.now:
-                self._until[name] = end
+        for row in np.flatnonzero(silence > 0.0).tolist():
+            if familiar(ids[row]):
+                self._until[ids[row]] = int(until[row])
 
     def near(self, here: Array, states: Array, ages: Ages) -> NDArray[np.bool_]:
         """Which (M,) of the others can act on a plan that is made ``here`` (3,) now: all whose states (M, 6)
         of ``ages`` (M,) µs are within the bound for S = P = 0."""
+        apart = _norm(states[:, 0:3] - here)
+        near: NDArray[np.bool_] = apart <= self._certainly
+        if near.all():
+            return near
         closing = self._fastest + np.maximum(_norm(states[:, 3:6]), self._fastest)
         gone = 1e-6 * np.clip(ages, 0, self._shown) * (closing - self._fastest)
-        apart = _norm(states[:, 0:3] - here)
-        near: NDArray[np.bool_] = apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN
-        return near
+        return np.asarray(apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN)
 
     def _reach(self, closing: Array | float) -> Array:
         """How near (m, between centres) two have to come before one acts on the other when they close at

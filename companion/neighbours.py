@@ -151,8 +151,11 @@ class Neighbours:
     def listen(self, now: int, own: State | None) -> None:
         """Find out whom to ignore for a while, the ``own`` state being what it is at ``now`` (µs)."""
         self._put_down()
-        familiar = [system in self._clocks and system not in self._things for system in self._ids]
-        self.earshot.look(own, self._ids, self._states, now - self._times, familiar)
+        self.earshot.look(own, self._ids, self._states, now - self._times, self._is_familiar)
+
+    def _is_familiar(self, system: int) -> bool:
+        """Whether it shares plans, as vehicles do that fly by limits like ours."""
+        return system in self._clocks and system not in self._things
 
     def obstacles(self, now: int, own: Array | None = None) -> Obstacles:
         """All neighbours aligned with ``now + n·dt``, n = 0…N; only those that may act on a plan that begins
