@@ -8,6 +8,7 @@ together they are the filter of six states, of covariance P ⊗ I₃, exactly (`
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 from companion.config import TrackConfig
@@ -28,6 +29,8 @@ _ANY_SPEED = 5.0
 """m/s, σ of the velocity of one who has told a place, and never a velocity."""
 _DOUBTS = 4
 """So many stories may be told beside the one that is believed."""
+_STEPS = 2048
+"""Steps that are remembered: of two hundred senders those of a second."""
 
 
 class Doubt(NamedTuple):
@@ -54,7 +57,8 @@ class Belief(NamedTuple):
 
 
 class Estimator:
-    """Steps from belief to belief: a function of its arguments alone."""
+    """Steps from belief to belief: ``after`` is a function of its arguments alone, so that of many who hear
+    the same sender in one process the first takes the step for all."""
 
     def __init__(self, config: TrackConfig) -> None:
         self._noise = Noise(config.sigma_position, config.sigma_velocity, config.sigma_acceleration)
@@ -66,8 +70,9 @@ class Estimator:
         self._gate = config.gate
         self._jump = config.jump
         self._witnesses = config.witnesses
+        self.after = lru_cache(maxsize=_STEPS)(self._after)
 
-    def after(self, belief: Belief | None, time: int, z: Measured) -> Belief:
+    def _after(self, belief: Belief | None, time: int, z: Measured) -> Belief:
         """The belief after a measurement ``z`` that was true at ``time`` (µs), no earlier than the belief's.
 
         It is refused when d² = yᵀS⁻¹y exceeds the gate (χ² of six), or when it lies further from the
@@ -138,3 +143,9 @@ class Estimator:
 
     def _most(self, elapsed: int) -> float:
         return self._jump * (1.0 + 1e-6 * elapsed)
+
+
+@lru_cache(maxsize=64)
+def estimator(config: TrackConfig) -> Estimator:
+    """One for all tracks of the same settings."""
+    return Estimator(config)

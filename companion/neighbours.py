@@ -8,15 +8,18 @@ its n = 0 position for the whole horizon (Sec. IV-A), or carried on at constant 
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import compress
 
 import numpy as np
 
 from companion.config import CompanionConfig
+from companion.earshot import Earshot
+from companion.estimator import Measured
 from companion.forces import Obstacles
 from companion.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.plan_clock import PlanClock
 from companion.reception import AUTOPILOT
-from companion.tracks import Track
+from companion.tracks import State, Track, measured
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition, Tunnel
@@ -30,7 +33,7 @@ _STRAYED = 1.0
 """A neighbour further than this (m) from its own plan is not where it says: its track counts."""
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _read(payload: bytes) -> tuple[int, Horizon]:
     """Fingerprint and horizon of a plan on the wire. Where many companions share a process each plan is read
     once. Raises PlanWireError."""
@@ -40,13 +43,11 @@ def _read(payload: bytes) -> tuple[int, Horizon]:
     return plan.origin, horizon
 
 
-@lru_cache(maxsize=256)
-def _placed(fleet: FleetFrame, message: GlobalPosition) -> tuple[Array, Array]:
-    """Position and velocity (3,) of a message, fleet-local ENU; each worked out once in a process."""
+@lru_cache(maxsize=1024)
+def _placed(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measured | None:
+    """What a message measures, as ``measured`` has it; each worked out once in a process."""
     position = fleet.to_enu(message.latitude, message.longitude, message.altitude)
-    velocity = ned_to_enu(message.velocity_ned)
-    position.flags.writeable = velocity.flags.writeable = False
-    return position, velocity
+    return measured(position, ned_to_enu(message.velocity_ned), upward=upward)
 
 
 class Neighbours:
@@ -57,8 +58,11 @@ class Neighbours:
         self._system = system
         self._fleet = fleet
         self._tracks: dict[int, Track] = {}
-        # The tracks' last states as rows, in the order of the tracks: sampled together at every plan.
+        # The tracks' last states as rows, in the order of the tracks: sampled together at every plan, where
+        # those of the fresh ones are put down first.
         self._ids: tuple[int, ...] = ()
+        self._rows: dict[int, int] = {}
+        self._fresh: set[int] = set()
         self._states: Array = np.zeros((0, 6))
         self._times = np.zeros(0, dtype=np.int64)
         self._clocks: dict[int, PlanClock] = {}
@@ -72,6 +76,9 @@ class Neighbours:
         self._spoken: dict[int, int] = {}
         self._by_autopilot: dict[int, bool] = {}
         self._brief = False
+        # What is larger than a vehicle, and flies by no limits.
+        self._things = {one.system for one in config.moving}
+        self.earshot = Earshot(config)
 
     @property
     def brief(self) -> bool:
@@ -98,24 +105,21 @@ class Neighbours:
         elif now - self._spoken.get(system, now - _VOICE) < _VOICE:
             # Its companion says it already, by another clock.
             return
-        position, velocity = _placed(self._fleet, message)
         track = self._tracks.get(system)
         if track is None or self._by_autopilot[system] != by_autopilot:
             track = Track(self._config.neighbour)
             track.brief = self._brief
-        track.measure(now, position, velocity, message.time_boot)
-        time = track.time
-        if time is None:
+        placed = _placed(self._fleet, message, self._config.neighbour.velocity_up)
+        track.take(now, placed, message.time_boot)
+        if track.time is None:
             return
-        known = system in self._tracks
-        self._tracks[system], self._by_autopilot[system] = track, by_autopilot
-        if not known:
-            self._ids = tuple(self._tracks)
+        if system not in self._rows:
+            self._rows[system] = len(self._ids)
+            self._ids += (system,)
             self._states = np.vstack([self._states, np.zeros(6)])
             self._times = np.append(self._times, now)
-        row = self._ids.index(system)
-        self._states[row] = track.last
-        self._times[row] = time
+        self._tracks[system], self._by_autopilot[system] = track, by_autopilot
+        self._fresh.add(system)
 
     def hear_plan(self, now: int, message: Tunnel) -> None:
         """A neighbour's horizon in a TUNNEL. One in another fleet frame, from the future or from long ago is
@@ -140,10 +144,22 @@ class Neighbours:
         if begins is None:
             self.refused_plans += 1
             return
-        self._table.put(system, Horizon(begins, horizon.dt, horizon.knots))
+        if begins != horizon.epoch:
+            horizon = Horizon(begins, horizon.dt, horizon.knots)
+        self._table.put(system, horizon)
 
-    def obstacles(self, now: int) -> Obstacles:
-        """All neighbours aligned with ``now + n·dt``, n = 0…N.
+    def listen(self, now: int, own: State | None) -> None:
+        """Find out whom to ignore for a while, the ``own`` state being what it is at ``now`` (µs)."""
+        self._put_down()
+        self.earshot.look(own, self._ids, self._states, now - self._times, self._is_familiar)
+
+    def _is_familiar(self, system: int) -> bool:
+        """Whether it shares plans, as vehicles do that fly by limits like ours."""
+        return system in self._clocks and system not in self._things
+
+    def obstacles(self, now: int, own: Array | None = None) -> Obstacles:
+        """All neighbours aligned with ``now + n·dt``, n = 0…N; only those that may act on a plan that begins
+        at ``own`` (3,), if that is said.
 
         One that falls silent stays an obstacle where it was last, carried on for a bounded time: it may well
         be there. With ``guard.flown_on_us`` it may have stopped, or its autopilot flown on: it is an obstacle
@@ -151,8 +167,17 @@ class Neighbours:
         """
         config = self._config
         steps = config.horizon.steps + 1
+        self._put_down()
         age = now - self._times
         ids, states = self._ids, self._states
+        if own is not None and ids:
+            near = self.earshot.near(own, states, age)
+            for system in self._things:
+                if system in self._rows:
+                    near[self._rows[system]] = True
+            if not near.all():
+                ids = tuple(compress(ids, near.tolist()))
+                age, states = age[near], states[near]
         if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
         carried = np.minimum(np.maximum(age, 0), config.neighbour.extrapolate_us) * 1e-6
@@ -185,6 +210,7 @@ class Neighbours:
 
     def last_heard(self) -> list[tuple[int, int, Array, Array]]:
         """System id, time (µs), position (3,) and velocity (3,) of everybody's last known state."""
+        self._put_down()
         return [
             (system, int(time), state[0:3], state[3:6])
             for system, time, state in zip(self._ids, self._times, self._states, strict=True)
@@ -192,4 +218,15 @@ class Neighbours:
 
     def ages(self, now: int) -> dict[int, int]:
         """Age (µs) of every neighbour's track."""
-        return {system: now - int(time) for system, time in zip(self._ids, self._times, strict=True)}
+        self._put_down()
+        return dict(zip(self._ids, (now - self._times).tolist(), strict=True))
+
+    def _put_down(self) -> None:
+        """The states of those who were heard since."""
+        if not self._fresh:
+            return
+        rows = [self._rows[system] for system in self._fresh]
+        tracks = [self._tracks[system] for system in self._fresh]
+        self._states[rows] = [track.last for track in tracks]
+        self._times[rows] = [track.time or 0 for track in tracks]
+        self._fresh.clear()

@@ -95,8 +95,9 @@ class Companion:
         self.voice = Voice(config.voice, self._source)
         self._dials = Dials(config, self._source)
         self._signing = signing
+        self._earshot = earshot = self.world.neighbours.earshot
         self._codecs = {
-            link: Codec(accepts(link, system, target_system, config), signing, number)
+            link: Codec(accepts(link, system, target_system, config, earshot.ignores), signing, number)
             for number, link in enumerate(LINKS)
         }
         self.plan: Plan | None = None
@@ -223,6 +224,7 @@ class Companion:
 
     def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
         answers: list[Message] = []
+        self._earshot.now = now
         for link, data in inbox:
             for message in self._codecs[link].feed(data, whole=True):
                 if link == "ground":
@@ -447,6 +449,7 @@ class Companion:
             self._looked_late = late
             return
         self._next_look = now + _LOOK
+        self.world.neighbours.listen(now, view.own)
         situation = Situation(
             now,
             view,

@@ -26,6 +26,13 @@ class PlanClock:
     """The clock of one sender of plans, all times µs. ``delay``: the least age of a message at its arrival;
     ``stale``: how old a plan may be."""
 
+    __slots__ = (
+        "_begins",
+        "_clock",
+        "_epoch",
+        "_stale",
+    )
+
     def __init__(self, delay: int, stale: int) -> None:
         self._clock = SenderClock(delay, stale)
         self._stale = stale

@@ -11,6 +11,8 @@ AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1: other components of the vehicle have no say in where it is."""
 _DISTANCES, _TRAFFIC = 330, 246
 """Sensors of the own system may be on both links; traffic may be told by anybody on the swarm's."""
+_WHERE = {33, 385}
+"""What a neighbour says of where it is and will be: not decoded while it is out of earshot."""
 _WANTED = {
     "autopilot": {0, 1, 30, 32, 49, 77, 245, 253},
     "swarm": {33, 111, 385},
@@ -20,9 +22,15 @@ LINKS = ("autopilot", "swarm", "target", "ground")
 """The links of a companion."""
 
 
-def accepts(link: str, system: int, target: int, config: CompanionConfig) -> Callable[[int, int, int], bool]:
+def accepts(
+    link: str,
+    system: int,
+    target: int,
+    config: CompanionConfig,
+    ignores: Callable[[int], bool] = lambda _sender: False,
+) -> Callable[[int, int, int], bool]:
     """Header filter of a link of the companion of ``system``, whose target has the system id ``target``: the
-    messages wanted there, from whom they may come."""
+    messages wanted there, from whom they may come. ``ignores``: who on the swarm link is out of earshot."""
     wanted = _WANTED.get(link, set())
     source = config.target_source
     sensors = {_DISTANCES} if config.proximity is not None else set()
@@ -42,6 +50,7 @@ def accepts(link: str, system: int, target: int, config: CompanionConfig) -> Cal
     if link == "swarm":
         wanted = wanted | (sensors & {_TRAFFIC})
         return lambda identifier, sender, _component: (
-            (identifier in wanted and sender != system) or (identifier in sensors and sender == system)
+            (identifier in wanted and sender != system and not (identifier in _WHERE and ignores(sender)))
+            or (identifier in sensors and sender == system)
         )
     return lambda identifier, _sender, _component: identifier in wanted

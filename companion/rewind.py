@@ -17,6 +17,17 @@ class Rewind:
     """Measurements of the last ``window`` µs, and for a while some older ones, and what was believed before
     them."""
 
+    __slots__ = (
+        "_before",
+        "_beliefs",
+        "_estimator",
+        "_measured",
+        "_times",
+        "_window",
+        "belief",
+        "too_late",
+    )
+
     def __init__(self, estimator: Estimator, window: int) -> None:
         self._estimator = estimator
         self._window = window

@@ -14,9 +14,9 @@ a moment must not ground a vehicle for ever. A step *back* of the stamps further
 each other is a clock that began anew, as soon as a second of it has been heard as it was sent: what waited
 somewhere comes in a burst instead.
 
-A track keeps its own time, which runs as the sender's clock does and is only read with an offset. So what a
-track makes of a message does not depend on when it came; and where the stamps step, or are of no use, the
-track's time goes on.
+A track keeps its own time, which runs as the sender's clock does and is only read with an offset: it is the
+sender's where stamps were of use from the first. So what a track makes of a message does not depend on when
+it came, nor on who heard it; and where the stamps step, or are of no use, the track's time goes on.
 """
 
 from __future__ import annotations
@@ -92,6 +92,30 @@ class SenderClock:
     whenever its machine is busy; a delay that grows is then not seen.
     """
 
+    __slots__ = (
+        "_base",
+        "_begun",
+        "_delay",
+        "_lately",
+        "_least",
+        "_line",
+        "_newest",
+        "_pieces",
+        "_rate",
+        "_received",
+        "_repeated",
+        "_repeats",
+        "_stamp",
+        "_suspected",
+        "_suspects",
+        "_timed",
+        "_tolerance",
+        "brief",
+        "heard",
+        "laid",
+        "skew",
+    )
+
     def __init__(self, delay: int, latest: int) -> None:
         self.skew = 0
         self.heard = 0
@@ -102,7 +126,7 @@ class SenderClock:
         self._tolerance = max(latest, _STEP)
         # Track time minus stamp; None before the first stamp, and while they are of no use.
         self._base: int | None = None
-        self._begun = False
+        self._begun = self._timed = False
         self._stamp = self._newest = 0
         self._repeats, self._repeated = 0, 0
         self._suspects: list[_Suspect] = []
@@ -153,12 +177,17 @@ class SenderClock:
         return min(stamp + self._base + self.skew, received - self._delay)
 
     def _by_arrival(self, received: int) -> Dated:
+        if not self._timed:
+            # Not ours: so it is one for many who hear the same after the same time.
+            self._timed, self.skew = True, received - self._delay
         return Dated(received - self._delay - self.skew, False)
 
     def _begin(self, last: _Suspect, lag: int, heard: int) -> Dated:
         """Lay the line through ``lag``. The track's time goes on: its skew stays what it was."""
         received, stamp = last
-        self._begun = True
+        if not self._timed:
+            self.skew = lag - self._delay
+        self._begun = self._timed = True
         self.laid += 1
         self._base = lag - self._delay - self.skew
         self._stamp = self._newest = stamp

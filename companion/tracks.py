@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.config import TrackConfig
-from companion.estimator import Belief, Estimator
+from companion.estimator import Belief, Measured, Six, estimator
 from companion.gains import model
 from companion.horizon import Array
 from companion.rewind import Rewind
@@ -44,10 +44,18 @@ class State(NamedTuple):
 class Track:
     """Filters the measurements of one sender. Times are the companion's own µs."""
 
+    __slots__ = (
+        "_absurd",
+        "_clock",
+        "_config",
+        "_rewind",
+        "_undated",
+    )
+
     def __init__(self, config: TrackConfig) -> None:
         self._config = config
         self._clock = SenderClock(config.delay_us, config.rewind_us)
-        self._rewind = Rewind(Estimator(config), config.rewind_us)
+        self._rewind = Rewind(estimator(config), config.rewind_us)
         self._absurd = self._undated = 0
 
     @property
@@ -85,18 +93,18 @@ class Track:
         sender that counts its vertical speed upwards is put right here. A late one is taken in its place as
         long as ``rewind_us`` reaches; a duplicate changes nothing.
         """
-        a, b, c = position.tolist()
-        d, e, f = (0.0, 0.0, 0.0) if velocity is None else velocity.tolist()
-        if not (a * a + b * b + c * c <= _FAR**2 and d * d + e * e + f * f <= _FAST**2):
+        return self.take(received, measured(position, velocity, upward=self._config.velocity_up), stamp)
+
+    def take(self, received: int, z: Measured | None, stamp: int) -> bool:
+        """The same for what ``measured`` makes of position and velocity."""
+        if z is None:
             self._absurd += 1
             return False
         dated = self._clock.date(received, stamp if self._config.stamps else 0)
         if dated is None:
             self._undated += 1
             return False
-        if velocity is None:
-            return self._rewind.put(dated, (a, b, c))
-        return self._rewind.put(dated, (a, b, c, d, e, -f if self._config.velocity_up else f))
+        return self._rewind.put(dated, z)
 
     def when(self, received: int, stamp: int) -> int:
         """When another message of the same sender was true, µs: one that arrived at ``received`` and left
@@ -124,9 +132,9 @@ class Track:
         return State(position, velocity, age, sigma, rate)
 
     @property
-    def last(self) -> Array:
-        """Position and velocity (6,) at the last accepted measurement; ValueError before the first."""
-        return np.array(self._known().x)
+    def last(self) -> Six:
+        """Position and velocity at the last accepted measurement; ValueError before the first."""
+        return self._known().x
 
     def covariance(self, now: int | None = None) -> Array:
         """Covariance (6, 6) of position and velocity at ``now`` (µs), or at the last measurement; ValueError
@@ -149,3 +157,15 @@ class Track:
         if self._rewind.belief is None:
             raise ValueError("nothing has been heard yet: there is no state")
         return self._rewind.belief
+
+
+def measured(position: Array, velocity: Array | None, *, upward: bool) -> Measured | None:
+    """A measurement of position (3,) m and velocity (3,) m/s or None, fleet-local ENU; None for an absurd
+    one. ``upward``: its sender counts the vertical speed the wrong way."""
+    a, b, c = position.tolist()
+    if velocity is None:
+        return (a, b, c) if a * a + b * b + c * c <= _FAR**2 else None
+    d, e, f = velocity.tolist()
+    if not (a * a + b * b + c * c <= _FAR**2 and d * d + e * e + f * f <= _FAST**2):
+        return None
+    return a, b, c, d, e, -f if upward else f

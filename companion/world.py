@@ -88,21 +88,19 @@ class World:
 
     def hear(self, now: int, link: str, message: Message) -> None:
         """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
-        if link == "target" or isinstance(message, CameraTrackingGeo):
+        if link == "swarm" and isinstance(message, GlobalPosition):
+            self.neighbours.hear_position(now, message)
+        elif link == "swarm" and isinstance(message, Tunnel):
+            self.neighbours.hear_plan(now, message)
+        elif link == "target" or isinstance(message, CameraTrackingGeo):
             self.target.hear(now, link, message)
         elif isinstance(message, ObstacleDistance):
             self._hear_distances(now, message)
         elif isinstance(message, AdsbVehicle):
             own = self._own.at(now)
             self.sensed.hear_traffic(now, message, _ORIGIN if own is None else own.position)
-        elif link == "autopilot":
-            if message.source.system == self._system:
-                self._hear_own(now, message)
-        elif link == "swarm":
-            if isinstance(message, GlobalPosition):
-                self.neighbours.hear_position(now, message)
-            elif isinstance(message, Tunnel):
-                self.neighbours.hear_plan(now, message)
+        elif link == "autopilot" and message.source.system == self._system:
+            self._hear_own(now, message)
 
     def at(self, now: int) -> View:
         """The view at ``now`` (µs); a target unheard of for too long is none."""
@@ -135,8 +133,9 @@ class World:
     def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
         """Neighbours and what else moves, the target where it is one, and what stands near the own
         ``prediction`` (N + 1, 3), aligned with ``now + n·dt``."""
-        obstacles = self.neighbours.obstacles(now)
         config, field = self.config, self.config.field
+        certified = config.avoidance == "certified"
+        obstacles = self.neighbours.obstacles(now, None if certified else prediction[0])
         if len(self._moving):
             obstacles = self._moving.among(obstacles, prediction, field.d_min, field.d_safe, field.margin(1))
         if view.target is not None and config.target_d_min is not None and config.target_d_safe is not None:

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 from mavlink_bridge.converters import BY_ID, BY_TYPE, Converter
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.fields.flight import TEXT_LENGTH, text_chunks
-from mavlink_bridge.framing import SIGNED_FLAG, Framer, frame_v1, frame_v2
+from mavlink_bridge.framing import SIGNED_FLAG, Frame, Framer, frame_v1, frame_v2
 from mavlink_bridge.messages import Message, Source, StatusText
 from mavlink_bridge.signing import Signing
 
 Accept = Callable[[int, int, int], bool]
+
+
+@lru_cache(maxsize=1024)
+def _read(frame: Frame) -> Message | None:
+    """What ``Converter.parse`` makes of a frame; done once in a process for all who receive it."""
+    return BY_ID[frame.message_id].parse(Source(frame.system, frame.component), frame.payload)
 
 
 class Counters(NamedTuple):
@@ -88,7 +95,7 @@ class Codec:
             if signing is not None and signing.check(frame) is not None:
                 self._refused += 1
                 continue
-            message = row.parse(Source(frame.system, frame.component), frame.payload)
+            message = _read(frame)
             if message is None:
                 self._bad += 1
             else:

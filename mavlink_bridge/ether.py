@@ -161,9 +161,13 @@ class Ether:
                 number = self._sequences[sender]
                 self._sequences[sender] = number + 1
                 self._sent += len(paths)
+                way, there, arrival = -1, "", None
                 for path in paths:
                     if path.plain and now >= path.shut:
-                        arrival = (now + path.way, sender, number, 1, Datagram(path.link, data))
+                        # Mostly one and the same for all: it is made once.
+                        if arrival is None or path.way != way or path.link != there:
+                            way, there = path.way, path.link
+                            arrival = (now + way, sender, number, 1, Datagram(there, data))
                         heappush(path.queue, arrival)
                     else:
                         self._carry(now, number, path, data)

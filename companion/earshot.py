@@ -1,0 +1,114 @@
+"""Whom not to listen to for a moment: who is so far off that nothing it may say meanwhile could matter.
+
+The bound. A vehicle acts on a plan where, at some time within the horizon H, it is nearer than ``reach``:
+what the field, the band and the angles reach when closing at c, the sum of both speeds. Neither is faster
+than the norm of ``limits.v_max``, or than it is measured to be. A neighbour whose last state is ``age`` old,
+at a distance d from here, is nearer by c·(S + P + H) and its own speed times ``age`` at most when plans that
+are made until S from now, and for P after that, end. So it is ignored for no longer than
+
+    S = (d − reach(c) − v·age) / c − P − H
+
+P are two of its messages' periods: one may be lost, and still it is heard in time. Nobody is ignored for
+longer than ``_LONGEST`` after it was heard: ages that are shown stay those of a neighbour that is there.
+
+Only those are ignored who share a plan, and so fly by limits as ours are; strangers, and who was measured to
+be faster than the limits, are always heard, and so is everybody where the own place is not known. The
+certified mode hears all: there what somebody promised counts, not where it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.config import CompanionConfig
+from companion.horizon import Array
+from companion.tracks import State
+
+Ages = NDArray[np.int64]
+_LONGEST = 700_000
+"""µs of age; an autopilot is taken for its vehicle's only voice after a second without its companion's."""
+_OFF_PLAN = 1.0
+"""m by which a plan that counts may begin beside its sender's track."""
+
+
+class Earshot:
+    """Of one companion. All times µs on its clock; ``now`` has to be set before headers are asked about."""
+
+    def __init__(self, config: CompanionConfig) -> None:
+        self._config = config
+        self._fastest = hypot(*config.limits.v_max)
+        self._ahead = 1e-6 * config.horizon.dt_us * (config.horizon.steps + 1)
+        self._silence = 2e-6 * config.rates.state_us
+        self._longest = 1e-6 * min(
+            _LONGEST, config.neighbour.extrapolate_us, config.guard.neighbour_lost_us // 4
+        )
+        self._shown = max(config.neighbour.extrapolate_us, config.guard.flown_on_us)
+        self._closing = 2.0 * self._fastest
+        self._certainly = float(self._reach(self._closing)) + self._closing * self._ahead
+        self._always = config.avoidance == "certified"
+        self._until: dict[int, int] = {}
+        self.now = 0
+
+    def ignores(self, sender: int) -> bool:
+        """Whether what this system says of where it is and will be need not be decoded now."""
+        return self._until.get(sender, 0) > self.now
+
+    def look(
+        self,
+        own: State | None,
+        ids: Sequence[int],
+        states: Array,
+        ages: Ages,
+        familiar: Callable[[int], bool],
+    ) -> None:
+        """Find out whom to ignore from ``now`` on. ``states`` (M, 6) are the others' last positions and
+        velocities, fleet-local ENU, ``ages`` (M,) µs; ``familiar`` tells who shares a plan."""
+        self._until.clear()
+        if self._always or own is None or own.age > self._config.guard.own_stale_us or not len(states):
+            return
+        if float(np.sqrt(own.velocity @ own.velocity)) > self._fastest:
+            return
+        apart = _norm(states[:, 0:3] - own.position)
+        if apart.max() <= self._certainly:
+            return
+        age = 1e-6 * np.maximum(ages, 0)
+        # What is known of the own place may be old as well.
+        spare = apart - self._certainly - self._fastest * (age + 1e-6 * max(own.age, 0)) - _OFF_PLAN
+        silence = np.minimum(spare / self._closing - self._silence, self._longest - age)
+        silence[_norm(states[:, 3:6]) > self._fastest] = 0.0
+        until = self.now + (1e6 * silence).astype(np.int64)
+        for row in np.flatnonzero(silence > 0.0).tolist():
+            if familiar(ids[row]):
+                self._until[ids[row]] = int(until[row])
+
+    def near(self, here: Array, states: Array, ages: Ages) -> NDArray[np.bool_]:
+        """Which (M,) of the others can act on a plan that is made ``here`` (3,) now: all whose states (M, 6)
+        of ``ages`` (M,) µs are within the bound for S = P = 0."""
+        apart = _norm(states[:, 0:3] - here)
+        near: NDArray[np.bool_] = apart <= self._certainly
+        if near.all():
+            return near
+        closing = self._fastest + np.maximum(_norm(states[:, 3:6]), self._fastest)
+        gone = 1e-6 * np.clip(ages, 0, self._shown) * (closing - self._fastest)
+        return np.asarray(apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN)
+
+    def _reach(self, closing: Array | float) -> Array:
+        """How near (m, between centres) two have to come before one acts on the other when they close at
+        ``closing`` m/s."""
+        config = self._config
+        field, band = config.field, config.tangential
+        braking = 0.0 if field.braking is None else np.square(closing) / (2.0 * field.braking)
+        reach = field.d_safe + field.margin(2) + np.maximum(braking, band.d_band + band.reach_s * closing)
+        return np.asarray(np.maximum(reach, config.approach_angle.reach + _FADING), dtype=np.float64)
+
+
+_FADING = 1.0
+"""m over which the angles' field fades out beyond its reach."""
+
+
+def _norm(vectors: Array) -> Array:
+    return np.asarray(np.sqrt(np.vecdot(vectors, vectors)), dtype=np.float64)
