@@ -6,17 +6,12 @@ well. It answers no order.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from companion.config import CompanionConfig
-from companion.node import COMPONENT, Companion
+from companion.node import Companion
 from companion.pilot import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
 from companion.understudy import Onlooker, Understudy
 from companion.world import View
-from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandLong, Heartbeat, Message, Source, StatusText
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
 
 ONLOOKER = 194
 """MAV_COMP_ID_ONBOARD_COMPUTER4."""
@@ -40,18 +35,7 @@ class DryRun(Understudy):
     """As ``Companion``; nothing leaves it that would change what the vehicle or anybody else does."""
 
     pilot: _Asking
-
-    def __init__(
-        self,
-        config: CompanionConfig,
-        system: int,
-        target_system: int,
-        fleet: FleetFrame,
-        stopwatch: Callable[[], int],
-        signing: Signing | None = None,
-    ) -> None:
-        super().__init__(config, system, target_system, fleet, stopwatch, signing)
-        self.pilot = _Asking(config, Source(system, COMPONENT), fleet.altitude)
+    pilots = _Asking
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:
         super()._encode(**links)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from math import hypot
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from companion.bearings import turned
+from companion.aims import Aims
 from companion.certified.flight import CertifiedFlight
 from companion.certified.keeper import Why
 from companion.config import CompanionConfig, MethodName
@@ -19,33 +19,26 @@ from companion.forces import Obstacles
 from companion.guard import Guard
 from companion.heading import Heading
 from companion.horizon import Array, Horizon, Motion
-from companion.pilot import NAV_LAND, NAV_TAKEOFF, STEERED, Phase, Pilot
+from companion.orders import Orders
+from companion.pilot import Phase, Pilot
 from companion.plan_log import PlanLog
-from companion.planner import Aim, Plan, Planner, standing
+from companion.planner import Aim, Plan, Planner
+from companion.reactions import Reactions
 from companion.reception import LINKS, accepts
 from companion.setpoint import is_finite, setpoint
-from companion.settling import Settling
 from companion.sharing import Sharing
 from companion.voice import Voice
-from companion.watch import Reaction, Situation, Watch
+from companion.watch import Situation, Watch
 from companion.world import View, World
 from mavlink_bridge.codec import Codec, Counters
 from mavlink_bridge.frames import FleetFrame, LocalFrame
-from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source, Timesync, Tunnel
+from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.signing import Signing
 
 COMPONENT = 195
 """MAV_COMP_ID_PATHPLANNER."""
-NAV_LOITER_UNLIM, NAV_RETURN, DO_REPOSITION = 17, 20, 192
-ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 _LONGEST_NS = (1 << 32) - 1
-_GLOBAL = (0, 5)
-"""MAV_FRAME_GLOBAL and its INT twin."""
-_HIGHEST = 1e5
-"""m; a NaN is not below it either."""
-_BACK, _STILL = 0.5, 0.5
-"""m and m/s: so near to where it started, and so slow, it is back."""
 _LOOK = 100_000
 """µs between two looks at what may be wrong."""
 _NOTHING: dict[str, list[Message]] = {"autopilot": [], "ground": []}
@@ -73,6 +66,8 @@ class Companion:
     all links, whose number in ``LINKS`` is the link id; without, whatever it hears counts.
     """
 
+    pilots: ClassVar[type[Pilot]] = Pilot
+
     def __init__(
         self,
         config: CompanionConfig,
@@ -90,7 +85,7 @@ class Companion:
         self.world = World(config, system, target_system, fleet)
         self.planner = Planner(config)
         self.guard = Guard(config)
-        self.pilot = Pilot(config, self._source, fleet.altitude)
+        self.pilot = self.pilots(config, self._source, fleet.altitude)
         self._sharing = Sharing(config, self._source, fleet)
         self.voice = Voice(config.voice, self._source)
         self._dials = Dials(config, self._source)
@@ -102,16 +97,16 @@ class Companion:
         }
         self.plan: Plan | None = None
         self._frame: LocalFrame | None = None
-        self._goal: Array | None = None
-        self._held: Array | None = None
         self.watch = Watch(config)
-        self._owed: dict[str, Reaction] = {}
+        self._reactions = Reactions()
         self._next_look = self._looked_late = 0
-        self._settling = Settling(config)
         self._certified = (
             CertifiedFlight(config, self._source, fleet) if config.avoidance == "certified" else None
         )
-        self._surface = config.surface_of(system)
+        ahead = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
+        certified = self._certified
+        self._aims = Aims(config, system, self.pilot, ahead if certified is None else certified.seconds)
+        self._orders = Orders(config, self._source, fleet, self.pilot, self._aims)
         self._obstacles = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
         self._heading = Heading(config.heading, config.horizon)
         self._boot: int | None = None
@@ -190,8 +185,7 @@ class Companion:
         view = self.world.at(now)
         commands = self.pilot.step(now, view)
         self._look(now, view)
-        if self.pilot.phase not in (Phase.HOLD, Phase.RETURN) and view.target is not None:
-            self._held = None
+        self._aims.forget(view)
         self._fly(now, view)
         setpoints = self._setpoints(now, view)
         certified = self._certified
@@ -228,7 +222,7 @@ class Companion:
         for link, data in inbox:
             for message in self._codecs[link].feed(data, whole=True):
                 if link == "ground":
-                    answers += self._obey(message)
+                    answers += self._orders.obey(message)
                     continue
                 if link == "autopilot":
                     self.pilot.hear(message)
@@ -237,44 +231,6 @@ class Companion:
                 else:
                     self.world.hear(now, link, message)
         return answers
-
-    def _obey(self, message: Message) -> list[Message]:
-        """Operator's commands: NAV_TAKEOFF is the go, DO_REPOSITION the goal, NAV_LOITER_UNLIM to stay,
-        NAV_RETURN_TO_LAUNCH to come back, NAV_LAND the end."""
-        if not isinstance(message, CommandInt | CommandLong):
-            return []
-        if (message.target_system, message.target_component) != self._source:
-            return []
-        if isinstance(message, CommandInt) and message.command == DO_REPOSITION:
-            taken = self._aim_at(message)
-        elif isinstance(message, CommandLong) and message.command == NAV_TAKEOFF:
-            taken = self.pilot.go(message.params[6])
-        elif isinstance(message, CommandLong) and message.command == NAV_LAND:
-            taken = self.pilot.land()
-        elif isinstance(message, CommandLong) and message.command == NAV_LOITER_UNLIM:
-            taken = self.pilot.hold()
-        elif isinstance(message, CommandLong) and message.command == NAV_RETURN:
-            taken = self.pilot.come_back()
-        else:
-            return [self._ack(message, UNSUPPORTED)]
-        return [self._ack(message, ACCEPTED if taken else DENIED)]
-
-    def _aim_at(self, order: CommandInt) -> bool:
-        """DO_REPOSITION to a place on the globe, its altitude above mean sea level; others are refused."""
-        latitude, longitude = order.x * 1e-7, order.y * 1e-7
-        if order.frame not in _GLOBAL or abs(latitude) > 90.0 or abs(longitude) > 180.0:
-            return False
-        if not abs(order.z) < _HIGHEST:
-            return False
-        goal = self._fleet.to_enu(latitude, longitude, order.z)
-        limits = self.config.limits
-        if self.config.task != "goto" or (goal < limits.box_min).any() or (goal > limits.box_max).any():
-            return False
-        self._goal = goal
-        return True
-
-    def _ack(self, message: CommandInt | CommandLong, result: int) -> CommandAck:
-        return CommandAck(self._source, message.command, result, 0, 0, *message.source)
 
     def _fly(self, now: int, view: View) -> None:
         """Plan when due; start from the measured state each time the vehicle becomes ours."""
@@ -294,7 +250,8 @@ class Companion:
             if stale or view.yaw is None:
                 return
             self._heading.reset(view.yaw)
-            self._goal = view.own.position if self._goal is None else self._goal
+            if self._aims.goal is None:
+                self._aims.goal = view.own.position
             self.guard.start(now, measured)
             if self._certified is not None:
                 self._certified.stand(now, measured.position)
@@ -391,56 +348,12 @@ class Companion:
     def _aim(self, now: int, view: View, measured: Motion) -> Aim | None:
         """Where to; None when nobody knows."""
         try:
-            aim = self._destination(now, view, measured)
+            aim = self._aims.aim(view, measured, self._obstacles, cautious=self.watch.blinkered)
         except SurfaceError:
             return None
-        if aim is not None and self.watch.blinkered:
-            aim = self._cautious(aim, measured)
-        if aim is None or self.config.traffic is None:
+        if self.config.traffic is None:
             return aim
         return aim._replace(destination=self.world.sensed.aside(now, aim.destination, measured.position))
-
-    def _cautious(self, aim: Aim, measured: Motion) -> Aim:
-        """The same way, but no further in a horizon than ``guard.cautious_speed`` goes."""
-        speed = self.config.guard.cautious_speed
-        if speed is None:
-            return aim
-        drift = aim.target_end - aim.target
-        way = aim.destination - drift - measured.position
-        far = float(np.linalg.norm(way))
-        most = speed * 1e-6 * self.config.horizon.dt_us * (self.config.horizon.steps + 1)
-        if far <= most:
-            return aim
-        return aim._replace(destination=measured.position + drift + most / far * way)
-
-    def _destination(self, now: int, view: View, measured: Motion) -> Aim | None:
-        """Where to: the own goal, or the surface around the target where it will be at the end of the
-        horizon."""
-        config, target = self.config, view.target
-        if self.pilot.phase is Phase.HOLD:
-            return standing(self._place_to_hold(measured), None if target is None else target.position)
-        if self.pilot.phase is Phase.RETURN:
-            return standing(self._way_back(measured), None if target is None else target.position)
-        if self.pilot.phase is Phase.SETTLE:
-            rest = self._settling.rest(measured, self._obstacles)
-            if self._settling.clear:
-                self.pilot.settled()
-            return standing(rest, None if target is None else target.position)
-        if config.task == "goto":
-            goal = measured.position if self._goal is None else self._goal
-            return standing(goal, None if target is None else target.position)
-        if target is None:
-            # Nobody is to be stood around: it stays where it is, clear of the others.
-            return standing(self._place_to_hold(measured), None)
-        steps = config.horizon.steps + 1
-        ahead = steps * config.horizon.dt_us * 1e-6 if self._certified is None else self._certified.seconds
-        (end,), (velocity,) = target.ahead(np.array([ahead]))
-        surface = self._surface
-        offset = surface.nearest(measured.position - target.position)
-        if config.turn_rate:
-            offset = surface.nearest(turned(offset, config.turn_rate * ahead))
-            velocity = velocity + config.turn_rate * np.array([-offset[1], offset[0], 0.0])
-        return Aim(end + offset, velocity, target.position, end, surface)
 
     def _look(self, now: int, view: View) -> None:
         """See what is wrong, ten times a second, and react to what begins."""
@@ -463,39 +376,12 @@ class Companion:
             self.world.moves,
             self.world.displaced,
         )
-        for concern, begins in self.watch.look(situation):
+        for change in self.watch.look(situation):
+            concern = change.concern
             if concern.name != "target":  # of that the world tells
-                self.voice.report(concern.severity, concern.text, begins=begins)
-            if begins and concern.reaction is not Reaction.TELL:
-                self._owed[concern.name] = concern.reaction
-            elif not begins:
-                self._owed.pop(concern.name, None)
-        if self._owed and self.pilot.phase in STEERED:
-            # What began on the way up, or while somebody else had the vehicle, follows now.
-            if Reaction.LAND in self._owed.values():
-                self.pilot.alight()
-            else:
-                self.pilot.come_back()
-            self._owed.clear()
-
-    def _place_to_hold(self, measured: Motion) -> Array:
-        """Where it was when it was told to stay or to come back, or when the target was lost."""
-        if self._held is None:
-            self._held = measured.position.copy()
-        return self._held
-
-    def _way_back(self, measured: Motion) -> Array:
-        """Above where it started, as high as it flies now and allowed; told to the pilot when it is there."""
-        limits, start = self.config.limits, self.pilot.start
-        if start is None:
-            return measured.position
-        height = float(self._place_to_hold(measured)[2])
-        height = min(max(height, limits.box_min[2]), limits.box_max[2])
-        above = np.array([start[0], start[1], height])
-        off = above - measured.position
-        if float(off[:2] @ off[:2]) < _BACK**2 and float(measured.velocity @ measured.velocity) < _STILL**2:
-            self.pilot.returned()
-        return above
+                self.voice.report(concern.severity, concern.text, begins=change.begins)
+            self._reactions.note(change)
+        self._reactions.follow(self.pilot)
 
     def _setpoints(self, now: int, view: View) -> list[Message]:
         if now < self._next_setpoint:

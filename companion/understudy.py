@@ -11,11 +11,11 @@ from collections.abc import Callable
 
 from companion.config import CompanionConfig
 from companion.errors import CompanionError
-from companion.node import COMPONENT, Companion
+from companion.node import Companion
 from companion.pilot import Phase, Pilot
 from companion.world import View
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, SetpointLocal, Source
+from mavlink_bridge.messages import Message, SetpointLocal
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.signing import Signing
 
@@ -63,6 +63,8 @@ class Understudy(Companion):
     CompanionError for ``avoidance: certified``.
     """
 
+    pilots = Onlooker
+
     def __init__(
         self,
         config: CompanionConfig,
@@ -77,7 +79,6 @@ class Understudy(Companion):
         guard = config.guard.model_copy(update={"tube": _ALWAYS_ANEW})
         config = config.model_copy(update={"guard": guard})
         super().__init__(config, system, target_system, fleet, stopwatch, signing)
-        self.pilot = Onlooker(config, Source(system, COMPONENT), fleet.altitude)
         self.would: list[SetpointLocal] = []
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:

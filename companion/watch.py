@@ -67,7 +67,6 @@ class Watch:
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
         self.concerns: dict[str, Concern] = {}
-        self._neighbours: dict[int, bool] = {}
         self._late_until = 0
         self._clock_steps = 0
         self._target_seen = False
@@ -82,12 +81,6 @@ class Watch:
         changes += [Change(concern, False) for name, concern in self.concerns.items() if name not in found]
         self.concerns = found
         return changes
-
-    @property
-    def reaction(self) -> Reaction:
-        """The gravest of what the present concerns ask for."""
-        order = list(Reaction)
-        return max((c.reaction for c in self.concerns.values()), key=order.index, default=Reaction.TELL)
 
     @property
     def blinkered(self) -> bool:

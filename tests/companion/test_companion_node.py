@@ -32,7 +32,7 @@ from companion_bench import (
 
 from companion.errors import SolverError
 from companion.guard import Holding
-from companion.node import NAV_LOITER_UNLIM, NAV_RETURN
+from companion.orders import NAV_LOITER_UNLIM, NAV_RETURN
 from companion.pilot import Phase
 from mavlink_bridge.messages import (
     Attitude,

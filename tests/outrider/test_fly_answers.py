@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.dry_run import ONLOOKER, DryRun
-from companion.node import COMPONENT, NAV_RETURN, Companion
+from companion.node import COMPONENT, Companion
+from companion.orders import NAV_RETURN
 from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec

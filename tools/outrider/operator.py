@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.node import COMPONENT, DO_REPOSITION
+from companion.node import COMPONENT
+from companion.orders import DO_REPOSITION
 from companion.pilot import NAV_LAND, NAV_TAKEOFF
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame

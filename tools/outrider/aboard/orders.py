@@ -5,7 +5,8 @@ from __future__ import annotations
 from difflib import get_close_matches
 
 from companion.calls import ACCEPTED
-from companion.node import COMPONENT, NAV_LOITER_UNLIM, NAV_RETURN
+from companion.node import COMPONENT
+from companion.orders import NAV_LOITER_UNLIM, NAV_RETURN
 from companion.pilot import NAV_LAND, NAV_TAKEOFF
 from companion.reception import LINKS
 from mavlink_bridge.codec import Codec
