@@ -302,6 +302,22 @@ def paper(
 
 
 @app.command()
+def gallery(
+    names: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Argument(metavar="[SCENARIO]...", help="Names of shipped scenarios; all without."),
+    ] = None,
+    jobs: Annotated[Optional[int], typer.Option(min=1, help="Processes; as many as cores.")] = None,  # noqa: UP045
+    out: Annotated[Optional[Path], typer.Option(help="Directory; one begun is gone on with.")] = None,  # noqa: UP045
+    page: Annotated[Optional[Path], typer.Option(metavar="FOLDER", help="Page and pictures there.")] = None,  # noqa: UP045
+) -> None:
+    """Fly every method in every scenario, and draw a page of pictures."""
+    from outrider.gallery.command import gallery as drawing
+
+    raise typer.Exit(drawing(tuple(names or ()), jobs, out, page))
+
+
+@app.command()
 def replay(
     log: Annotated[
         Path,

@@ -13,15 +13,11 @@ from outrider.paper.results import Result, result_of
 from outrider.paper.rows import ROWS, Row, cells_of
 from outrider.paper.table import markdown, show
 from outrider.sweeps import directory as places
-from outrider.sweeps.cells import Cell, task
-from outrider.sweeps.execution import cores, has_ended, header, work
-from outrider.sweeps.journal import Journal, opened
-from outrider.sweeps.pool import Pool
-from outrider.sweeps.progress import watching
+from outrider.sweeps.cells import Cell
+from outrider.sweeps.comparison import Flown, flown
 from outrider.sweeps.runs import run_of
 
 INTERRUPTED = 3
-_WALL_LIMIT_S = 1800.0
 
 
 def paper(
@@ -41,26 +37,14 @@ def paper(
     found = cells_of(rows)
     folder = places.prepare(out, "paper")
     numbers = range(TRACED, TRACED + seeds)
-    with opened(folder / places.JOURNAL, header("paper", found)) as journal:
-        tasks = [task(cell, seed) for seed in numbers for cell in found]
-        waiting = [one for one in tasks if not has_ended(journal, one)]
-        with (
-            watching(len(tasks), len(tasks) - len(waiting)) as watch,
-            Pool(run, jobs or cores(), _WALL_LIMIT_S) as pool,
-        ):
-            stopped = work(journal, waiting, watch, pool)
-        if stopped:
-            left = sum(not has_ended(journal, one) for one in tasks)
-            sys.stderr.write(
-                f"stopped with {left} of {len(tasks)} flights left; the same command with --out {folder} "
-                "goes on\n"
-            )
-            return INTERRUPTED
-        results = [
-            result_of(row, [run_of(journal.entries[cell.key, seed]) for seed in numbers])
-            for row, cell in zip(rows, found, strict=True)
-        ]
-        traces = _traces(rows, found, journal)
+    entries = flown("paper", found, numbers, folder, run, jobs)
+    if entries is None:
+        return INTERRUPTED
+    results = [
+        result_of(row, [run_of(entries[cell.key, seed]) for seed in numbers])
+        for row, cell in zip(rows, found, strict=True)
+    ]
+    traces = _traces(rows, found, entries)
     document = {"rows": [result.document() for result in results]}
     (folder / "paper.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
     (folder / "paper.md").write_text(markdown(rows, results), encoding="utf-8")
@@ -73,11 +57,11 @@ def paper(
     return _status(results)
 
 
-def _traces(rows: tuple[Row, ...], found: list[Cell], journal: Journal) -> dict[Row, dict[str, Any]]:
+def _traces(rows: tuple[Row, ...], found: list[Cell], entries: Flown) -> dict[Row, dict[str, Any]]:
     """Of the seed that is drawn, where it was flown."""
     traces = {}
     for row, cell in zip(rows, found, strict=True):
-        summary = journal.entries[cell.key, TRACED].summary
+        summary = entries[cell.key, TRACED].summary
         if summary is not None and "trace" in summary:
             traces[row] = summary["trace"]
     return traces

@@ -1,0 +1,74 @@
+"""``outrider gallery`` as a whole, with flights that take no time, and what its panels fly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from outrider.errors import InputError
+from outrider.gallery.command import gallery
+from outrider.gallery.flying import fly
+from outrider.gallery.showings import WAYS, cells_of, chosen, scenarios, showings
+from outrider.resources import config_root
+from outrider.sweeps.cells import scenario_of, task
+
+
+def test_every_scenario_is_flown_in_every_way() -> None:
+    assert set(scenarios()) == {path.stem for path in (config_root() / "scenarios").iterdir()}
+    shown = showings(chosen(()))
+    cells = cells_of(shown)
+    assert len({cell.key for cell in cells}) == len(cells) == len(WAYS) * len(scenarios())
+    for (scenario, way), cell in zip(shown, cells, strict=True):
+        flown = scenario_of(task(cell, 1))
+        assert flown.name == scenario
+        assert flown.airborne
+        certified = flown.companion.avoidance == "certified"
+        assert certified if way == "certified" else flown.companion.methods == (way,) and not certified
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_page_shows_all_and_says_what_became_of_each(here: Path) -> None:
+    assert gallery(("traffic", "obstacles"), to=Path("page"), run="gallery_runs:straight") == 1
+    text = (here / "page" / "README.md").read_text()
+    row = "| [traffic](#traffic) | stuck, least 1.50 m | not flown: "
+    assert row in text
+    assert "| 7.2 s, least 1.50 m | 7.2 s, least 1.50 m | 7.2 s, least 0.40 m, 1 violation |" in text
+    assert "Four vehicles change lanes between posts and spheres." in text
+    for name in ("traffic", "obstacles"):
+        assert f"![{name}]({name}.png)" in text
+        assert (here / "page" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    assert (here / "runs" / "sweep-gallery" / "journal.jsonl").is_file()
+
+
+def test_what_is_flown_already_is_not_flown_again(here: Path) -> None:
+    assert gallery(("obstacles",), out=Path("out"), run="gallery_runs:fine") == 0
+    before = Path("out/journal.jsonl").read_bytes()
+    assert gallery(("obstacles",), out=Path("out"), run="gallery_runs:never") == 0
+    assert Path("out/journal.jsonl").read_bytes() == before
+
+
+def test_a_scenario_that_is_not_shipped_is_refused_with_those_that_are(here: Path) -> None:
+    with pytest.raises(InputError, match="'nowhere' is not shipped; allowed: adversary, antipodal"):
+        gallery(("nowhere",))
+    assert list(here.iterdir()) == []
+
+
+def test_a_scene_has_what_the_picture_needs() -> None:
+    (cell,) = (one for one in cells_of(showings(("scenario-3",))) if one.label.endswith("tangential"))
+    summary = fly(task(cell, 1))
+    scene = summary["scene"]
+    assert summary["converged"] is True
+    count = len(scene["time_s"])
+    assert len(scene["position"]) == len(scene["separation"]) == len(scene["target"]) == count
+    assert scene["time_s"][0] == 0.0
+    assert scene["time_s"][-1] > summary["convergence_time_s"]
+    flown = scenario_of(task(cell, 1))
+    assert len(scene["position"][0]) == flown.size
+    assert scene["vehicles"] == flown.vehicles == 1
+    assert abs(min(scene["separation"]) - summary["min_separation_m"]) < 0.01

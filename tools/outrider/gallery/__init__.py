@@ -1,0 +1,1 @@
+"""The page of pictures: every method in every scenario."""

@@ -1,0 +1,65 @@
+"""``outrider gallery``: flies what is shown, resumable, then draws it and writes the page."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from outrider.gallery import figures
+from outrider.gallery.flying import RUN
+from outrider.gallery.page import page
+from outrider.gallery.showings import Showing, cells_of, chosen, showings
+from outrider.sweeps import directory as places
+from outrider.sweeps.cells import scenario_of, task
+from outrider.sweeps.comparison import Flown, flown
+from outrider.sweeps.runs import Ending, run_of
+
+INTERRUPTED = 3
+SEED = 1
+
+
+def gallery(
+    names: tuple[str, ...] = (),
+    jobs: int | None = None,
+    out: Path | None = None,
+    to: Path | None = None,
+    run: str = RUN,
+) -> int:
+    """Fly and draw the scenarios ``names``, or all; the exit status.
+
+    0 drawn; 1 a flight came to nothing; 3 interrupted. That a way gets stuck, or comes too near, is shown.
+    The journal is in ``out`` (``runs/sweep-gallery``), the page, ``README.md``, with its pictures in ``to``,
+    or there, too. InputError for an unknown scenario.
+    """
+    shown = showings(chosen(names))
+    found = cells_of(shown)
+    folder = places.prepare(out, "gallery")
+    entries = flown("gallery", found, (SEED,), folder, run, jobs)
+    if entries is None:
+        return INTERRUPTED
+    by_cell = dict(zip(shown, (cell.key for cell in found), strict=True))
+    panels = {name: _panels(name, shown, by_cell, entries) for name in dict.fromkeys(s for s, _ in shown)}
+    told = {
+        showing.scenario: scenario_of(task(cell, SEED)).description
+        for showing, cell in zip(shown, found, strict=True)
+    }
+    there = folder if to is None else to
+    there.mkdir(parents=True, exist_ok=True)
+    for name, of in panels.items():
+        figures.draw(name, of, there / f"{name}.png")
+    (there / "README.md").write_text(page(panels, told, SEED), encoding="utf-8")
+    sys.stderr.write(f"page and pictures: {there}\n")
+    failed = (Ending.FAILED, Ending.FAULT, Ending.LOST)
+    return 1 if any(run.ending in failed for of in panels.values() for _, run, _ in of) else 0
+
+
+def _panels(
+    name: str, shown: tuple[Showing, ...], keys: dict[Showing, str], entries: Flown
+) -> list[figures.Panel]:
+    panels: list[figures.Panel] = []
+    for showing in shown:
+        if showing.scenario == name:
+            entry = entries[keys[showing], SEED]
+            scene = None if entry.summary is None else entry.summary.get("scene")
+            panels.append((showing.way, run_of(entry), scene))
+    return panels

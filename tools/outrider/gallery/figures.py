@@ -1,0 +1,87 @@
+"""One picture for each scenario: a column for each way, the paths from above and the least separation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from outrider.sweeps.runs import Ending, Run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_TARGET, _THING = "0.25", "0.6"
+_LIMIT = "#b00020"
+_HIGH = 6.0
+"""m of separation that is shown: above, nobody is near."""
+
+Panel = tuple[str, Run, Mapping[str, Any] | None]
+"""A way, what came of it, and the flight's scene, if there was a flight."""
+
+
+def draw(scenario: str, panels: Sequence[Panel], path: Path) -> None:
+    """Write the PNG of one scenario to ``path``."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(3.4 * len(panels), 5.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(2, len(panels), squeeze=False, height_ratios=(2.6, 1.0))
+    for column, (way, run, scene) in enumerate(panels):
+        axes[0, column].set_title(f"{way}\n{outcome(run)}", fontsize=9)
+        if scene is not None:
+            _paths(axes[0, column], scene)
+            _separation(axes[1, column], scene)
+    axes[0, 0].set_ylabel("north, m")
+    axes[1, 0].set_ylabel("least separation, m")
+    figure.suptitle(f"{scenario}: paths from above (o start, ● end)", fontsize=11)
+    figure.savefig(path, dpi=80, pil_kwargs={"optimize": True})
+
+
+def outcome(run: Run) -> str:
+    """What came of a flight, in a few words."""
+    if run.ending in (Ending.FAILED, Ending.FAULT, Ending.LOST):
+        return f"not flown: {run.what}"
+    words = []
+    if run.converged is not None:
+        words.append(f"{run.seconds:.1f} s" if run.converged else "stuck")
+    if run.separation is not None:
+        words.append(f"least {run.separation:.2f} m")
+    if run.violations:
+        words.append(f"{run.violations} violation{'s' * (run.violations > 1)}")
+    return ", ".join(words)
+
+
+def _paths(axes: Axes, scene: Mapping[str, Any]) -> None:
+    from matplotlib.patches import Circle
+
+    for east, north, radius in scene["obstacles"]:
+        axes.add_patch(Circle((east, north), radius, color=_THING, lw=0.0))
+    for way, radius in zip(scene["moving"], scene["moving_radius"], strict=True):
+        axes.plot(*np.array(way).T, color=_THING, lw=0.8)
+        axes.add_patch(Circle(way[-1], radius, fc="0.8", ec=_THING, lw=0.8))
+    positions = np.array(scene["position"])
+    for k in range(positions.shape[1]):
+        colour = f"C{k % 10}" if k < scene["vehicles"] else _THING
+        axes.plot(*positions[:, k].T, lw=0.9, color=colour)
+        axes.plot(*positions[0, k], "o", ms=3, mfc="none", color=colour)
+        axes.plot(*positions[-1, k], "o", ms=4, color=colour)
+    if scene["target"]:
+        axes.plot(*np.array(scene["target"]).T, color=_TARGET, lw=1.2, ls=":")
+        axes.plot(*scene["target"][-1], "*", ms=9, color=_TARGET)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.tick_params(labelsize=7)
+    axes.grid(alpha=0.3)
+
+
+def _separation(axes: Axes, scene: Mapping[str, Any]) -> None:
+    near = np.array(scene["separation"])
+    axes.plot(scene["time_s"], np.where(near < 0.0, np.nan, near), lw=1.0)
+    axes.axhline(scene["d_min"], color=_LIMIT, lw=1.0)
+    axes.set_ylim(0.0, _HIGH)
+    axes.set_xlabel("s", fontsize=8)
+    axes.tick_params(labelsize=7)
+    axes.grid(alpha=0.3)

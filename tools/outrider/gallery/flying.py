@@ -1,0 +1,45 @@
+"""What a worker does with a flight that is to be shown: its summary, and what the picture needs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from outrider.outcome import Outcome
+from outrider.swarm import measured
+from outrider.sweeps.flying import prepared
+from outrider.sweeps.tasks import Task
+
+RUN = f"{__name__}:fly"
+_EVERY = 5
+"""Samples of the truth to a point of the picture: 0.1 s."""
+
+
+def fly(task: Task) -> dict[str, Any]:
+    """Fly it without files. The same task gives the same result."""
+    outcome, summary = measured(prepared(task), task.seed)
+    return {**summary, "scene": _scene(outcome)}
+
+
+def _scene(outcome: Outcome) -> dict[str, Any]:
+    """From the clock's start: times (T,) s; positions (T, K, 2) and the target's ways (T, 2), m from above;
+    least separation (T,), m; obstacles as (east, north, radius), the ways of those that move (M, T, 2) with
+    their radii, and how many of the vehicles are escorts. Rounded to cm: it goes into a journal."""
+    start = outcome.clock_start or 0
+    samples = outcome.truth.samples(start, outcome.clock_end)
+    near = samples.separation
+    pieces = np.arange(0, len(near), _EVERY)
+    nearest = np.minimum.reduceat(near, pieces) if len(near) else near
+    target = samples.target[::_EVERY]
+    return {
+        "time_s": np.round((samples.time[::_EVERY] - start) * 1e-6, 2).tolist(),
+        "position": np.round(samples.position[::_EVERY, :, :2], 2).tolist(),
+        "separation": np.round(np.where(np.isfinite(nearest), nearest, -1.0), 2).tolist(),
+        "target": np.round(target[np.isfinite(target).all(axis=1)][:, :2], 2).tolist(),
+        "obstacles": [[*one.at[:2], one.radius] for one in outcome.scenario.obstacles],
+        "moving": np.round(samples.moving[::_EVERY, :, :2].swapaxes(0, 1), 2).tolist(),
+        "moving_radius": [one.radius for one in outcome.scenario.moving],
+        "vehicles": outcome.scenario.vehicles,
+        "d_min": outcome.scenario.d_min,
+    }

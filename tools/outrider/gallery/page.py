@@ -1,0 +1,36 @@
+"""The page: what each picture shows, and a table of all flights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from outrider.gallery.figures import Panel, outcome
+from outrider.gallery.showings import WAYS
+
+_HEAD = """\
+# Every method in every scenario
+
+Each shipped scenario, flown once from the air with seed {seed} in full physics over MAVLink: by the four
+methods of the field, and certified. Coloured lines are the vehicles' paths from above, from the ring to the
+dot; grey is what is in the way; the star is the target, the dotted line its way. Below each: the least
+distance of any two vehicles, and d_min in red. One flight is a picture, no measurement: for figures over many
+seeds see the tables in README.
+
+`outrider gallery --page docs/gallery` makes this page.
+
+| scenario | {ways} |
+|---|{rules}
+"""
+
+
+def page(panels: Mapping[str, Sequence[Panel]], descriptions: Mapping[str, str], seed: int) -> str:
+    """The Markdown, beside pictures named ``SCENARIO.png``."""
+    ways = " | ".join(way.replace("_", " ") for way in WAYS)
+    text = _HEAD.format(seed=seed, ways=ways, rules="---|" * len(WAYS))
+    for scenario, of in panels.items():
+        cells = " | ".join(outcome(run) for _, run, _ in of)
+        text += f"| [{scenario}](#{scenario}) | {cells} |\n"
+    for scenario in panels:
+        said = descriptions[scenario]
+        text += f"\n## {scenario}\n\n{said[:1].upper()}{said[1:]}.\n\n![{scenario}]({scenario}.png)\n"
+    return text

@@ -1,0 +1,51 @@
+"""What is shown: each shipped scenario by each method of the paper, and certified."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from outrider.errors import InputError
+from outrider.resources import config_root
+from outrider.sweeps.cells import Cell, cells
+from outrider.sweeps.grid import Sweep
+
+WAYS = ("baseline", "swivel", "approach_angle", "tangential", "certified")
+"""The methods, and what stands in their place."""
+
+
+class Showing(NamedTuple):
+    """One panel: a scenario flown in one of ``WAYS``."""
+
+    scenario: str
+    way: str
+
+
+def scenarios() -> tuple[str, ...]:
+    """The names of the shipped scenarios, sorted."""
+    return tuple(sorted(path.stem for path in Path(config_root(), "scenarios").glob("*.yaml")))
+
+
+def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Those of ``names``, or all if there are none. InputError for one that is not shipped."""
+    known = scenarios()
+    for name in names:
+        if name not in known:
+            raise InputError(f"scenario {name!r} is not shipped; allowed: {', '.join(known)}")
+    return tuple(dict.fromkeys(names)) or known
+
+
+def showings(names: tuple[str, ...]) -> tuple[Showing, ...]:
+    """Each scenario in each way."""
+    return tuple(Showing(name, way) for name in names for way in WAYS)
+
+
+def cells_of(shown: tuple[Showing, ...]) -> list[Cell]:
+    """What each flies: the scenario as it is shipped, from the air."""
+    found = []
+    for number, (scenario, way) in enumerate(shown, 1):
+        other = {"companion.avoidance": "certified"} if way == "certified" else {"companion.methods": [way]}
+        spec = Sweep(name="gallery", scenarios=(scenario,), set={"airborne": True, **other})
+        (cell,) = cells(spec, f"{scenario} by {way}")
+        found.append(cell._replace(label=f"{scenario}, {way}", slug=f"{number:03d}-{scenario}-{way}"))
+    return found
