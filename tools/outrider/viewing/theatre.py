@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import viser
 
+from outrider.viewing.doorkeeper import guarded
 from outrider.viewing.moment import Moment
 from outrider.viewing.panel import Panel
 from outrider.viewing.scene import Scene
@@ -34,7 +35,8 @@ class Theatre:
     def __init__(self, host: str, port: int) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)
-            self.server = Server(host=host, port=port, verbose=False)
+            with guarded(host):
+                self.server = Server(host=host, port=port, verbose=False)
         here = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::", "::1") else host
         self.url = f"http://{here}:{self.server.get_port()}"
         self.server.gui.add_markdown("Nothing has come yet.")
