@@ -10,103 +10,35 @@ import numpy as np
 import pytest
 from companion_bench import (
     ARM,
-    ARMED,
-    AUTOPILOT,
     FLEET,
     INTERVAL,
     LAND,
     MODE,
-    PREARM_OK,
     PROFILES,
     REQUEST,
-    START,
     TAKEOFF,
     TICK,
 )
+from pilot_rig import (
+    FLAVOURS,
+    GROUND,
+    HALF,
+    HEALTHY,
+    HEIGHT,
+    ILL,
+    NOTHING,
+    READY,
+    Rig,
+    ack,
+    beat,
+    landed,
+    state,
+)
 
 from companion.config import CompanionConfig
-from companion.pilot import Phase, Pilot
-from companion.tracks import State
+from companion.pilot import Phase
 from companion.world import View
-from mavlink_bridge.messages import CommandAck, ExtendedSysState, Heartbeat, Message, Source, SysStatus
-
-OWN = Source(11, 195)
-HEIGHT, GROUND = 6.0, 2.5
-HALF = 500_000
-LOCAL = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
-FLAVOURS = tuple(PROFILES)
-IN_FLIGHT = ExtendedSysState(AUTOPILOT, 0, 2)
-HEALTHY = SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, None, None)
-ILL = SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, 0, None, None)
-
-
-def state(height=0.0, speed=0.0, age=5_000):
-    return State(np.array([0.0, 0.0, GROUND + height]), np.array([0.0, 0.0, speed]), age)
-
-
-def beat(flavour, armed=False, guided=False, autopilot=None, mode=0):
-    profile = PROFILES[flavour]
-    mode = profile.guided_custom_mode if guided else mode
-    kind = profile.autopilot if autopilot is None else autopilot
-    return Heartbeat(AUTOPILOT, 2, kind, ARMED * armed, mode, 4)
-
-
-def ack(command, result=0):
-    return CommandAck(AUTOPILOT, command, result, 0, 0, *OWN)
-
-
-def landed(state_of_landing):
-    return ExtendedSysState(AUTOPILOT, 0, state_of_landing)
-
-
-NOTHING = View(None, None, None, None)
-READY = View(state(), 0.3, None, LOCAL)
-
-
-class Rig:
-    """A pilot, the time, and what it sees and has sent."""
-
-    def __init__(self, flavour="ardupilot", view=READY):
-        self.flavour = flavour
-        self.pilot = Pilot(CompanionConfig(), OWN, FLEET.altitude)
-        self.now, self.view = START, view
-        self.sent = []
-
-    def tick(self, *heard: Message):
-        """One step: the commands sent, as (command, parameters without NaN)."""
-        for message in heard:
-            # As a codec makes it: a new one each time.
-            self.pilot.hear(message._replace())
-        sent = [
-            (m.command, tuple(p for p in m.params if p == p)) for m in self.pilot.step(self.now, self.view)
-        ]
-        self.sent += [(self.now, *call) for call in sent]
-        self.now += TICK
-        return sent
-
-    def run(self, seconds, *every, acks=False):
-        """Steps; with ``acks`` every command is accepted at once."""
-        sent, answers = [], []
-        for _ in range(round(seconds * 1e6 / TICK)):
-            new = self.tick(*every, *answers)
-            answers = [ack(command) for command, _ in new] if acks else []
-            sent += new
-        return sent
-
-    def prepared(self):
-        """Connected, given the go, intervals asked for."""
-        self.run(0.2, beat(self.flavour), HEALTHY, acks=True)
-        assert self.pilot.go(HEIGHT)
-        self.tick()
-        assert self.pilot.phase is Phase.PREPARE
-        return self
-
-    def escorting(self):
-        self.prepared()
-        self.view = READY._replace(own=state(HEIGHT))
-        self.run(0.2, beat(self.flavour, armed=True, guided=True))
-        assert self.pilot.phase is Phase.ESCORT
-        return self
+from mavlink_bridge.messages import Message
 
 
 class Want(NamedTuple):
@@ -153,14 +85,6 @@ def test_connecting_waits_and_names_what_is_missing(name):
         assert not rig.pilot.streaming
     else:
         assert rig.pilot.phase is Phase.PREPARE
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_nothing_is_armed_without_a_go(flavour):
-    rig = Rig(flavour)
-    sent = rig.run(20.0, beat(flavour), HEALTHY, acks=True)
-    assert {command for command, _ in sent} == {INTERVAL, REQUEST}
-    assert rig.pilot.phase is Phase.CONNECT
 
 
 ORDER = {
@@ -306,15 +230,6 @@ def test_orders(flavour, case):
     assert (taken, rig.pilot.phase) == (case.taken, case.after)
 
 
-def test_an_order_to_land_takes_an_earlier_go_back():
-    rig = Rig(view=READY._replace(local=None))
-    assert rig.pilot.go(HEIGHT)
-    assert rig.pilot.land()
-    rig.view = READY
-    assert {command for command, _ in rig.run(5.0, BEAT, HEALTHY, acks=True)} == {INTERVAL, REQUEST}
-    assert rig.pilot.phase is Phase.CONNECT
-
-
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_without_a_heartbeat_for_three_seconds_nothing_is_steered(flavour):
     rig = Rig(flavour).escorting()
@@ -374,235 +289,6 @@ def test_only_who_settles_can_have_settled(phase):
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("landing", [False, True])
-def test_who_takes_the_vehicle_over_by_its_mode_switch_has_it_until_a_new_go(flavour, landing):
-    """Nothing is sent, nothing is ordered back; not when its mode is ours again either: that may be a ground
-    station that flies it."""
-    rig = Rig(flavour).escorting()
-    if landing:
-        rig.pilot.land()
-    assert rig.run(60.0, beat(flavour, armed=True, guided=False)) == []
-    assert rig.pilot.phase is Phase.YIELDED
-    assert not rig.pilot.streaming
-    assert rig.run(60.0, beat(flavour, armed=True, guided=True)) == []
-    assert rig.pilot.phase is Phase.YIELDED
-    assert not rig.pilot.streaming
-    assert not rig.pilot.land()
-    assert not rig.pilot.come_back()
-    assert not rig.pilot.hold()
-
-
-# A pilot on the way up and down
-
-
-HOLD = {flavour: profile.hold_mode for flavour, profile in PROFILES.items()}
-MANUAL = {"ardupilot": (0, 2, 5, 6, 16), "px4": (1 << 16, 2 << 16, 3 << 16, 4 << 16 | 5 << 24)}
-
-
-def climbing(flavour, height):
-    """Armed, told to take off, ``height`` up."""
-    rig = Rig(flavour).prepared()
-    up = beat(flavour, armed=True, guided=flavour == "ardupilot")
-    rig.run(0.5, up, landed(1), acks=True)
-    rising = beat(flavour, armed=True, mode=min(PROFILES[flavour].takeoff_modes, default=4))
-    rig.view = READY._replace(own=state(height, 1.0))
-    rig.run(0.5, rising, landed(3), acks=True)
-    assert rig.pilot.phase is Phase.PREPARE
-    return rig
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("height", [0.3 * HEIGHT, 0.9 * HEIGHT])
-def test_who_takes_it_over_on_the_way_up_has_it(flavour, height):
-    for mode in MANUAL[flavour]:
-        rig = climbing(flavour, height)
-        assert rig.run(60.0, beat(flavour, armed=True, mode=mode), landed(2)) == []
-        assert rig.pilot.phase is Phase.YIELDED
-        assert not rig.pilot.streaming
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_pause_on_the_way_up_is_somebodys_will_and_the_end_of_it_is_not(flavour):
-    """PX4 holds when it has risen."""
-    rig = climbing(flavour, 0.5 * HEIGHT)
-    held = beat(flavour, armed=True, mode=HOLD[flavour])
-    assert rig.run(10.0, held, landed(2)) == []
-    assert rig.pilot.phase is Phase.YIELDED
-    rig = climbing("px4", 0.95 * HEIGHT)
-    held = beat("px4", armed=True, mode=HOLD["px4"])
-    rig.view = READY._replace(own=state(HEIGHT))
-    assert MODE in {command for command, _ in rig.run(5.0, held, landed(2))}
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_who_takes_it_over_on_the_way_down_has_it(flavour):
-    for before in (0.0, 1.0):
-        for mode in MANUAL[flavour]:
-            rig = Rig(flavour).escorting()
-            rig.pilot.land()
-            rig.pilot.settled()
-            landing = beat(flavour, armed=True, mode=min(PROFILES[flavour].land_modes))
-            rig.run(before, landing, landed(2), acks=True)
-            assert rig.run(60.0, beat(flavour, armed=True, mode=mode), landed(2)) == []
-            assert rig.pilot.phase is Phase.YIELDED
-
-
-def test_a_mode_switched_away_on_the_ground_takes_the_go_back():
-    rig = Rig("ardupilot").prepared()
-    rig.run(0.2, beat("ardupilot", guided=True), HEALTHY, acks=True)
-    rig.run(0.2, beat("ardupilot"), HEALTHY, acks=True)
-    sent = rig.run(30.0, beat("ardupilot", guided=True), HEALTHY, acks=True)
-    assert not {command for command, _ in sent} & {ARM, MODE, TAKEOFF}
-    assert rig.pilot.waiting_for == "the operator's go"
-
-
-@pytest.mark.parametrize("mode", [0, 3 << 16, HOLD["px4"]])
-def test_what_happened_while_nothing_was_heard_may_have_been_a_pilot(mode):
-    rig = Rig("px4").escorting()
-    rig.pilot.streamed(rig.now)
-    rig.run(4.0)
-    assert rig.run(10.0, beat("px4", armed=True, mode=mode)) == []
-    assert rig.pilot.phase is Phase.YIELDED
-
-
-# A go does not keep
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_go_that_came_too_early_is_forgotten(flavour):
-    rig = Rig(flavour)
-    assert rig.pilot.go(HEIGHT)
-    rig.run(30.5, beat(flavour), ILL, acks=True)
-    sent = rig.run(30.0, beat(flavour), HEALTHY, acks=True)
-    assert not {command for command, _ in sent} & {ARM, MODE, TAKEOFF}
-    assert rig.pilot.waiting_for == "the operator's go"
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_vehicle_that_does_not_arm_is_not_told_to_for_ever(flavour):
-    rig = Rig(flavour).prepared()
-    guided = beat(flavour, guided=flavour == "ardupilot")
-    rig.run(31.0, guided, HEALTHY, ack(ARM, result=4))
-    rig.sent.clear()
-    rig.run(60.0, guided, HEALTHY, ack(ARM, result=4))
-    assert not {command for _, command, _ in rig.sent} & {ARM, MODE, TAKEOFF}
-
-
-# Where it may start
-
-
-@pytest.mark.parametrize(
-    ("place", "allowed"),
-    [
-        ((0.0, 0.0, 0.0), True),
-        ((45.0, 0.0, 0.0), True),
-        ((0.0, 0.0, -20.0), True),
-        ((400.0, 0.0, 0.0), False),
-        ((0.0, -400.0, 0.0), False),
-        ((0.0, 0.0, -458.0), False),
-        ((0.0, 0.0, 60.0), False),
-        ((math.nan, 0.0, 0.0), False),
-    ],
-)
-def test_a_vehicle_far_from_the_box_does_not_start(place, allowed):
-    rig = Rig("px4", READY._replace(own=State(np.array(place), np.zeros(3), 5_000)))
-    rig.run(0.2, beat("px4"), HEALTHY, acks=True)
-    assert rig.pilot.go(HEIGHT)
-    sent = rig.run(5.0, beat("px4"), HEALTHY, acks=True)
-    assert (ARM in {command for command, _ in sent}) == allowed
-    assert allowed or "a start near the box" in rig.pilot.waiting_for
-
-
-@pytest.mark.parametrize("left", [0.19, 0.02])
-def test_with_a_low_battery_nothing_starts(left):
-    rig = Rig("px4")
-    low = HEALTHY._replace(battery_remaining=left)
-    assert rig.pilot.go(HEIGHT)
-    sent = rig.run(5.0, beat("px4"), low, acks=True)
-    assert ARM not in {command for command, _ in sent}
-    assert rig.pilot.waiting_for == "a battery above 20 %"
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_new_go_takes_the_vehicle_back_in_flight_and_asks_for_the_mode_alone(flavour):
-    rig = Rig(flavour).escorting()
-    rig.run(5.0, beat(flavour, armed=True), HEALTHY, IN_FLIGHT)
-    assert rig.pilot.phase is Phase.YIELDED
-    assert rig.pilot.go(HEIGHT)
-    sent = rig.run(3.0, beat(flavour, armed=True), HEALTHY, IN_FLIGHT, acks=True)
-    assert {command for command, _ in sent} == {INTERVAL, REQUEST, MODE}
-    rig.run(0.2, beat(flavour, armed=True, guided=True))
-    assert rig.pilot.phase is Phase.ESCORT
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("guided", [False, True])
-def test_who_disarms_it_ends_the_flight(flavour, guided):
-    """Armed again by somebody, who will not expect it to fly: a new go is needed."""
-    rig = Rig(flavour).escorting()
-    rig.run(0.1, beat(flavour, guided=guided))
-    assert rig.pilot.phase is Phase.CONNECT
-    sent = rig.run(3.0, beat(flavour, armed=True, guided=True), HEALTHY, IN_FLIGHT, acks=True)
-    assert {command for command, _ in sent} == {INTERVAL, REQUEST}
-    assert rig.pilot.waiting_for == "the operator's go"
-    assert not rig.pilot.streaming
-
-
-LOSS = sorted(PROFILES["px4"].loss_modes)
-
-
-@pytest.mark.parametrize("mode", LOSS)
-@pytest.mark.parametrize("gap", [2.0, 0.0], ids=["after a gap", "out of the blue"])
-def test_px4_is_asked_for_offboard_again_only_where_missing_set_points_ended_it(mode, gap):
-    rig = Rig("px4").escorting()
-    flying = beat("px4", armed=True, guided=True)
-    lost = flying._replace(custom_mode=mode)
-    for _ in range(100):
-        rig.pilot.streamed(rig.now)
-        rig.tick(flying)
-    rig.now += round(gap * 1e6)
-    sent = rig.tick(lost)
-    if not gap:
-        assert rig.pilot.phase is Phase.YIELDED
-        return
-    assert [command for command, _ in sent] == [MODE]
-    assert rig.pilot.streaming
-    rig.pilot.streamed(rig.now)
-    rig.tick(flying)
-    assert rig.pilot.phase is Phase.ESCORT
-    # Later on it was somebody.
-    for _ in range(500):
-        rig.pilot.streamed(rig.now)
-        rig.tick(flying)
-    assert rig.tick(lost) == []
-    assert rig.pilot.phase is Phase.YIELDED
-
-
-def test_asking_for_offboard_again_ends():
-    rig = Rig("px4").escorting()
-    flying = beat("px4", armed=True, guided=True)
-    rig.pilot.streamed(rig.now)
-    rig.tick(flying)
-    rig.now += 2_000_000
-    lost = flying._replace(custom_mode=LOSS[0])
-    sent = []
-    for _ in range(1000):
-        rig.pilot.streamed(rig.now)
-        sent += rig.tick(lost)
-    assert {command for command, _ in sent} == {MODE}
-    assert rig.pilot.phase is Phase.YIELDED
-
-
-def test_a_switch_to_a_mode_of_a_pilot_is_no_accident_even_after_a_gap():
-    rig = Rig("px4").escorting()
-    rig.pilot.streamed(rig.now)
-    rig.now += 2_000_000
-    manual = beat("px4", armed=True)._replace(custom_mode=1 << 16)
-    assert rig.tick(manual) == []
-    assert rig.pilot.phase is Phase.YIELDED
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
 def test_hold_come_back_and_go_on(flavour):
     rig = Rig(flavour).escorting()
     flying = beat(flavour, armed=True, guided=True)
@@ -625,80 +311,6 @@ def test_hold_come_back_and_go_on(flavour):
     assert pilot.phase is Phase.SETTLE
     assert not pilot.hold()
     np.testing.assert_array_equal(pilot.start, [0.0, 0.0, GROUND])
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_an_order_to_land_before_the_start_takes_the_go_back(flavour):
-    rig = Rig(flavour, NOTHING)
-    assert rig.pilot.go(6.0)
-    assert rig.pilot.land()
-    rig.view = READY
-    rig.run(5.0, beat(flavour), HEALTHY, acks=True)
-    assert rig.pilot.phase is Phase.CONNECT
-    assert rig.pilot.waiting_for == "the operator's go"
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_without_a_heartbeat_nothing_is_guided(flavour):
-    rig = Rig(flavour).escorting()
-    assert rig.pilot.guided
-    rig.run(4.0)
-    assert not rig.pilot.guided
-    assert not rig.pilot.streaming
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_who_took_the_vehicle_over_while_it_settles_keeps_it(flavour):
-    rig = Rig(flavour).escorting()
-    assert rig.pilot.land()
-    taken = beat(flavour, armed=True, guided=False)
-    assert rig.run(CompanionConfig().guard.settle_us * 1e-6 + 1.0, taken) == []
-    assert not rig.pilot.streaming
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_disarmed_on_the_way_up_it_does_not_arm_again_without_a_new_go(flavour):
-    rig = Rig(flavour).prepared()
-    rig.run(1.0, beat(flavour, armed=True, guided=True), acks=True)
-    assert rig.pilot.phase is Phase.PREPARE
-    sent = rig.run(20.0, beat(flavour), HEALTHY, acks=True)
-    assert ARM not in {command for command, _ in sent}
-    assert rig.pilot.phase is Phase.CONNECT
-    assert rig.pilot.waiting_for == "the operator's go"
-
-
-# A vehicle that flies already
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("airborne", [2, 3, 4], ids=["in the air", "taking off", "landing"])
-def test_who_may_be_flying_is_never_told_to_take_off(flavour, airborne):
-    rig = Rig(flavour, READY._replace(own=state(8.0)))
-    assert rig.pilot.go(HEIGHT)
-    every = beat(flavour, armed=True, guided=True), HEALTHY, landed(airborne)
-    sent = rig.run(4.0, *every, acks=True)
-    assert rig.pilot.phase is Phase.ESCORT
-    assert not {command for command, _ in sent} & {TAKEOFF, ARM}
-
-
-@pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("heard", [(), (landed(0),)], ids=["nothing said", "undefined"])
-def test_an_armed_vehicle_of_which_nobody_says_where_it_is_is_left_alone(flavour, heard):
-    rig = Rig(flavour, READY._replace(own=state(8.0)))
-    assert rig.pilot.go(HEIGHT)
-    sent = rig.run(4.0, beat(flavour, armed=True, guided=True), HEALTHY, *heard, acks=True)
-    assert rig.pilot.phase is Phase.CONNECT
-    assert "EXTENDED_SYS_STATE" in rig.pilot.waiting_for
-    assert not {command for command, _ in sent} & {TAKEOFF, ARM}
-
-
-def test_what_was_said_of_landing_long_ago_is_forgotten():
-    rig = Rig()
-    rig.run(0.2, beat("ardupilot", armed=True), HEALTHY, landed(2), acks=True)
-    rig.run(4.0, beat("ardupilot", armed=True), HEALTHY, acks=True)
-    assert rig.pilot.go(HEIGHT)
-    rig.run(1.0, beat("ardupilot", armed=True), HEALTHY, acks=True)
-    assert "EXTENDED_SYS_STATE" in rig.pilot.waiting_for
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
