@@ -8,10 +8,12 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import sweep_runs
 
+PATIENCE_S = 120.0
 HERE = str(Path(__file__).parent)
 
 
@@ -27,10 +29,8 @@ class Machines:
         file = self._folder / "scheduler.json"
         options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
         self._start("scheduler", *options)
-        while not self.address:
-            time.sleep(0.05)
-            if file.is_file() and (text := file.read_text()).endswith("}"):
-                self.address = json.loads(text)["address"]
+        self._wait(self.scheduler, lambda: file.is_file() and file.read_text().endswith("}"))
+        self.address = json.loads(file.read_text())["address"]
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -46,13 +46,21 @@ class Machines:
         options = [self.address, "--nthreads", str(threads), "--no-nanny", "--no-dashboard"]
         options += ["--host", "127.0.0.1", "--worker-port", str(port), "--local-directory", str(self._folder)]
         process = self._start("worker", *options, path=path)
-        while "Registered to" not in self._said(process).read_text():
-            time.sleep(0.05)
+        self._wait(process, lambda: "Registered to" in self._said(process).read_text())
         return process
 
     def kill(self, process: subprocess.Popen[bytes]) -> None:
         process.send_signal(signal.SIGKILL)
         process.wait()
+
+    def _wait(self, process: subprocess.Popen[bytes], there: Callable[[], bool]) -> None:
+        """Until it is there; RuntimeError with its last words if that process ends before, or takes too
+        long."""
+        began = time.monotonic()
+        while not there():
+            if process.poll() is not None or time.monotonic() - began > PATIENCE_S:
+                raise RuntimeError(f"Dask did not start: {self._said(process).read_text()[-2000:]}")
+            time.sleep(0.05)
 
     def _said(self, process: subprocess.Popen[bytes]) -> Path:
         return self._folder / f"process-{self._processes.index(process)}.txt"

@@ -65,6 +65,18 @@ def breaks(task: Task) -> dict[str, Any]:
     return fine(task)
 
 
+def breaks_badly(task: Task) -> dict[str, Any]:
+    """Raises for every third seed, in words that are a program elsewhere."""
+    if task.seed % 3 == 0:
+        raise RuntimeError(f"<script> {task.seed} is bad")
+    return fine(task)
+
+
+def stuck_or_broken(task: Task) -> dict[str, Any]:
+    """None converges, and every third seed raises."""
+    return {**breaks(task), "converged": False, "convergence_time_s": None}
+
+
 def no_json(task: Task) -> dict[str, Any]:
     """Values that JSON does not have."""
     return {"min_separation_m": float("nan")}

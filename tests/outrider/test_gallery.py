@@ -8,10 +8,13 @@ import pytest
 
 from outrider.errors import InputError
 from outrider.gallery.command import gallery
+from outrider.gallery.figures import outcome
 from outrider.gallery.flying import fly
+from outrider.gallery.page import page
 from outrider.gallery.showings import WAYS, cells_of, chosen, scenarios, showings
 from outrider.resources import config_root
 from outrider.sweeps.cells import scenario_of, task
+from outrider.sweeps.runs import Ending, Run
 
 
 def test_every_scenario_is_flown_in_every_way() -> None:
@@ -36,7 +39,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_page_shows_all_and_says_what_became_of_each(here: Path) -> None:
     assert gallery(("traffic", "obstacles"), to=Path("page"), run="gallery_runs:straight") == 1
     text = (here / "page" / "README.md").read_text()
-    row = "| [traffic](#traffic) | stuck, least 1.50 m | not flown: "
+    row = "| [traffic](#traffic) | stuck, least 1.50 m | no flight: "
     assert row in text
     assert "| 7.2 s, least 1.50 m | 7.2 s, least 1.50 m | 7.2 s, least 0.40 m, 1 violation |" in text
     assert "Four vehicles change lanes between posts and spheres." in text
@@ -51,6 +54,33 @@ def test_what_is_flown_already_is_not_flown_again(here: Path) -> None:
     before = Path("out/journal.jsonl").read_bytes()
     assert gallery(("obstacles",), out=Path("out"), run="gallery_runs:never") == 0
     assert Path("out/journal.jsonl").read_bytes() == before
+
+
+def test_a_few_may_be_flown_before_the_rest(here: Path) -> None:
+    assert gallery(("obstacles",), out=Path("out"), run="gallery_runs:fine") == 0
+    assert gallery(("traffic", "obstacles"), out=Path("out"), run="gallery_runs:fine") == 0
+    assert "## traffic" in (here / "out" / "README.md").read_text()
+
+
+def test_a_page_of_somebody_else_is_not_overwritten(here: Path) -> None:
+    (here / "README.md").write_text("# Mine\n")
+    with pytest.raises(InputError, match=r"holds a README\.md that is no gallery"):
+        gallery(("obstacles",), to=here, run="gallery_runs:fine")
+    (here / "file").touch()
+    with pytest.raises(InputError, match="--page file: cannot be made"):
+        gallery(("obstacles",), to=Path("file"), run="gallery_runs:fine")
+    assert (here / "README.md").read_text() == "# Mine\n"
+    assert not list(here.glob("**/*.png"))
+
+
+def test_what_is_said_of_a_failure_is_short_and_no_table() -> None:
+    nothing = (None,) * 4
+    run = Run(1, Ending.FAULT, *nothing, 0, *nothing, "unsupported operand | " + 80 * "long ")
+    assert outcome(run).startswith("no flight: unsupported operand")
+    assert len(outcome(run)) < 60
+    text = page({"traffic": [(way, run, None) for way in WAYS]}, {"traffic": "x"}, 1)
+    (row,) = [line for line in text.splitlines() if line.startswith("| [traffic]")]
+    assert row.count("|") == len(WAYS) + 2
 
 
 def test_a_scenario_that_is_not_shipped_is_refused_with_those_that_are(here: Path) -> None:

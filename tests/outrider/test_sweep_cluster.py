@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import dask
+import pyarrow.parquet
 import pytest
 import sweep_runs
 from dask_machines import Machines
@@ -121,6 +123,11 @@ def expected(capsys: pytest.CaptureFixture[str]) -> tuple[bytes, str]:
     return summary, table
 
 
+def same_rows(name: str) -> bool:
+    """Whether the Parquet of the sweep here and of that with Dask hold the same."""
+    return bool(pyarrow.parquet.read_table(f"out/{name}").equals(pyarrow.parquet.read_table(f"local/{name}")))
+
+
 def test_a_killed_worker_costs_the_one_run_that_is_named_and_the_table_is_the_local_one(
     here: Path, mortal: Machines, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -130,6 +137,8 @@ def test_a_killed_worker_costs_the_one_run_that_is_named_and_the_table_is_the_lo
     assert fly("kills_machine", mortal) == 1
     said = capsys.readouterr()
     assert (Path("out/summary.json").read_bytes(), said.out) == (summary, table)
+    assert same_rows("summary.parquet")
+    assert same_rows("runs.parquet")
     (lost,) = [line for line in said.err.splitlines() if line.startswith("lost: ")]
     assert "seed 5: its Dask worker tcp://127.0.0.1:" in lost
     assert lost.endswith(" is gone")
@@ -210,13 +219,39 @@ def test_what_is_no_address_is_said(address: str) -> None:
         scheduler.connected(address)
 
 
-def test_where_nobody_or_somebody_else_answers_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("listens", [False, True])
+def test_where_nobody_or_somebody_else_answers_is_said(
+    listens: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(scheduler, "CONNECT_S", 0.5)
+    why = "whoever answers there is no Dask scheduler" if listens else "nobody answers there"
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
+        if listens:
+            taken.listen()
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
-        with pytest.raises(InputError, match=f"--scheduler {address}: nobody answers there; allowed: "):
+        with pytest.raises(InputError, match=f"--scheduler {address}: .*; allowed: ") as refused:
             scheduler.connected(address)
+    assert why in str(refused.value) or (listens and "no Dask scheduler answers there" in str(refused.value))
+
+
+def test_a_scheduler_with_another_dask_is_refused(
+    machines: Machines, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scheduler, "version_of", lambda _package: "1.0")
+    with pytest.raises(InputError, match=r"has distributed \S+ \(here 1\.0\)"):
+        scheduler.connected(machines.address)
+
+
+def test_tls_with_files_that_are_not_there_is_said() -> None:
+    nowhere = {
+        f"distributed.comm.tls.{name}": "/nowhere" for name in ("ca-file", "client.cert", "client.key")
+    }
+    with (
+        dask.config.set(nowhere),
+        pytest.raises(InputError, match=r"the files of Dask's settings distributed\.comm\.tls"),
+    ):
+        scheduler.connected("tls://127.0.0.1:8786")
 
 
 def test_tls_without_certificates_is_said() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import shlex
 from pathlib import Path
@@ -54,19 +55,16 @@ def test_parquet_holds_every_run_and_the_summary(capsys: pytest.CaptureFixture[s
         assert row["violation_rate_high"] == pytest.approx(cell["violation_rate"]["high"], abs=1e-6)
 
 
-def test_the_page_stands_alone_and_says_what_the_table_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nasty(label: str) -> str:
-        return Path("methods.yaml").read_text().replace("runs: 30", f"runs: 3\ndescription: '{label}'")
-
-    Path("methods.yaml").write_text(nasty("<script>"))
-    fly("breaks")
+def test_the_page_stands_alone_and_says_what_the_table_says() -> None:
+    Path("methods.yaml").write_text(SWEEP.replace("runs: 30", "runs: 3"), encoding="utf-8")
+    fly("breaks_badly")
     page = Path("out/summary.html").read_text(encoding="utf-8")
     assert "default-src 'none'" in page
     assert "<script" not in page
     assert not re.search(r"""(src|href)=["'](?!data:)""", page)
-    assert "RuntimeError: seed 3 is bad" in page
+    assert "RuntimeError: &lt;script&gt; 3 is bad" in page
     assert "methods=baseline" in page
-    assert '<h1 class="bad">4 runs, 2 at fault</h1>' in page
+    assert '<h1 class="bad">6 runs, 2 at fault</h1>' in page
 
 
 def test_every_failure_becomes_a_scenario_that_flies_what_failed() -> None:
@@ -78,7 +76,7 @@ def test_every_failure_becomes_a_scenario_that_flies_what_failed() -> None:
         for seed in range(1, 31):
             run = sweep_runs.swap(task(cell, seed))
             if run["d_min_violations"] or not run["converged"]:
-                failed[f"methods-{cell.slug}-seed{seed}.yaml"] = task(cell, seed)
+                failed[f"methods-{cell.slug}-{cell.key[:8]}-seed{seed}.yaml"] = task(cell, seed)
     assert failed
     assert {path.name for path in Path("kept/here").iterdir()} == failed.keys()
     for name, one in failed.items():
@@ -93,13 +91,40 @@ def test_every_failure_becomes_a_scenario_that_flies_what_failed() -> None:
     assert {path: path.read_bytes() for path in Path("kept/here").iterdir()} == before
 
 
-def test_a_file_of_somebody_else_is_not_overwritten() -> None:
+def test_what_is_there_stays_and_another_cell_has_other_files() -> None:
     fly(regressions="kept")
+    names = {path.name for path in Path("kept").iterdir()}
     mine = sorted(Path("kept").iterdir())[0]
     mine.write_text("name: mine\n")
-    with pytest.raises(InputError, match="is there, and none of a sweep"):
-        fly(regressions="kept")
+    fly(regressions="kept")
     assert mine.read_text() == "name: mine\n"
+    Path("methods.yaml").write_text(SWEEP.replace("baseline", "swivel"), encoding="utf-8")
+    Path("out").rename("before")
+    fly(regressions="kept")
+    assert names < {path.name for path in Path("kept").iterdir()}
+    assert mine.read_text() == "name: mine\n"
+
+
+def test_where_failures_cannot_be_kept_nothing_is_flown() -> None:
+    Path("taken").touch()
+    with pytest.raises(InputError, match="--regressions taken: cannot be made"):
+        fly(regressions="taken")
+    assert not Path("out").exists()
+
+
+def test_in_parquet_what_never_came_about_is_nothing() -> None:
+    Path("methods.yaml").write_text(SWEEP.replace("runs: 30", "runs: 6"), encoding="utf-8")
+    fly("stuck_or_broken")
+    cells_, runs = (pyarrow.parquet.read_table(f"out/{name}.parquet") for name in ("summary", "runs"))
+    for table in (cells_, runs):
+        for name in table.column_names:
+            values = [value for value in table[name].to_pylist() if isinstance(value, float)]
+            assert all(map(math.isfinite, values)), name
+    assert cells_["convergence_time_median_s"].to_pylist() == [None, None]
+    by_seed = {row["seed"]: row for row in runs.to_pylist()}
+    assert by_seed[3]["ending"] == "fault"
+    assert by_seed[3]["d_min_violations"] is None
+    assert by_seed[1]["d_min_violations"] == 0
 
 
 def test_all_well_leaves_no_failures() -> None:

@@ -5,17 +5,21 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from outrider import whole_file
+from outrider.errors import InputError
 from outrider.gallery import figures
 from outrider.gallery.flying import RUN
-from outrider.gallery.page import page
-from outrider.gallery.showings import Showing, cells_of, chosen, showings
+from outrider.gallery.page import TITLE, page
+from outrider.gallery.showings import Showing, cells_of, chosen, scenarios, showings
 from outrider.sweeps import directory as places
 from outrider.sweeps.cells import scenario_of, task
 from outrider.sweeps.comparison import Flown, flown
-from outrider.sweeps.runs import Ending, run_of
+from outrider.sweeps.execution import header
+from outrider.sweeps.runs import run_of
 
 INTERRUPTED = 3
 SEED = 1
+PAGE = "README.md"
 
 
 def gallery(
@@ -29,12 +33,16 @@ def gallery(
 
     0 drawn; 1 a flight came to nothing; 3 interrupted. That a way gets stuck, or comes too near, is shown.
     The journal is in ``out`` (``runs/sweep-gallery``), the page, ``README.md``, with its pictures in ``to``,
-    or there, too. InputError for an unknown scenario.
+    or there, too. InputError for an unknown scenario, or for another page there.
     """
     shown = showings(chosen(names))
     found = cells_of(shown)
     folder = places.prepare(out, "gallery")
-    entries = flown("gallery", found, (SEED,), folder, run, jobs)
+    there = folder if to is None else to
+    _check(there)
+    # Of all, so that a few may be flown first, and the rest later.
+    whole = header("gallery", cells_of(showings(scenarios())))
+    entries = flown(whole, found, (SEED,), folder, run, jobs)
     if entries is None:
         return INTERRUPTED
     by_cell = dict(zip(shown, (cell.key for cell in found), strict=True))
@@ -43,14 +51,21 @@ def gallery(
         showing.scenario: scenario_of(task(cell, SEED)).description
         for showing, cell in zip(shown, found, strict=True)
     }
-    there = folder if to is None else to
-    there.mkdir(parents=True, exist_ok=True)
     for name, of in panels.items():
         figures.draw(name, of, there / f"{name}.png")
-    (there / "README.md").write_text(page(panels, told, SEED), encoding="utf-8")
+    whole_file.write(there / PAGE, page(panels, told, SEED))
     sys.stderr.write(f"page and pictures: {there}\n")
-    failed = (Ending.FAILED, Ending.FAULT, Ending.LOST)
-    return 1 if any(run.ending in failed for of in panels.values() for _, run, _ in of) else 0
+    return 1 if any(run.what for of in panels.values() for _, run, _ in of) else 0
+
+
+def _check(folder: Path) -> None:
+    """Make the ``folder`` of the page. InputError if that cannot be, or another page is there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--page {folder}: cannot be made: {error.strerror}") from None
+    if (folder / PAGE).exists() and not (folder / PAGE).read_bytes().startswith(TITLE.encode()):
+        raise InputError(f"--page {folder}: holds a {PAGE} that is no gallery; nothing is overwritten")
 
 
 def _panels(

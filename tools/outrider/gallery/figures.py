@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 _TARGET, _THING = "0.25", "0.6"
 _LIMIT = "#b00020"
+_LONG = 44
+"""Characters of a failure that are shown above a panel."""
 _HIGH = 6.0
 """m of separation that is shown: above, nobody is near."""
 
@@ -32,7 +35,7 @@ def draw(scenario: str, panels: Sequence[Panel], path: Path) -> None:
     axes = figure.subplots(2, len(panels), squeeze=False, height_ratios=(2.6, 1.0))
     for column, (way, run, scene) in enumerate(panels):
         axes[0, column].set_title(f"{way}\n{outcome(run)}", fontsize=9)
-        if scene is not None:
+        if scene is not None and scene["time_s"]:
             _paths(axes[0, column], scene)
             _separation(axes[1, column], scene)
     axes[0, 0].set_ylabel("north, m")
@@ -43,16 +46,17 @@ def draw(scenario: str, panels: Sequence[Panel], path: Path) -> None:
 
 def outcome(run: Run) -> str:
     """What came of a flight, in a few words."""
-    if run.ending in (Ending.FAILED, Ending.FAULT, Ending.LOST):
-        return f"not flown: {run.what}"
-    words = []
+    what = shorten(run.what or "", _LONG)
+    if run.ending in (Ending.FAULT, Ending.LOST):
+        return f"no flight: {what}"
+    words = [what] if what else []
     if run.converged is not None:
         words.append(f"{run.seconds:.1f} s" if run.converged else "stuck")
     if run.separation is not None:
         words.append(f"least {run.separation:.2f} m")
     if run.violations:
         words.append(f"{run.violations} violation{'s' * (run.violations > 1)}")
-    return ", ".join(words)
+    return ", ".join(words) or "flown"
 
 
 def _paths(axes: Axes, scene: Mapping[str, Any]) -> None:

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from outrider.gallery.figures import Panel, outcome
 from outrider.gallery.showings import WAYS
 
-_HEAD = """\
-# Every method in every scenario
-
+TITLE = "# Every method in every scenario\n"
+_HEAD = (
+    TITLE
+    + """
 Each shipped scenario, flown once from the air with seed {seed} in full physics over MAVLink: by the four
 methods of the field, and certified. Coloured lines are the vehicles' paths from above, from the ring to the
 dot; grey is what is in the way; the star is the target, the dotted line its way. Below each: the least
@@ -21,6 +22,7 @@ seeds see the tables in README.
 | scenario | {ways} |
 |---|{rules}
 """
+)
 
 
 def page(panels: Mapping[str, Sequence[Panel]], descriptions: Mapping[str, str], seed: int) -> str:
@@ -28,7 +30,7 @@ def page(panels: Mapping[str, Sequence[Panel]], descriptions: Mapping[str, str],
     ways = " | ".join(way.replace("_", " ") for way in WAYS)
     text = _HEAD.format(seed=seed, ways=ways, rules="---|" * len(WAYS))
     for scenario, of in panels.items():
-        cells = " | ".join(outcome(run) for _, run, _ in of)
+        cells = " | ".join(outcome(run).replace("|", "/") for _, run, _ in of)
         text += f"| [{scenario}](#{scenario}) | {cells} |\n"
     for scenario in panels:
         said = descriptions[scenario]

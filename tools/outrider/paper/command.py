@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from outrider import whole_file
 from outrider.paper import figures
 from outrider.paper.flying import RUN, TRACED
 from outrider.paper.results import Result, result_of
@@ -15,6 +16,7 @@ from outrider.paper.table import markdown, show
 from outrider.sweeps import directory as places
 from outrider.sweeps.cells import Cell
 from outrider.sweeps.comparison import Flown, flown
+from outrider.sweeps.execution import header
 from outrider.sweeps.runs import run_of
 
 INTERRUPTED = 3
@@ -37,7 +39,7 @@ def paper(
     found = cells_of(rows)
     folder = places.prepare(out, "paper")
     numbers = range(TRACED, TRACED + seeds)
-    entries = flown("paper", found, numbers, folder, run, jobs)
+    entries = flown(header("paper", found), found, numbers, folder, run, jobs)
     if entries is None:
         return INTERRUPTED
     results = [
@@ -46,8 +48,8 @@ def paper(
     ]
     traces = _traces(rows, found, entries)
     document = {"rows": [result.document() for result in results]}
-    (folder / "paper.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    (folder / "paper.md").write_text(markdown(rows, results), encoding="utf-8")
+    whole_file.write(folder / "paper.json", json.dumps(document, indent=2) + "\n")
+    whole_file.write(folder / "paper.md", markdown(rows, results))
     figures.draw(rows, results, traces, folder)
     if as_json:
         sys.stdout.write(json.dumps(document) + "\n")

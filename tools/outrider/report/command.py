@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
+from outrider import whole_file
 from outrider.errors import InputError
 from outrider.report import clocks
 from outrider.report.charts import charts, histogram
@@ -122,12 +122,7 @@ def check(path: Path) -> None:
 def write(path: Path, text: str) -> None:
     """Put the page there at once, or not at all."""
     check(path)
-    new = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        new.write_text(text, encoding="utf-8")
-        new.replace(path)
-    finally:
-        new.unlink(missing_ok=True)
+    whole_file.write(path, text)
 
 
 def _document(path: Path, made: Made) -> dict[str, object]:

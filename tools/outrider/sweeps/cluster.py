@@ -34,7 +34,7 @@ PATIENCE_S = 300.0
 """So long a sweep waits when there is no worker."""
 _INTRODUCTION = "__import__('outrider.sweeps.crew', fromlist=['crew']).introduce()"
 """As a text: a function that a Dask worker cannot find ends it, and there may be no outrider there."""
-_TICK_S, _LOOK_S, _FETCH_S, _GOODBYE_S = 0.5, 1.0, 2.0, 3.0
+_TICK_S, _LOOK_S, _FETCH_S, _GOODBYE_S, _REPLY_S = 0.5, 1.0, 2.0, 3.0, 20.0
 
 
 @dataclass
@@ -104,11 +104,7 @@ class Cluster:
         if now - self._looked < _LOOK_S:
             return
         self._looked = now
-        try:
-            there: dict[str, int] = dict(self._client.nthreads())
-        except Exception:
-            # Whatever Dask makes of a connection that has ended.
-            raise self._abandoned("has gone") from None
+        there = self._there()
         for flight in list(self._flights.values()):
             if flight.site.address not in there:
                 self._lose(flight, f"its Dask worker {flight.site.address} is gone", backlog, ended)
@@ -118,16 +114,32 @@ class Cluster:
             if address not in self._sites:
                 self._sites[address] = site = _Site(address, threads)
                 self._submit(site, None, eval, _INTRODUCTION)
-        if any(site.refused is None for site in self._sites.values()):
-            self._served = now
-        elif self._sites and not self._flown:
-            lines = (f"{site.address}: {site.refused}" for site in self._sites.values())
+        self._wait(now)
+
+    def _there(self) -> dict[str, int]:
+        """The threads of each worker, by its address."""
+        scheduler = self._client.scheduler
+        try:
+            return dict(self._client.sync(scheduler.ncores, workers=None, callback_timeout=_REPLY_S))
+        except Exception:
+            # Whatever Dask makes of a connection that has ended, or that nobody answers by.
+            raise self._abandoned("has gone") from None
+
+    def _wait(self, now: float) -> None:
+        """See whether there is somebody who flies, and for how long there has been nobody."""
+        sites = self._sites.values()
+        silent = any(site.me is None and site.refused is None for site in sites)
+        if any(site.me is not None and site.refused is None for site in sites):
+            self._served, self._said = now, False
+        elif sites and not silent and not self._flown:
+            lines = (f"{site.address}: {site.refused}" for site in sites)
             raise InputError(*(f"--scheduler {self._address}: no worker can fly: {line}" for line in lines))
         elif now - self._served >= self._patience:
             raise self._abandoned(f"has had no worker for {self._patience:g} s")
-        elif not self._said:
+        elif not silent and not self._said:
             self._said = True
-            _say(f"no worker at {self._address} yet; waiting for one: dask worker {self._address}")
+            start = f"dask worker {self._address} --host OWN-ADDRESS"
+            _say(f"no worker at {self._address}; waiting for one: {start}")
 
     def _begin(self, site: _Site, task: Task) -> None:
         site.busy += 1
@@ -150,27 +162,39 @@ class Cluster:
                 future = self._answers.get(timeout=wait)
                 wait = 0.0
                 flight = self._flights.get(future.key)
-                if flight is not None:
-                    self._answered(flight, backlog, ended)
+                if flight is not None and not self._answered(flight, backlog, ended):
+                    # For the next time; not now, or nobody would look who is still there.
+                    self._answers.put(future)
+                    return
 
-    def _answered(self, flight: _Flight, backlog: Backlog, ended: Ended) -> None:
-        task, site = flight.task, flight.site
+    def _answered(self, flight: _Flight, backlog: Backlog, ended: Ended) -> bool:
+        """Whether the answer could be fetched."""
+        answer = self._fetched(flight.future)
+        if answer is not None:
+            self._take(answer, flight, backlog, ended)
+        return answer is not None
+
+    def _fetched(self, future: Future[Any]) -> dict[str, Any] | None:
+        """What a worker answered; None if it has died with it, which will be seen, or is slow."""
         try:
-            answer: dict[str, Any] = flight.future.result(timeout=_FETCH_S)
-        except TimeoutError:
-            # Its worker has died with the answer, which will be seen, or is slow.
-            self._answers.put(flight.future)
-            return
+            answer: dict[str, Any] = future.result(timeout=_FETCH_S)
         except FutureCancelledError:
             raise self._abandoned("has gone") from None
         except KilledWorker:
-            answer = {"restarted": True}
+            return {"restarted": True}
         except Exception as error:
+            if isinstance(error, TimeoutError) and future.status != "error":
+                return None
             # It was raised there: most likely outrider is not installed, or is another one.
-            answer = {"unable": f"{type(error).__name__}: {' '.join(str(error).split())}"}
+            return {"unable": f"{type(error).__name__}: {' '.join(str(error).split())}"}
+        return answer
+
+    def _take(self, answer: dict[str, Any], flight: _Flight, backlog: Backlog, ended: Ended) -> None:
+        task, site = flight.task, flight.site
         if "restarted" in answer:
             # Dask has begun it again in another life of the worker, which will be asked who it is now.
-            self._sites.pop(site.address, None)
+            if self._sites.get(site.address) is site:
+                del self._sites[site.address]
             self._lose(flight, f"its Dask worker {site.address} was restarted", backlog, ended)
             return
         self._drop(flight)

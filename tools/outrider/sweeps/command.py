@@ -11,12 +11,13 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any
 
+from outrider import whole_file
 from outrider.errors import InputError
 from outrider.resources import find
 from outrider.sweeps import directory as places
 from outrider.sweeps import page, picture, regressions, tables
 from outrider.sweeps.cells import Cell, cells, task
-from outrider.sweeps.execution import Workers, cores, has_ended, header, work
+from outrider.sweeps.execution import WALL_LIMIT_S, Workers, cores, has_ended, header, work
 from outrider.sweeps.flying import RUN
 from outrider.sweeps.grid import Sweep
 from outrider.sweeps.journal import Journal, opened
@@ -28,7 +29,6 @@ from outrider.sweeps.table import show
 from outrider.sweeps.tasks import Task
 from outrider.yaml_file import load
 
-WALL_LIMIT_S = 1800.0
 INTERRUPTED = 3
 
 
@@ -56,23 +56,33 @@ def sweep(
     if runs is not None:
         spec = spec.model_copy(update={"runs": runs})
     found = cells(spec, str(path))
+    if jobs is not None and scheduler is not None:
+        raise InputError(
+            "--jobs does not go with --scheduler; allowed: one of them: a Dask worker flies as many runs at "
+            "a time as it has threads (dask worker --nthreads)"
+        )
+    if failures is not None:
+        regressions.prepare(failures)
+    folder = places.prepare(out, spec.name)
     with ExitStack() as open_:
-        # Before there is a directory: a scheduler that does not answer leaves none.
-        workers = open_.enter_context(_workers(run, jobs, wall_limit_s, scheduler))
-        folder = places.prepare(out, spec.name)
         began = time.perf_counter()
         journal = open_.enter_context(opened(folder / places.JOURNAL, header(spec.name, found)))
         tasks = [task(cell, seed) for seed in spec.seeds for cell in found]
         waiting = [one for one in tasks if not has_ended(journal, one)]
+        labels = {cell.key: cell.label for cell in found}
         with watching(len(tasks), len(tasks) - len(waiting)) as watch:
-            stopped = work(journal, waiting, watch, workers)
+            # However it ends, behind the bar.
+            open_.callback(_name_losses, watch, labels)
+            stopped = None
+            if waiting:
+                workers = open_.enter_context(_workers(run, jobs, wall_limit_s, scheduler))
+                stopped = work(journal, waiting, watch, workers)
         if stopped is not None:
             left = sum(not has_ended(journal, one) for one in tasks)
-            words = ["outrider", "sweep", name, *([] if runs is None else ["--runs", str(runs)]), "--out"]
-            words += [str(folder), *([] if scheduler is None else ["--scheduler", scheduler])]
+            again = _again(name, folder, runs, scheduler, failures, wall_limit_s)
             sys.stderr.write(
                 f"{stopped} after {len(tasks) - left} of {len(tasks)} runs, which are kept; this goes on "
-                f"with the rest: {shlex.join(words)}\n"
+                f"with the rest: {again}\n"
             )
             return INTERRUPTED
         wall = time.perf_counter() - began
@@ -89,14 +99,35 @@ def _workers(
 ) -> AbstractContextManager[Workers]:
     if scheduler is None:
         return Pool(run, jobs or cores(), wall_limit_s)
-    if jobs is not None:
-        raise InputError(
-            "--jobs does not go with --scheduler; allowed: one of them: a Dask worker flies as many runs at "
-            "a time as it has threads (dask worker --nthreads)"
-        )
     from outrider.sweeps.cluster import Cluster
 
     return Cluster(scheduler, run, wall_limit_s)
+
+
+def _again(
+    name: str,
+    folder: Path,
+    runs: int | None,
+    scheduler: str | None,
+    failures: Path | None,
+    wall_limit_s: float,
+) -> str:
+    """The command that goes on."""
+    words = ["outrider", "sweep", name]
+    for option, value, usual in (
+        ("--runs", runs, None),
+        ("--out", folder, None),
+        ("--scheduler", scheduler, None),
+        ("--regressions", failures, None),
+        ("--wall-limit", wall_limit_s, WALL_LIMIT_S),
+    ):
+        words += [] if value == usual else [option, str(value)]
+    return shlex.join(words)
+
+
+def _name_losses(watch: Watch, labels: dict[str, str]) -> None:
+    for entry in watch.lost:
+        sys.stderr.write(f"lost: {labels[entry.key]}, seed {entry.seed}: {entry.what}\n")
 
 
 class _Effort:
@@ -117,7 +148,7 @@ def _conclude(
     runs = {cell.key: _runs(journal, cell, spec) for cell in found}
     reports = [_report(folder, cell, runs[cell.key]) for cell in found]
     summary = document(spec.name, spec.first_seed, reports)
-    (folder / places.SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    whole_file.write(folder / places.SUMMARY, json.dumps(summary, indent=2) + "\n")
     picture.draw(spec.name, reports, runs, folder / places.PICTURE)
     page.write(folder / page.PAGE, spec.name, reports, folder / places.PICTURE)
     tables.write(folder, reports, runs)
@@ -127,8 +158,6 @@ def _conclude(
         sys.stdout.write(json.dumps(whole) + "\n")
     else:
         show(spec.name, reports)
-    for entry in effort.lost:
-        sys.stderr.write(f"lost: {labels[entry.key]}, seed {entry.seed}: {entry.what}\n")
     if effort.flown:
         pace = 60.0 * effort.flown / effort.wall_s
         sys.stderr.write(f"{effort.flown} runs in {duration(effort.wall_s)}, {pace:.0f} a minute; {folder}\n")

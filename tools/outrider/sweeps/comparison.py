@@ -8,29 +8,27 @@ from pathlib import Path
 
 from outrider.sweeps import directory as places
 from outrider.sweeps.cells import Cell, task
-from outrider.sweeps.execution import cores, has_ended, header, work
-from outrider.sweeps.journal import opened
+from outrider.sweeps.execution import WALL_LIMIT_S, cores, has_ended, work
+from outrider.sweeps.journal import Header, opened
 from outrider.sweeps.pool import Pool
 from outrider.sweeps.progress import watching
 from outrider.sweeps.tasks import Entry
-
-_WALL_LIMIT_S = 1800.0
 
 Flown = dict[tuple[str, int], Entry]
 """By the cell's key and the seed."""
 
 
 def flown(
-    name: str, found: Sequence[Cell], seeds: Sequence[int], folder: Path, run: str, jobs: int | None
+    of: Header, found: Sequence[Cell], seeds: Sequence[int], folder: Path, run: str, jobs: int | None
 ) -> Flown | None:
     """Fly each cell with each of ``seeds`` by ``run`` (``module:function``) in ``jobs`` processes, into the
-    journal of ``folder``; None if it was interrupted, which is said."""
-    with opened(folder / places.JOURNAL, header(name, found)) as journal:
+    journal ``of`` them in ``folder``; None if it was interrupted, which is said."""
+    with opened(folder / places.JOURNAL, of) as journal:
         tasks = [task(cell, seed) for seed in seeds for cell in found]
         waiting = [one for one in tasks if not has_ended(journal, one)]
         with (
             watching(len(tasks), len(tasks) - len(waiting)) as watch,
-            Pool(run, jobs or cores(), _WALL_LIMIT_S) as pool,
+            Pool(run, jobs or cores(), WALL_LIMIT_S) as pool,
         ):
             stopped = work(journal, waiting, watch, pool)
         if not stopped:

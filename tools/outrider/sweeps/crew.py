@@ -32,10 +32,13 @@ class Crew:
         self._lock = Lock()
         self._all: dict[str, set[Process]] = {}
         self._idle: dict[str, dict[Process, Timer]] = {}
+        self._over: set[str] = set()
 
-    def take(self, sweep: str, run: str) -> Process:
-        """One that is ready, or a new one."""
+    def take(self, sweep: str, run: str) -> Process | None:
+        """One that is ready, or a new one; none for a sweep that is over."""
         with self._lock:
+            if sweep in self._over:
+                return None
             idle = self._idle.get(sweep, {})
             while idle:
                 process, timer = idle.popitem()
@@ -68,6 +71,8 @@ class Crew:
                 idle.pop(process).cancel()
                 self._end(sweep, process)
             if only is None:
+                self._over.add(sweep)
+                self._idle.pop(sweep, None)
                 for process in self._all.pop(sweep, set()):
                     process.process.kill()
 
@@ -97,6 +102,8 @@ def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> di
         return {"restarted": True}
     for _ in range(MOST_STARTS):
         process = CREW.take(sweep, run)
+        if process is None:
+            return {"unable": "its sweep is over"}
         while not process.ready and not process.dead and process.cannot is None:
             process.hear()
         if process.ready and not process.dead:
@@ -108,11 +115,13 @@ def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> di
         return {"unable": what}
     task = Task(**json.loads(document))
     process.give(task)
+    output = select.poll()
+    output.register(process.output, select.POLLIN)
     while (entry := process.take_entry()) is None:
         if process.dead or process.overdue(wall_limit_s):
             CREW.forget(sweep, process)
             return {"entry": process.lost(task, process.bury(wall_limit_s))._asdict()}
-        if select.select([process.output], [], [], min(_TICK_S, wall_limit_s))[0]:
+        if output.poll(1e3 * min(_TICK_S, wall_limit_s)):
             process.hear()
     process.task = None
     CREW.give_back(sweep, process)

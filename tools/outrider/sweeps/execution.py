@@ -13,6 +13,9 @@ from outrider.sweeps.progress import Watch
 from outrider.sweeps.sources import versions
 from outrider.sweeps.tasks import AbandonedError, Ended, Entry, Task
 
+WALL_LIMIT_S = 1800.0
+"""s of wall time for one run."""
+
 
 class Workers(Protocol):
     """Who runs tasks: a `Pool` of processes here, or a `Cluster` of machines."""

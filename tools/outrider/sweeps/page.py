@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
+from outrider import whole_file
 from outrider.report.page import STYLES, static
 from outrider.sweeps.report import METHOD, CellReport, Named, exit_status
 from outrider.sweeps.table import rows
@@ -25,7 +26,8 @@ def write(path: Path, name: str, cells: Sequence[CellReport], picture: Path) -> 
     policy += "base-uri 'none'; form-action 'none'"
     image = base64.b64encode(picture.read_bytes()).decode("ascii")
     verdict = "bad" if exit_status(cells) else "good"
-    path.write_text(
+    whole_file.write(
+        path,
         f"""<!doctype html>
 <html lang="en">
 <head>
@@ -46,12 +48,11 @@ def write(path: Path, name: str, cells: Sequence[CellReport], picture: Path) -> 
 </body>
 </html>
 """,
-        encoding="utf-8",
     )
 
 
 def _outcome(cells: Sequence[CellReport]) -> str:
-    words = [f"{sum(cell.ended for cell in cells)} runs"]
+    words = [f"{sum(cell.runs for cell in cells)} runs"]
     for attribute, said in (
         ("violations", "with a violation"),
         ("stuck", "stuck"),

@@ -2,34 +2,45 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from outrider import whole_file
 from outrider.errors import InputError
 from outrider.sweeps.cells import Cell, scenario_of, scenario_text, task
 from outrider.sweeps.runs import Ending, Run
 
 _MARK = "# A run of a sweep that failed"
+_KEY = 8
+
+
+def prepare(folder: Path) -> None:
+    """Make the ``folder``, before anything is flown. InputError if that cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--regressions {folder}: cannot be made: {error.strerror}") from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"--regressions {folder}: cannot be written to; allowed: a folder of your own")
 
 
 def write(folder: Path, sweep: str, cells: Sequence[Cell], runs: Mapping[str, Sequence[Run]]) -> list[Path]:
-    """A file in ``folder`` for each run that did not end well: SWEEP-CELL-seedN.yaml, which begins with what
-    went wrong and the command that flies it. ``runs`` holds those of each cell by its key. InputError, and
-    nothing written, if a file is there that is none of these."""
+    """A file in ``folder`` for each run that did not end well: SWEEP-CELL-KEY-seedN.yaml, where KEY tells
+    what is flown; it begins with what went wrong and the command that flies it. ``runs`` holds those of each
+    cell by its key. What is there stays, as somebody may have changed it. InputError if one cannot be
+    written."""
     files: dict[Path, str] = {}
     for cell in cells:
         for run in runs[cell.key]:
             if run.ending is not Ending.FINE:
-                path = folder / f"{sweep}-{cell.slug}-seed{run.seed}.yaml"
+                path = folder / f"{sweep}-{cell.slug}-{cell.key[:_KEY]}-seed{run.seed}.yaml"
                 files[path] = _text(path, sweep, cell, run)
-    for path in files:
-        if path.exists() and not path.read_bytes().startswith(_MARK.encode()):
-            raise InputError(f"--regressions: {path} is there, and none of a sweep; nothing is overwritten")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for path, text in files.items():
-            path.write_text(text, encoding="utf-8")
+            if not path.exists():
+                whole_file.write(path, text)
     except OSError as error:
         raise InputError(f"--regressions {folder}: cannot be written to: {error.strerror}") from None
     return list(files)

@@ -9,6 +9,7 @@ from threading import Thread
 from typing import Any
 
 from outrider.errors import InputError
+from outrider.sweeps.sources import version_of
 
 CONNECT_S = 5.0
 _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})")
@@ -23,8 +24,9 @@ def connected(address: str) -> Any:
         )
     if address.startswith("tls:") and not _has_tls():
         raise InputError(
-            f"--scheduler {address}: there are no certificates for TLS here; allowed: Dask's own settings, "
-            "as DASK_DISTRIBUTED__COMM__TLS__CA_FILE"
+            f"--scheduler {address}: there are no certificates for TLS here; allowed: Dask's own settings "
+            "distributed.comm.tls.ca-file, .client.cert and .client.key, all three "
+            "(DASK_DISTRIBUTED__COMM__TLS__CA_FILE and so on)"
         )
     ended: list[Any] = []
     # In a thread, as Dask waits for ever for a first word that is none of its protocol.
@@ -33,6 +35,8 @@ def connected(address: str) -> Any:
     thread.join(2 * CONNECT_S)
     if ended and not isinstance(ended[0], Exception):
         return ended[0]
+    if ended and isinstance(ended[0], InputError):
+        raise ended[0]
     if ended and isinstance(ended[0], OSError):
         why = "nobody answers there"
     elif ended:
@@ -46,10 +50,27 @@ def connected(address: str) -> Any:
     )
 
 
+def _check_alike(client: Any, address: str) -> None:
+    """InputError if the scheduler has not the Dask that is here."""
+    there = client.sync(client.scheduler.versions, callback_timeout=CONNECT_S)
+    theirs, ours = there["packages"]["distributed"], version_of("distributed")
+    if theirs != ours:
+        raise InputError(
+            f"--scheduler {address}: has distributed {theirs} (here {ours}); allowed: the same there and here"
+        )
+
+
 def _has_tls() -> bool:
     from distributed.security import Security
 
-    return Security().get_connection_args("client")["ssl_context"] is not None  # type: ignore[no-untyped-call]
+    try:
+        settings = Security().get_connection_args("client")  # type: ignore[no-untyped-call]
+    except OSError as error:
+        # A file that is not there, or that is no certificate.
+        raise InputError(
+            f"--scheduler: the files of Dask's settings distributed.comm.tls cannot be used: {error}"
+        ) from None
+    return settings["ssl_context"] is not None
 
 
 def _connect(address: str, ended: list[Any]) -> None:
@@ -68,6 +89,12 @@ def _connect(address: str, ended: list[Any]) -> None:
         )
     except Exception as error:
         # Whatever it is that speaks there.
+        ended.append(error)
+        return
+    try:
+        _check_alike(client, address)
+    except Exception as error:
+        client.close()  # type: ignore[no-untyped-call]
         ended.append(error)
     else:
         ended.append(client)

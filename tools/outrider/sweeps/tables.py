@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
-from math import inf
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from outrider import whole_file
 from outrider.sweeps.report import CellReport
-from outrider.sweeps.runs import Run
+from outrider.sweeps.runs import Ending, Run
 
 CELLS, RUNS = "summary.parquet", "runs.parquet"
 
@@ -31,7 +32,9 @@ def write(folder: Path, cells: Sequence[CellReport], runs: Mapping[str, Sequence
         (RUNS, [_run_row(cell, run) for cell in cells for run in runs[cell.key]], _RUN_FIELDS),
     ):
         schema = pa.schema([(field, kinds[kind]) for field, kind in fields.items()])
-        parquet.write_table(pa.Table.from_pylist(rows, schema=schema), folder / name)
+        content = pa.BufferOutputStream()
+        parquet.write_table(pa.Table.from_pylist(rows, schema=schema), content)
+        whole_file.write(folder / name, content.getvalue().to_pybytes())
 
 
 _COUNTS = ("runs", "ended", "converged", "stuck", "violations", "failed", "faults", "lost")
@@ -80,7 +83,8 @@ def _cell_row(cell: CellReport) -> dict[str, Any]:
     for attribute, name in _INTERVALS.items():
         interval = getattr(cell, attribute)
         if interval is not None:
-            row |= {name: interval.value, f"{name}_low": interval.low, f"{name}_high": interval.high}
+            ends = {"": interval.value, "_low": interval.low, "_high": interval.high}
+            row |= {f"{name}{end}": _finite(value) for end, value in ends.items()}
     for attribute, (name, unit, *words) in _SPREADS.items():
         row |= {
             f"{name}_{word}_{unit}": value
@@ -90,7 +94,13 @@ def _cell_row(cell: CellReport) -> dict[str, Any]:
 
 
 def _run_row(cell: CellReport, run: Run) -> dict[str, Any]:
-    seconds = None if run.seconds == inf else run.seconds
+    violations = None if run.ending in (Ending.FAULT, Ending.LOST) else run.violations
+    seconds = _finite(run.seconds)
     head = (cell.label, cell.key, run.seed, run.ending.value, run.converged, seconds, run.separation)
-    rest = (run.to_obstacle, run.violations, run.yaw, run.tracking, run.what)
+    rest = (run.to_obstacle, violations, run.yaw, run.tracking, run.what)
     return dict(zip(_RUN_FIELDS, (*head, *rest), strict=True))
+
+
+def _finite(value: float | None) -> float | None:
+    """A number; never is none."""
+    return value if value is not None and isfinite(value) else None

@@ -54,7 +54,11 @@ def guarded(host: str) -> Iterator[None]:
             headers = request.headers
             hosts = headers.get_all("Host")
             if len(hosts) == 1 and admits(hosts[0], headers.get_all("Origin"), names):
-                return process_request(connection, request)
+                answer = process_request(connection, request)
+                if answer is not None:
+                    # Nor may its page stand in a frame of another, where a click is not meant for it.
+                    answer.headers["Content-Security-Policy"] = "frame-ancestors 'none'"
+                return answer
             return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), _ELSEWHERE)
 
         return serve(*arguments, process_request=door, **options)
