@@ -8,12 +8,13 @@ are made until S from now, and for P after that, end. So it is ignored for no lo
 
     S = (d − reach(c) − v·age) / c − P − H
 
-P are two of its messages' periods: one may be lost, and still it is heard in time. Nobody is ignored for
-longer than ``_LONGEST`` after it was heard: ages that are shown stay those of a neighbour that is there.
+P are two periods of messages like our own: one may be lost, and still it is heard in time. Nobody is ignored
+for longer than ``_LONGEST`` after it was heard: ages that are shown stay those of a neighbour that is there.
 
-Only those are ignored who share a plan, and so fly by limits as ours are; strangers, and who was measured to
-be faster than the limits, are always heard, and so is everybody where the own place is not known. The
-certified mode hears all: there what somebody promised counts, not where it is.
+Only those are ignored whose word counts (``familiars``) and who were not measured to be faster than the
+limits, and nobody where the own place is not known. Who is level with the own place in the plane is laid
+before the planner from any height, as landing is straight down. The certified mode hears and sees all, since
+there what somebody promised counts, not where it is; so does the swivel, which weighs all bearings.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.config import CompanionConfig
+from companion.config import CompanionConfig, MethodName
 from companion.horizon import Array
+from companion.methods.approach_angle import FADING
 from companion.tracks import State
 
 Ages = NDArray[np.int64]
@@ -42,16 +44,23 @@ class Earshot:
         self._config = config
         self._fastest = hypot(*config.limits.v_max)
         self._ahead = 1e-6 * config.horizon.dt_us * (config.horizon.steps + 1)
-        self._silence = 2e-6 * config.rates.state_us
+        self._silence = 2e-6 * max(config.rates.state_us, config.rates.plan_us)
         self._longest = 1e-6 * min(
             _LONGEST, config.neighbour.extrapolate_us, config.guard.neighbour_lost_us // 4
         )
         self._shown = max(config.neighbour.extrapolate_us, config.guard.flown_on_us)
         self._closing = 2.0 * self._fastest
         self._certainly = float(self._reach(self._closing)) + self._closing * self._ahead
-        self._always = config.avoidance == "certified"
+        self._below = config.guard.landing_clearance + config.field.margin(2)
+        self._all = False
         self._until: dict[int, int] = {}
         self.now = 0
+        self.use(config.methods)
+
+    def use(self, methods: Sequence[MethodName]) -> None:
+        """The planner goes by these ``methods`` now."""
+        self._all = self._config.avoidance == "certified" or "swivel" in methods
+        self._until.clear()
 
     def ignores(self, sender: int) -> bool:
         """Whether what this system says of where it is and will be need not be decoded now."""
@@ -66,9 +75,9 @@ class Earshot:
         familiar: Callable[[int], bool],
     ) -> None:
         """Find out whom to ignore from ``now`` on. ``states`` (M, 6) are the others' last positions and
-        velocities, fleet-local ENU, ``ages`` (M,) µs; ``familiar`` tells who shares a plan."""
+        velocities, fleet-local ENU, ``ages`` (M,) µs; ``familiar`` tells whose word counts."""
         self._until.clear()
-        if self._always or own is None or own.age > self._config.guard.own_stale_us or not len(states):
+        if self._all or own is None or own.age > self._config.guard.own_stale_us or not len(states):
             return
         if float(np.sqrt(own.velocity @ own.velocity)) > self._fastest:
             return
@@ -85,16 +94,20 @@ class Earshot:
             if familiar(ids[row]):
                 self._until[ids[row]] = int(until[row])
 
-    def near(self, here: Array, states: Array, ages: Ages) -> NDArray[np.bool_]:
-        """Which (M,) of the others can act on a plan that is made ``here`` (3,) now: all whose states (M, 6)
-        of ``ages`` (M,) µs are within the bound for S = P = 0."""
-        apart = _norm(states[:, 0:3] - here)
-        near: NDArray[np.bool_] = apart <= self._certainly
+    def near(self, places: Array, states: Array, ages: Ages) -> NDArray[np.bool_]:
+        """Which (M,) of the others can act on a plan that is made at one of ``places`` (P, 3) now: all whose
+        states (M, 6) of ``ages`` (M,) µs are within the bound for S = P = 0 of one, and whom a vehicle that
+        lands there would come down on."""
+        off = states[:, None, 0:3] - places
+        apart = _norm(off).min(axis=1)
+        near: NDArray[np.bool_] = (apart <= self._certainly) | self._all
         if near.all():
             return near
         closing = self._fastest + np.maximum(_norm(states[:, 3:6]), self._fastest)
         gone = 1e-6 * np.clip(ages, 0, self._shown) * (closing - self._fastest)
-        return np.asarray(apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN)
+        near = apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN
+        below = _norm(off[:, :, 0:2]).min(axis=1) <= self._below + gone + _OFF_PLAN
+        return np.asarray(near | below)
 
     def _reach(self, closing: Array | float) -> Array:
         """How near (m, between centres) two have to come before one acts on the other when they close at
@@ -103,11 +116,7 @@ class Earshot:
         field, band = config.field, config.tangential
         braking = 0.0 if field.braking is None else np.square(closing) / (2.0 * field.braking)
         reach = field.d_safe + field.margin(2) + np.maximum(braking, band.d_band + band.reach_s * closing)
-        return np.asarray(np.maximum(reach, config.approach_angle.reach + _FADING), dtype=np.float64)
-
-
-_FADING = 1.0
-"""m over which the angles' field fades out beyond its reach."""
+        return np.asarray(np.maximum(reach, config.approach_angle.reach + FADING), dtype=np.float64)
 
 
 def _norm(vectors: Array) -> Array:

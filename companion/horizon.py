@@ -108,6 +108,10 @@ class HorizonTable:
             self._latest[sender] = horizon
             self._fresh.add(sender)
 
+    def latest(self, sender: int) -> Horizon | None:
+        """The latest that is known."""
+        return self._latest.get(sender)
+
     def _put_down(self) -> None:
         """The fresh ones, row by row."""
         new = [sender for sender in self._fresh if sender not in self._rows]

@@ -15,6 +15,7 @@ import numpy as np
 from companion.config import CompanionConfig
 from companion.earshot import Earshot
 from companion.estimator import Measured
+from companion.familiars import Familiars
 from companion.forces import Obstacles
 from companion.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.plan_clock import PlanClock
@@ -79,6 +80,7 @@ class Neighbours:
         # What is larger than a vehicle, and flies by no limits.
         self._things = {one.system for one in config.moving}
         self.earshot = Earshot(config)
+        self._familiars = Familiars()
 
     @property
     def brief(self) -> bool:
@@ -153,13 +155,25 @@ class Neighbours:
         self._put_down()
         self.earshot.look(own, self._ids, self._states, now - self._times, self._is_familiar)
 
-    def _is_familiar(self, system: int) -> bool:
-        """Whether it shares plans, as vehicles do that fly by limits like ours."""
-        return system in self._clocks and system not in self._things
+    def ignores(self, system: int, component: int) -> bool:
+        """Whether what this sender says of where it is and will be need not be decoded now."""
+        if not self.earshot.ignores(system):
+            return False
+        if component != AUTOPILOT:
+            # It goes on being its vehicle's voice.
+            self._spoken[system] = self.earshot.now
+        return True
 
-    def obstacles(self, now: int, own: Array | None = None) -> Obstacles:
+    def _is_familiar(self, system: int) -> bool:
+        """Whether its word counts for a while, as of vehicles that fly by plans and limits like ours."""
+        plan = self._table.latest(system)
+        if plan is None or system in self._things:
+            return False
+        return self._familiars.trusts(self.earshot.now, system, self._tracks[system], plan)
+
+    def obstacles(self, now: int, places: Array | None = None) -> Obstacles:
         """All neighbours aligned with ``now + n·dt``, n = 0…N; only those that may act on a plan that begins
-        at ``own`` (3,), if that is said.
+        at one of ``places`` (P, 3), if those are said.
 
         One that falls silent stays an obstacle where it was last, carried on for a bounded time: it may well
         be there. With ``guard.flown_on_us`` it may have stopped, or its autopilot flown on: it is an obstacle
@@ -170,8 +184,8 @@ class Neighbours:
         self._put_down()
         age = now - self._times
         ids, states = self._ids, self._states
-        if own is not None and ids:
-            near = self.earshot.near(own, states, age)
+        if places is not None and ids:
+            near = self.earshot.near(places, states, age)
             for system in self._things:
                 if system in self._rows:
                     near[self._rows[system]] = True

@@ -80,7 +80,6 @@ class Companion:
         self.config = config
         self.name = f"companion-{system}"
         self._source = Source(system, COMPONENT)
-        self._fleet = fleet
         self._stopwatch = stopwatch
         self.world = World(config, system, target_system, fleet)
         self.planner = Planner(config)
@@ -90,9 +89,10 @@ class Companion:
         self.voice = Voice(config.voice, self._source)
         self._dials = Dials(config, self._source)
         self._signing = signing
-        self._earshot = earshot = self.world.neighbours.earshot
+        neighbours = self.world.neighbours
+        self._earshot = neighbours.earshot
         self._codecs = {
-            link: Codec(accepts(link, system, target_system, config, earshot.ignores), signing, number)
+            link: Codec(accepts(link, system, target_system, config, neighbours.ignores), signing, number)
             for number, link in enumerate(LINKS)
         }
         self.plan: Plan | None = None
@@ -150,6 +150,7 @@ class Companion:
     def use(self, methods: tuple[MethodName, ...]) -> None:
         """From the next plan on."""
         self.planner.use(methods)
+        self._earshot.use(methods)
 
     def shed(self) -> Sequence[int]:
         """Take the stopwatch's readings (ns) away, and the plan log with them: for who runs for days."""

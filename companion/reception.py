@@ -27,10 +27,11 @@ def accepts(
     system: int,
     target: int,
     config: CompanionConfig,
-    ignores: Callable[[int], bool] = lambda _sender: False,
+    ignores: Callable[[int, int], bool] = lambda _sender, _component: False,
 ) -> Callable[[int, int, int], bool]:
     """Header filter of a link of the companion of ``system``, whose target has the system id ``target``: the
-    messages wanted there, from whom they may come. ``ignores``: who on the swarm link is out of earshot."""
+    messages wanted there, from whom they may come. ``ignores``: what sender and component on the swarm link
+    are out of earshot."""
     wanted = _WANTED.get(link, set())
     source = config.target_source
     sensors = {_DISTANCES} if config.proximity is not None else set()
@@ -49,8 +50,12 @@ def accepts(
         )
     if link == "swarm":
         wanted = wanted | (sensors & {_TRAFFIC})
-        return lambda identifier, sender, _component: (
-            (identifier in wanted and sender != system and not (identifier in _WHERE and ignores(sender)))
+        return lambda identifier, sender, component: (
+            (
+                identifier in wanted
+                and sender != system
+                and not (identifier in _WHERE and ignores(sender, component))
+            )
             or (identifier in sensors and sender == system)
         )
     return lambda identifier, _sender, _component: identifier in wanted

@@ -81,6 +81,18 @@ class Track:
         return self._absurd + self._undated + self._rewind.too_late + refused
 
     @property
+    def refused(self) -> int:
+        """Measurements that the gate refused."""
+        belief = self._rewind.belief
+        return 0 if belief is None else belief.refused
+
+    @property
+    def doubted(self) -> bool:
+        """Whether another story than the one that is believed has been told lately."""
+        belief = self._rewind.belief
+        return belief is not None and bool(belief.doubts)
+
+    @property
     def clock_steps(self) -> int:
         """How often the sender's clock was found to be another."""
         return max(0, self._clock.laid - 1)

@@ -134,8 +134,11 @@ class World:
         """Neighbours and what else moves, the target where it is one, and what stands near the own
         ``prediction`` (N + 1, 3), aligned with ``now + n·dt``."""
         config, field = self.config, self.config.field
-        certified = config.avoidance == "certified"
-        obstacles = self.neighbours.obstacles(now, None if certified else prediction[0])
+        places = None
+        if config.avoidance != "certified":
+            # A plan begins on the last one, or where the vehicle is when that has been left.
+            places = prediction[:1] if view.own is None else np.stack([prediction[0], view.own.position])
+        obstacles = self.neighbours.obstacles(now, places)
         if len(self._moving):
             obstacles = self._moving.among(obstacles, prediction, field.d_min, field.d_safe, field.margin(1))
         if view.target is not None and config.target_d_min is not None and config.target_d_safe is not None:

@@ -28,7 +28,7 @@ from companion.methods import Influence, Scene
 from companion.methods.fading import reserve, shares
 
 _NEAR = 1e-6
-_FADING = 1.0
+FADING = 1.0
 """m over which the force fades out beyond ``reach``, behind, and towards the target, which has no bearing."""
 
 
@@ -54,7 +54,7 @@ class ApproachAngle:
         senses = self._senses(obstacles, aside, strength > 0.0)
         reach = np.hypot(out[:, 0], out[:, 1])
         beta = out / np.maximum(reach, _NEAR)[:, None]
-        total = (senses @ strength) * np.minimum(reach / _FADING, 1.0)
+        total = (senses @ strength) * np.minimum(reach / FADING, 1.0)
         # Who is under way across already is not made faster still, or it never comes round.
         across = scene.velocity[1] * beta[:, 0] - scene.velocity[0] * beta[:, 1]
         total *= shares(reserve(np.sign(total) * across, config.pass_speed))
@@ -68,10 +68,10 @@ class ApproachAngle:
         left = sqrt(scene.to_go @ scene.to_go)
         goal = scene.position + scene.to_go
         off = obstacles.positions[:, 0] - goal
-        ahead = shares(1.0 + (left + obstacles.d_safe - np.sqrt(np.vecdot(off, off))) / _FADING)
+        ahead = shares(1.0 + (left + obstacles.d_safe - np.sqrt(np.vecdot(off, off))) / FADING)
         here = obstacles.positions[:, 0] - scene.position
         room = self._config.reach - np.sqrt(np.vecdot(here, here))
-        ahead *= shares(1.0 + room / _FADING)
+        ahead *= shares(1.0 + room / FADING)
         return ahead[:, None]
 
     def _senses(self, obstacles: Obstacles, aside: Array, acts: NDArray[np.bool_]) -> Array:
