@@ -61,18 +61,28 @@ class Change(NamedTuple):
     begins: bool
 
 
+class _Lately:
+    """What happens at one moment stays a concern for a while."""
+
+    def __init__(self) -> None:
+        self._until = 0
+
+    def after(self, now: int, happens: bool) -> bool:
+        """Whether it does, or did lately."""
+        if happens:
+            self._until = now + _REMEMBERED
+        return now < self._until
+
+
 class Watch:
     """Judges each situation. ``concerns`` are those of now, by name."""
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
         self.concerns: dict[str, Concern] = {}
-        self._late_until = 0
-        self._clock_steps = 0
+        self._late, self._clock_set, self._origin_moved = _Lately(), _Lately(), _Lately()
+        self._clock_steps = self._moves = 0
         self._target_seen = False
-        self._clock_until = 0
-        self._moves = 0
-        self._moved_until = 0
 
     def look(self, s: Situation) -> list[Change]:
         """What has changed since the last look."""
@@ -166,22 +176,18 @@ class Watch:
         return Concern("fence", f"Fence: {which}, coming back", Reaction.RETURN, Severity.CRITICAL)
 
     def _lateness(self, s: Situation) -> Concern | None:
-        if s.late > self._config.guard.late_us:
-            self._late_until = s.now + _REMEMBERED
-        if s.now >= self._late_until:
-            return None
-        return Concern("lateness", "Deadlines are missed")
+        late = self._late.after(s.now, s.late > self._config.guard.late_us)
+        return Concern("lateness", "Deadlines are missed") if late else None
 
     def _clock(self, s: Situation) -> Concern | None:
-        if s.clock_steps != self._clock_steps:
-            self._clock_steps = s.clock_steps
-            self._clock_until = s.now + _REMEMBERED
-        return Concern("clock", "The autopilot's clock has jumped") if s.now < self._clock_until else None
+        jumped = self._clock_set.after(s.now, s.clock_steps != self._clock_steps)
+        self._clock_steps = s.clock_steps
+        return Concern("clock", "The autopilot's clock has jumped") if jumped else None
 
     def _origin(self, s: Situation) -> Concern | None:
-        if s.moves != self._moves:
-            self._moves, self._moved_until = s.moves, s.now + _REMEMBERED
-        if s.now >= self._moved_until or s.phase in _ON_THE_GROUND:
+        moved = self._origin_moved.after(s.now, s.moves != self._moves)
+        self._moves = s.moves
+        if not moved or s.phase in _ON_THE_GROUND:
             return None
         if not s.displaced <= self._config.guard.displaced:
             return Concern(
@@ -198,4 +204,4 @@ class Watch:
 _NEIGHBOUR = "neighbour "
 _ON_THE_GROUND = (Phase.CONNECT, Phase.DONE)
 _REMEMBERED = 5_000_000
-"""µs for which what happens at one moment stays a concern."""
+"""µs."""
