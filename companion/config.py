@@ -63,7 +63,8 @@ class CostConfig(Settings):
 
 
 class LimitsConfig(Settings):
-    """What the planner may ask for. ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it."""
+    """What the planner may ask for. ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it. The box is where
+    vehicles may be: plans stay inside by k·σ of the own place (``field.margin``)."""
 
     u_max: Bounds = (2.0, 2.0, 2.0)
     v_max: Bounds = (5.0, 5.0, 5.0)
@@ -78,6 +79,18 @@ class LimitsConfig(Settings):
         if self.a_total < max(self.u_max):
             raise ValueError("a_total must be at least the largest u_max")
         return self
+
+    def within(self, margin: float) -> LimitsConfig:
+        """The same with a box that is smaller by ``margin`` (m) on each side, or half as large where there is
+        no room for that."""
+        sides = tuple(zip(self.box_min, self.box_max, strict=True))
+        off = tuple(min(margin, (high - low) / 4.0) for low, high in sides)
+        return self.model_copy(
+            update={
+                "box_min": tuple(low + by for (low, _), by in zip(sides, off, strict=True)),
+                "box_max": tuple(high - by for (_, high), by in zip(sides, off, strict=True)),
+            }
+        )
 
 
 class Potential(Settings):

@@ -53,7 +53,7 @@ class Planner:
 
     def __init__(self, config: CompanionConfig) -> None:
         self.config = config
-        self.dqmpc = Dqmpc(config.horizon, config.cost, config.limits)
+        self.dqmpc = Dqmpc(config.horizon, config.cost, config.limits.within(config.field.margin(1)))
         self._methods = build(config)
         self._gradient: Array = np.zeros(3)
         self._force: Array = np.zeros((config.horizon.steps + 1, 3))

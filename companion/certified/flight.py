@@ -32,7 +32,9 @@ class CertifiedFlight:
     def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
         certified, steps = config.certified, config.horizon.steps + 1
         self._config, self._own = config, own
-        program = Program(steps, config.limits, certified, planar=config.planar)
+        program = Program(
+            steps, config.limits.within(config.field.margin(1)), certified, planar=config.planar
+        )
         self._stall = StallTurn(certified.stall, program.pull, _SENSES.get(config.turning_sense, 1.0))
         self.keeper = Keeper(certified, program, self._stall, fleet.fingerprint, planar=config.planar)
         self.ledger = Ledger(

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from companion.config import CompanionConfig
+from companion.forces import Obstacles
+from companion.planner import Planner, standing
 from companion.world import World, reach
 from mavlink_bridge.messages import GlobalPosition, Source
 
@@ -76,3 +78,30 @@ def test_without_an_error_nothing_grows():
     found = seen(settings(0.0, 2.0))
     field = CompanionConfig().field
     assert found.d_min.tolist() == [field.d_min, 1.0, field.d_min + 0.7]
+
+
+@given(sigma=SIGMAS, k=TIMES)
+def test_the_box_is_smaller_by_k_sigma_and_never_nothing(sigma, k):
+    limits, margin = settings(sigma, k).limits, k * sigma
+    low, high = np.array(limits.box_min), np.array(limits.box_max)
+    inner = limits.within(margin)
+    off = np.array(inner.box_min) - low
+    assert_allclose(high - np.array(inner.box_max), off, atol=1e-12)
+    assert (off <= margin + 1e-12).all()
+    assert_allclose(off, np.minimum(margin, (high - low) / 4.0), atol=1e-12)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.6])
+def test_who_is_sent_to_the_floor_stays_k_sigma_above_it(sigma):
+    config = settings(sigma, 2.0)
+    planner, prediction = Planner(config), np.broadcast_to([0.0, 0.0, 6.0], (16, 3))
+    position, velocity, now = np.array([0.0, 0.0, 6.0]), np.zeros(3), NOW
+    floor = config.limits.box_min[2] + 2.0 * sigma
+    for _ in range(80):
+        nobody = Obstacles((), np.zeros((0, 16, 3)), np.zeros(0), np.zeros(0))
+        plan = planner.plan(now, position, velocity, prediction, standing(np.array([3.0, 0.0, 0.0])), nobody)
+        now += config.horizon.dt_us
+        motion, prediction = plan.horizon.at(now), plan.horizon.knots[:16, 0:3]
+        position, velocity = motion.position, motion.velocity
+        assert position[2] >= floor - 1e-6
+    assert position[2] < floor + 0.05
