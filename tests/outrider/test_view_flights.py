@@ -136,7 +136,7 @@ def test_methods_loss_and_target_can_be_changed(alone: dict[str, bytes], tmp_pat
     np.testing.assert_allclose(target[-1], place)
     # The companions saw it move: by MAVLink, as everything.
     seen = flight.companions[0].world.target._track.last[:3]
-    assert np.linalg.norm(seen - place) < 2.0
+    assert np.linalg.norm(np.subtract(seen, place)) < 2.0
 
 
 @pytest.mark.parametrize("name", ["escort", "walk"])
