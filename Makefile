@@ -6,14 +6,17 @@ BIN = .venv/bin
 SCRIPTS = tools/bootstrap.py tools/client_environments.py tools/extract_log.py
 CLIENTS = tests/clients/requirements
 
-.PHONY: fly test trial soak lint bench schemas requirements clean
+.PHONY: fly test slow trial soak lint bench schemas requirements clean
 .DEFAULT_GOAL := fly
 
 fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--method tangential …"
 	@$(BIN)/outrider swarm escort $(ARGS)
 
-test: .venv/.made .venv/clients/.made  ## everything; one test with ARGS="-k name"
-	@$(BIN)/pytest -n $(JOBS) --dist loadfile $(ARGS) </dev/null
+test: .venv/.made  ## all tests but the slow ones; one test with ARGS="-k name"
+	@$(BIN)/pytest -m "not slow" -n $(JOBS) --dist loadfile $(ARGS) </dev/null
+
+slow: .venv/.made .venv/clients/.made  ## the slow tests: flights, browsers, other people's clients, wheels
+	@$(BIN)/pytest -m slow -n $(JOBS) --dist loadfile $(ARGS) </dev/null
 
 trial: .venv/.made  ## five companions on five vehicles through all that may happen; ARGS="--speed 1 --flavour px4"
 	@$(BIN)/python -m trials $(ARGS)

@@ -1,7 +1,7 @@
 """Make the environments of the client software that tests/clients flies: one in .venv/clients for each file
 of tests/clients/requirements, as MAVSDK's two APIs have one name and MAVProxy wants versions of its own.
 
-Run by `make test`, by the Python in .venv. What is there and up to date is left alone. Where a client has no
+Run by `make slow`, by the Python in .venv. What is there and up to date is left alone. Where a client has no
 wheel for this machine, its tests are skipped, and that is said; but in CI it is an error.
 """
 
