@@ -21,7 +21,7 @@ from test_sitl_command import free_base
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message
+from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, SysStatus
 
 PACE: Final = 0.9
 """By its rate a clock is known for a simulation's, which stands now and then on a busy machine. At 1 it is
@@ -53,6 +53,7 @@ class Bird:
         self.mode: int | None = None
         self.beats = 0
         self.place: tuple[float, np.ndarray] | None = None
+        self.battery: float | None = None
         self.memory: dict[int, list[tuple[float, int]]] = {}
         self.flights = 0
         self.alone_until = 0.0
@@ -81,7 +82,7 @@ class Bird:
         other = self._base + (2 if self.flavour == "ardupilot" else 10)
         kind = "tcp" if self.flavour == "ardupilot" else "udpin"
         self._ear = open_link(f"{kind}:{HOST}:{other}", WallClock())
-        self.mode, self.beats, self.place = None, 0, None
+        self.mode, self.beats, self.place, self.battery = None, 0, None, None
 
     def take_seat(self) -> None:
         """Start ``outrider fly``."""
@@ -168,6 +169,8 @@ class Bird:
                 elif isinstance(message, GlobalPosition):
                     place = FLEET.to_enu(message.latitude, message.longitude, message.altitude)
                     self.place = time.monotonic(), place
+                elif isinstance(message, SysStatus):
+                    self.battery = message.battery_remaining
         path = self.run / "events.jsonl" if self._fly is not None else None
         if path is not None and path.exists():
             with path.open(encoding="utf-8") as file:

@@ -374,6 +374,10 @@ class Sorties:
                 self._anew(craft)
             return
         self._down_since.pop(system, None)
+        if self._is_outside(craft):
+            self.note(craft, "is outside the fence without a companion that knows it: a pilot fetches it")
+            self._anew(craft)
+            return
         craft.marks["flew"] = craft.marks.get("flew", False) or (
             craft.autopilot.armed and craft.autopilot.airborne
         )
@@ -385,6 +389,16 @@ class Sorties:
         if wanted and not recent and (craft.autopilot.airborne or self._is_free(craft)):
             craft.marks["asked"] = now
             self.field.tower.go(system)
+
+    def _is_outside(self, craft: Craft) -> bool:
+        """Whether a companion that began anew will not take it over where it hovers, for some seconds."""
+        rows = self._since(craft, 5.0)
+        return (
+            craft.companion.pilot.waiting_for.startswith("a start near the box")
+            and craft.autopilot.airborne
+            and len(rows) > 40
+            and all(row.phase is Phase.CONNECT for row in rows)
+        )
 
     def _is_free(self, craft: Craft) -> bool:
         others = [other for other in self.field.crafts if other is not craft and other.autopilot.airborne]

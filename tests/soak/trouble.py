@@ -24,6 +24,11 @@ from mavlink_bridge.messages import CommandLong, ParamSet, SetMode, Source
 GROUND: Final = Source(255, 190)
 INJECT, GPS_UNIT, OFF, OK = 420, 4, 1, 0
 
+BATTERY_LOW: Final = 0.7
+"""Share at which the companion comes home, as flock's file says."""
+_SPARE: Final = 0.05
+"""Share that half a minute of flight takes, and some."""
+
 Wait = Callable[[], object]
 Life = Generator[tuple[str, Wait], None, None]
 
@@ -63,6 +68,10 @@ class Trouble:
             if not names:
                 # All of them, again and again, each time in another order.
                 names = self._random.sample(list(mishaps), len(mishaps))
+            if self._is_due_home():
+                yield "the end of its battery", lambda: self.bird.phase != "escort"
+                yield from self._escorts()
+                continue
             name = names.pop()
             self.begun[name] += 1
             yield from mishaps[name]()
@@ -123,6 +132,11 @@ class Trouble:
                 yield from self._pause_of(2.0)
             else:
                 return
+
+    def _is_due_home(self) -> bool:
+        """Whether its battery will call it home before a mishap is over: then that would wait in vain."""
+        battery = self.bird.battery
+        return battery is not None and battery < BATTERY_LOW + _SPARE
 
     def _asks(self) -> bool:
         bird = self.bird
