@@ -37,6 +37,12 @@ def resident(process: int) -> int | None:
     return int(pages.split()[1]) * resource.getpagesize()
 
 
+def _bury(process: subprocess.Popen[str] | None) -> None:
+    """Close the pipe to one that has ended."""
+    if process is not None:
+        process.communicate()
+
+
 class Bird:
     """A vehicle, its companion's process, and an ear at another of the vehicle's ports. ``steady``: its
     process is left alone, so that its memory can be looked at for long."""
@@ -66,6 +72,7 @@ class Bird:
 
     def power_up(self) -> None:
         """A vehicle with a full battery on its pad."""
+        _bury(self._sitl)
         directory = self.directory / f"sitl-{self.system}"
         directory.mkdir(exist_ok=True)
         origin = FLEET.to_geodetic(np.array([12.0 * self.system - 24.0, -14.0, 0.0]))
@@ -86,6 +93,7 @@ class Bird:
 
     def take_seat(self) -> None:
         """Start ``outrider fly``."""
+        _bury(self._fly)
         self.lives += 1
         kind = "tcp" if self.flavour == "ardupilot" else "udpin"
         home = self.directory / f"fly-{self.system}-{self.lives}"
@@ -155,7 +163,7 @@ class Bird:
         for process in (self._fly, self._sitl):
             if process is not None and process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)
-                process.communicate()
+            _bury(process)
         self._ear.close()
 
     # What is seen and said
