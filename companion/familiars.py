@@ -43,12 +43,9 @@ class Familiars:
 
 
 def _agree(track: Track, plan: Horizon) -> bool:
-    """Whether the last state lies on the plan. Floats: it is asked of many."""
+    """Whether the last state lies on the plan."""
     time = track.time
     if time is None or not -plan.dt <= time - plan.epoch <= _FRESH:
         return False
-    index = min(max((time - plan.epoch) // plan.dt, 0), len(plan.knots) - 1)
-    s = 1e-6 * (time - plan.epoch - index * plan.dt)
-    knot, place = plan.knots[index].tolist(), track.last
-    off = (knot[k] + s * (knot[k + 3] + 0.5 * s * knot[k + 6]) - place[k] for k in range(3))
-    return bool(sum(part * part for part in off) <= _BESIDE**2)
+    off = plan.at(time).position - track.last[0:3]
+    return bool(off @ off <= _BESIDE**2)
