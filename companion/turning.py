@@ -59,6 +59,9 @@ class TurnFilter:
 def carried(position: Array, velocity: Array, rate: float, seconds: Array) -> Path:
     """The motion (3,), (3,) at each of ``seconds`` (n,) later: its course turns at ``rate`` (rad/s), its
     speed and its vertical speed stay."""
+    if rate == 0.0:
+        straight = position + np.multiply.outer(seconds, velocity)
+        return Path(straight, np.broadcast_to(velocity, straight.shape))
     angle = rate * seconds
     # sin(ωt)/ω and (1 − cos(ωt))/ω, whole also where ω is 0.
     along = seconds * np.sinc(angle / np.pi)

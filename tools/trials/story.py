@@ -80,7 +80,10 @@ def _wait_for_the_go(stage: Stage) -> None:
 
 def _escort(stage: Stage, systems: Iterable[int]) -> None:
     stage.tell("go")
-    reports = Reports(stage)
+    _send(Reports(stage), systems)
+
+
+def _send(reports: Reports, systems: Iterable[int]) -> None:
     reports.go(systems)
     reports.of(systems, "phase", "escort")
 
@@ -106,8 +109,7 @@ def _kill_the_pilot(stage: Stage) -> None:
     reports.of([KILLED], "last word", "the vehicle")
     reports.of([KILLED], "waiting", "the operator's go")
     stage.wait(stage.plan.pause_s)
-    reports.go([KILLED])
-    reports.of([KILLED], "phase", "escort")
+    _send(reports, [KILLED])
 
 
 def _end_a_companion(stage: Stage) -> None:
@@ -122,8 +124,7 @@ def _end_a_companion(stage: Stage) -> None:
     wingman.start()
     reports.of([ENDED], "waiting", "the operator's go")
     reports.of(others, "over", silent)
-    reports.go([ENDED])
-    reports.of([ENDED], "phase", "escort")
+    _send(reports, [ENDED])
 
 
 def _cut_the_swarm(stage: Stage) -> None:

@@ -1,0 +1,61 @@
+"""Commands that fly many times."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from outrider.commands.words import AsJson, Begun, Jobs
+
+
+def sweep(
+    name: Annotated[str, typer.Argument(help="A file, or the name of a shipped sweep.")],
+    runs: Annotated[int | None, typer.Option(min=1, max=1_000_000, help="Seeds per cell.")] = None,
+    jobs: Jobs = None,
+    out: Begun = None,
+    wall_limit: Annotated[float, typer.Option(min=1.0, help="s of wall time for one run.")] = 1800.0,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Fly on the workers of a Dask scheduler: tcp://HOST:PORT."),
+    ] = None,
+    regressions: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Write every run that failed there, as a scenario."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Fly many seeds of a grid of scenarios or random scenes. What was killed can be gone on with."""
+    from outrider.sweeps.command import sweep as sweeping
+
+    raise typer.Exit(
+        sweeping(name, runs, jobs, out, as_json, wall_limit, scheduler=scheduler, failures=regressions)
+    )
+
+
+def paper(
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Flights of each row.")] = 10,
+    jobs: Jobs = None,
+    out: Begun = None,
+    as_json: AsJson = False,
+) -> None:
+    """Fly the paper's methods and scenarios, and put its table beside ours."""
+    from outrider.paper.command import paper as comparing
+
+    raise typer.Exit(comparing(seeds, jobs, out, as_json))
+
+
+def gallery(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[SCENARIO]...", help="Names of shipped scenarios; all without."),
+    ] = None,
+    jobs: Jobs = None,
+    out: Begun = None,
+    page: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Page and pictures there.")] = None,
+) -> None:
+    """Fly every method in every scenario, and draw a page of pictures."""
+    from outrider.gallery.command import gallery as drawing
+
+    raise typer.Exit(drawing(tuple(names or ()), jobs, out, page))

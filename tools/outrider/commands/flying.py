@@ -1,0 +1,198 @@
+"""Commands that fly: swarms of our own, emulated vehicles, and a companion on whatever autopilot there is."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from outrider.commands.words import METHODS, PHYSICS, SENSORS, AsJson, RunDirectory, SigningKey, Wind
+
+
+def swarm(
+    scenario: Annotated[str, typer.Argument(help="A file, or the name of a shipped scenario.")],
+    method: Annotated[str | None, typer.Option(help=METHODS)] = None,
+    avoidance: Annotated[str | None, typer.Option(help="field or certified.")] = None,
+    planar: Annotated[bool, typer.Option("--planar", help="Fix the height, as the paper.")] = False,
+    vehicles: Annotated[int | None, typer.Option(help="How many fly.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of jitter, phases and link faults.")] = 1,
+    loss: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Share of messages lost.")] = None,
+    delay_ms: Annotated[float | None, typer.Option(min=0.0, help="Of the swarm and target links.")] = None,
+    sensors: Annotated[str | None, typer.Option(help=SENSORS)] = None,
+    wind: Wind = None,
+    replan_hz: Annotated[float | None, typer.Option(help="Plans per second.")] = None,
+    physics: Annotated[str | None, typer.Option(help=PHYSICS)] = None,
+    real_time: Annotated[
+        bool, typer.Option("--real-time", help="Under the wall clock: a process per node, over UDP.")
+    ] = False,
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="Ask for real-time priority; implies --real-time.")
+    ] = False,
+    view: Annotated[bool, typer.Option("--view", help="Watch it in the browser (docs/view.md).")] = False,
+    out: RunDirectory = None,
+    as_json: AsJson = False,
+) -> None:
+    """Fly a scenario, in lock-step unless told otherwise, and leave logs, summary and picture in a run
+    directory."""
+    from outrider import swarm as flying
+    from outrider.console import progress, show
+    from outrider.report.command import NAME, make, write
+    from outrider.summary import exit_status
+
+    options = flying.Options(
+        method, avoidance, planar, vehicles, loss, delay_ms, sensors, replan_hz, wind, physics
+    )
+    prepared = flying.prepare(scenario, options)
+    with ExitStack() as open_:
+        shown = None
+        if view:
+            from outrider.viewing.show import showing
+
+            shown = open_.enter_context(showing())
+        directory = flying.run_directory(out, prepared.scenario, seed)
+        with progress(prepared.scenario.duration_s) as watch:
+            pace = flying.Pace(real_time or realtime, realtime)
+            summary = flying.fly(prepared, seed, directory, watch, pace, shown)
+        write(directory / NAME, make(directory).text)
+        if as_json:
+            sys.stdout.write(json.dumps(summary) + "\n")
+            sys.stdout.flush()
+        else:
+            show(summary)
+        if shown is not None:
+            shown.stay(directory)
+    raise typer.Exit(exit_status(summary))
+
+
+def sitl(
+    count: Annotated[int, typer.Option(min=1, max=254, help="Vehicles.")] = 1,
+    flavour: Annotated[str, typer.Option(help="ardupilot or px4.")] = "ardupilot",
+    speedup: Annotated[
+        float, typer.Option("--speedup", min=0.01, max=1000.0, help="Times as fast as the clock on the wall.")
+    ] = 1.0,
+    port_base: Annotated[
+        int | None,
+        typer.Option(min=1, max=65535, help="In place of 5760 (ardupilot) or 14540 (px4)."),
+    ] = None,
+    to: Annotated[
+        list[str] | None,
+        typer.Option(help="One more endpoint for all vehicles: udpout:127.0.0.1:14550, mcast:, …"),
+    ] = None,
+    host: Annotated[str, typer.Option(help="Interface to listen on.")] = "127.0.0.1",
+    first_id: Annotated[int, typer.Option(min=1, max=254, help="System id of the first vehicle.")] = 1,
+    vehicle: Annotated[str, typer.Option(help="A file, or firefly, hummingbird.")] = "firefly",
+    sensors: Annotated[str, typer.Option(help=SENSORS)] = "truth",
+    physics: Annotated[str, typer.Option(help=PHYSICS)] = "own",
+    startup: Annotated[
+        str, typer.Option(help="quick, or realistic: GPS and estimator take their time.")
+    ] = "quick",
+    response: Annotated[
+        str, typer.Option(help="exact, or firmware: it lags behind set-points as the real one.")
+    ] = "exact",
+    origin: Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE[,ALTITUDE].")] = None,
+    wind: Wind = None,
+    spacing: Annotated[float, typer.Option(min=0.0, max=1000.0, help="m between vehicles.")] = 3.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of sensors' noise.")] = 1,
+    state: Annotated[
+        Path | None,
+        typer.Option(help="Directory where parameters and missions are kept."),
+    ] = None,
+    signing_key: SigningKey = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End by itself after that.")] = None,
+    as_json: Annotated[
+        bool,
+        typer.Option("--json", help="One JSON object on standard output when all are up, one at the end."),
+    ] = False,
+) -> None:
+    """Emulate vehicles that MAVSDK, MAVProxy, pymavlink and ground stations can connect to, until Ctrl-C."""
+    from outrider.hangar.command import Terms, run
+    from outrider.hangar.request import Options, checked
+
+    options = Options(
+        count=count,
+        first_id=first_id,
+        flavour=flavour,
+        vehicle=vehicle,
+        sensors=sensors,
+        physics=physics,
+        startup=startup,
+        response=response,
+        origin=origin,
+        wind=wind,
+        spacing=spacing,
+        speedup=speedup,
+        seed=seed,
+        signing_key=signing_key,
+    )
+    raise typer.Exit(run(checked(options), Terms(port_base, tuple(to or ()), host, state, seconds, as_json)))
+
+
+def doctor(
+    endpoint: Annotated[
+        str, typer.Argument(help="udpin:HOST:PORT, tcp:HOST:PORT, /dev/DEVICE,BAUD, …, or tlog:PATH.")
+    ],
+    system: Annotated[
+        int | None,
+        typer.Option(min=1, max=255, help="System id of the vehicle; if not said, the lowest."),
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Wait so long at most.")] = 15.0,
+    key: Annotated[Path | None, typer.Option(help="Key file of a link that is signed.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say what is at an endpoint or in a log, what an escort misses there, and what to do about it. It asks,
+    and changes nothing. Ends with 1 if something is in the way of an escort."""
+    from outrider.doctor.command import doctor as examining
+
+    raise typer.Exit(examining(endpoint, system, seconds, key, as_json))
+
+
+def fly(
+    autopilot: Annotated[
+        str,
+        typer.Option(help="udpin:HOST:PORT, tcp:HOST:PORT, /dev/…,BAUD, …; tlog:PATH to rehearse."),
+    ],
+    config: Annotated[str, typer.Option(help="A file, or ardupilot, px4.")],
+    swarm: Annotated[str | None, typer.Option(help="Endpoint of the other companions.")] = None,
+    target: Annotated[str | None, typer.Option(help="Endpoint of the target; the swarm's.")] = None,
+    ground: Annotated[str | None, typer.Option(help="Endpoint of orders; the autopilot's.")] = None,
+    system: Annotated[
+        int | None,
+        typer.Option(min=1, max=250, help="In place of the file's system id; each vehicle has another."),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Plan and say what would be sent; steer and arm nothing.")
+    ] = False,
+    realtime: Annotated[bool, typer.Option("--realtime", help="Ask for real-time priority.")] = False,
+    signing_key: SigningKey = None,
+    out: RunDirectory = None,
+    as_json: AsJson = False,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="Hold and end after that.")] = None,
+    go: Annotated[
+        bool, typer.Option("--go", help="The operator's go, given as soon as all is ready: it takes off.")
+    ] = False,
+) -> None:
+    """Fly one vehicle as part of a swarm: a companion on a real or emulated autopilot, until it has landed
+    or Ctrl-C, which leaves it holding its place. Orders are typed: go, hold, return, land (docs/fly.md)."""
+    from outrider.aboard.command import run
+    from outrider.aboard.request import Options, checked
+
+    options = Options(
+        autopilot,
+        config,
+        swarm,
+        target,
+        ground,
+        system,
+        dry_run,
+        realtime,
+        signing_key,
+        out,
+        seconds,
+        go,
+        as_json,
+    )
+    raise typer.Exit(run(checked(options)))

@@ -1,0 +1,100 @@
+"""Commands that show, check or change the form of what was flown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from outrider.commands.words import AsJson
+from outrider.errors import InputError
+
+
+def view(
+    sources: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="RUN_DIR|ENDPOINT…", help="What a flight left; or what is listened to: udpin:…, mcast:, …"
+        ),
+    ],
+    host: Annotated[str, typer.Option(help="Interface to serve the page at.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Or the next that is free.")] = 8080,
+    target: Annotated[int, typer.Option(min=1, max=255, help="System id of what is escorted.")] = 10,
+    html: Annotated[
+        Path | None,
+        typer.Option(help="Write the run as one file that plays anywhere, and end."),
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End by itself after that.")] = None,
+) -> None:
+    """Show vehicles in the browser, in three dimensions: a run that is played, or a live flight that is
+    listened to; nothing is sent there."""
+    from outrider.viewing.command import Terms
+    from outrider.viewing.command import view as viewing
+
+    raise typer.Exit(viewing(sources, Terms(host, port, target, html, seconds)))
+
+
+def replay(
+    log: Annotated[
+        Path,
+        typer.Argument(metavar="LOG", help="A tlog, or what a flight left: logs and configuration.yaml."),
+    ],
+    listing: Annotated[
+        bool, typer.Option("--list", help="Show who is in the log, and what is damaged.")
+    ] = False,
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Check from the plans on the wire that all kept apart.")
+    ] = False,
+    own: Annotated[int | None, typer.Option(min=1, max=255, help="The own vehicle's system id.")] = None,
+    neighbours: Annotated[str | None, typer.Option(help="Their system ids, with commas.")] = None,
+    target: Annotated[int | None, typer.Option(min=1, max=255, help="The target's system id.")] = None,
+    like: Annotated[str, typer.Option(help="Scenario whose companions' settings count.")] = "escort",
+    speed: Annotated[float | None, typer.Option(min=0.01, max=1000.0, help="Times the log's own.")] = None,
+    to: Annotated[str | None, typer.Option(help="Endpoint for the log's telemetry; no commands.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Directory; new or empty.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Replay a log: what would a companion have sent (--own), or a vehicle of ours around what is recorded
+    (--target)? Or a flight of ours: does each companion, given what it received, send what it sent? Ends with
+    1 if not, or if there are findings."""
+    if listing and certify:
+        raise InputError(f"replay {log}: both at once; allowed: one of --list, --certify")
+    others = {"own": own, "neighbours": neighbours, "target": target, "speed": speed, "to": to, "out": out}
+    for name in [name for name, value in others.items() if value is not None] if listing or certify else ():
+        raise InputError(f"replay {log}: --{name} does not go with {'--list' if listing else '--certify'}")
+    if listing:
+        from outrider.logs.listing import listing as naming
+
+        raise typer.Exit(naming(log, as_json))
+    if certify:
+        from outrider.certify.command import certify as certifying
+
+        raise typer.Exit(certifying(log, as_json))
+    from outrider.replaying.request import Request
+
+    request = Request(log, own, neighbours, target, like, speed, to, out, as_json)
+    raise typer.Exit(request.run())
+
+
+def export(
+    source: Annotated[Path, typer.Argument(help="What a flight left, or a tlog.", metavar="RUN_DIR|LOG")],
+    form: Annotated[str, typer.Option("--format", help="mcap, csv, parquet or ulog.")],
+    out: Annotated[Path | None, typer.Option(help="File (mcap) or directory; new.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Turn a run or a log into files for Foxglove, PlotJuggler, tables or PX4's tools."""
+    from outrider.exports.command import export as exporting
+
+    exporting(source, form, out, as_json)
+
+
+def report(
+    run_dir: Annotated[Path, typer.Argument(help="What a flight left.")],
+    out: Annotated[Path | None, typer.Option(help="The page; RUN_DIR/report.html if not said.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make one HTML page of a run: summary, replay, charts, events and message loss. It needs no network."""
+    from outrider.report.command import report as reporting
+
+    raise typer.Exit(reporting(run_dir, out, as_json))

@@ -1,0 +1,21 @@
+"""What several commands take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+METHODS: Final = "baseline, swivel, approach_angle, tangential; joined by +."
+SENSORS: Final = "truth, rtk or gnss."
+PHYSICS: Final = "own or jsbsim."
+
+AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
+Begun = Annotated[Path | None, typer.Option(help="Directory; one begun is gone on with.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores.")]
+RunDirectory = Annotated[Path | None, typer.Option(help="Run directory; new or empty.")]
+SigningKey = Annotated[
+    Path | None, typer.Option(help="Only what is signed with it counts; see outrider key.")
+]
+Wind = Annotated[str | None, typer.Option(help="m/s towards east, or EAST,NORTH[,UP].")]
