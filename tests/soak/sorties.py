@@ -20,21 +20,18 @@ import numpy as np
 from air_nodes import EPOCH, RADIUS, SECOND
 from airfield import CONFIG, Airfield, Craft
 from mishaps import MISHAPS, NO_PLAN, OLD, UNHEARD, Mishap, Scene
+from setpoint_laws import SetpointLaws
 
 from companion.guard import Holding
 from companion.pilot import OPERATORS_GO, STEERED, Phase
-from companion.tracks import State
 from mavlink_bridge.messages import SetpointLocal
 
 LOOK = 100_000
 D_MIN = 0.5
-SINGLE = 1e-4
 LEG, REST = 200.0, 60.0
 """s: so long mishaps begin, and so long nothing happens; at the end of each rest all is well."""
 EVERY = 5.0
 """s between two mishaps, on average."""
-_CORRECTED = 0.3
-"""m by which a set-point may step where the plan begins anew at the measured state."""
 _DOWN = 90.0
 _SPOKEN = 20.0
 """s in which what is a concern has been said, however much there is to say: one text a second."""
@@ -48,15 +45,6 @@ class Row(NamedTuple):
     texts: frozenset[str]
     braking: bool
     place: np.ndarray
-
-
-class Sent(NamedTuple):
-    """A set-point at ``now`` to the place ``here`` (3,) m, fleet-local ENU, in the plan of ``anchor``."""
-
-    now: int
-    here: np.ndarray
-    anchor: tuple[int, object]
-    message: SetpointLocal
 
 
 class Promise(NamedTuple):
@@ -110,8 +98,7 @@ class Sorties:
     ) -> None:
         self.seed, self.seconds = seed, seconds
         self._progress = progress
-        self._setpoints: dict[int, Sent] = {}
-        self.sent: Counter[int] = Counter()
+        self._laws = SetpointLaws(self._must)
         self.field = Airfield(count, seed, self._take)
         self._by_system = {craft.system: craft for craft in self.field.crafts}
         self._plan = deque(planned(seed, first, seconds))
@@ -139,43 +126,20 @@ class Sorties:
     def fingerprint(self) -> tuple[Any, ...]:
         """The same for the same seed."""
         places = tuple(tuple(craft.place.tolist()) for craft in self.field.crafts)
-        return places, tuple(sorted(self.sent.items())), tuple(sorted(self.concerns.items())), self.texts
+        return (
+            places,
+            tuple(sorted(self._laws.sent.items())),
+            tuple(sorted(self.concerns.items())),
+            self.texts,
+        )
 
-    # What is sent
+    @property
+    def sent(self) -> Counter[int]:
+        """Set-points of each."""
+        return self._laws.sent
 
     def _take(self, system: int, now: int, message: SetpointLocal) -> None:
-        craft, limits = self._by_system[system], CONFIG.limits
-        pilot, guard = craft.companion.pilot, craft.companion.guard
-        self.sent[system] += 1
-        self._must(craft, pilot.vehicle.alive and pilot.streaming, "no set-point but to who follows them")
-        self._must(craft, pilot.phase is not Phase.YIELDED, "nothing for who was taken over")
-        numbers = (*message.position, *message.velocity, *message.acceleration, message.yaw, message.yaw_rate)
-        self._must(craft, all(map(math.isfinite, numbers)), f"finite: {message}")
-        self._must(craft, math.hypot(*message.acceleration) <= limits.a_total + SINGLE, f"a_total: {message}")
-        # A limit of the state gives way to those of the acceleration: what pushes may be stronger than u_max.
-        fastest = math.hypot(*limits.v_max)
-        self._must(craft, math.hypot(*message.velocity) <= fastest + SINGLE, f"v_max: {message}")
-        view = craft.companion.world.at(now)
-        if view.own is None or view.local is None:
-            raise BrokenLawError(f"seed {self.seed}: a set-point without a place")
-        here = view.local.position_to_fleet(message.position)
-        if view.own.age <= 100_000 and not self._has_jumped(craft, now, view.own):
-            off = float(np.linalg.norm(here - view.own.position))
-            self._must(craft, off <= CONFIG.guard.tube + 0.5, f"{off:.2f} m from the vehicle: {message}")
-        before, anchor = self._setpoints.get(system), (guard.anchored_anew, view.local)
-        if before is not None and now - before.now <= 100_000 and before.anchor == anchor:
-            step, dt = float(np.linalg.norm(here - before.here)), 1e-6 * (now - before.now)
-            self._must(craft, step <= fastest * dt + _CORRECTED, f"a jump of {step:.2f} m: {message}")
-        self._setpoints[system] = Sent(now, here, anchor, message)
-
-    def _has_jumped(self, craft: Craft, now: int, own: State) -> bool:
-        """Whether it was believed elsewhere when the plan was made: an estimate jumps when GPS is back."""
-        then, place, jumped = craft.marks.get("believed", (now, own.position, 0))
-        reach = 1.0 + 1e-6 * (now - then) * math.hypot(*CONFIG.limits.v_max)
-        if float(np.linalg.norm(own.position - place)) > reach:
-            jumped = now
-        craft.marks["believed"] = now, own.position, jumped
-        return now - jumped <= 2 * CONFIG.rates.replan_us
+        self._laws.take(self._by_system[system], now, message)
 
     # What is seen
 
@@ -318,7 +282,7 @@ class Sorties:
         """The set-points are at rest, or there are none."""
         if not self._steady(craft, text, seconds - 0.1) or not craft.companion.pilot.guided:
             return None
-        last = self._setpoints.get(craft.system)
+        last = self._laws.last.get(craft.system)
         if last is None or self.field.loop.now - last.now > 200_000:
             return True
         return math.hypot(*last.message.velocity) < 0.1
