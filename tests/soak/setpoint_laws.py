@@ -46,7 +46,8 @@ class SetpointLaws:
         self._must(craft, pilot.phase is not Phase.YIELDED, "nothing for who was taken over")
         numbers = (*message.position, *message.velocity, *message.acceleration, message.yaw, message.yaw_rate)
         self._must(craft, all(map(math.isfinite, numbers)), f"finite: {message}")
-        self._must(craft, math.hypot(*message.acceleration) <= limits.a_total + _SINGLE, f"a_total: {message}")
+        most = limits.a_total + _SINGLE
+        self._must(craft, math.hypot(*message.acceleration) <= most, f"a_total: {message}")
         # A limit of the state gives way to those of the acceleration: what pushes may be stronger than u_max.
         fastest = math.hypot(*limits.v_max)
         self._must(craft, math.hypot(*message.velocity) <= fastest + _SINGLE, f"v_max: {message}")

@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from outrider.conductor import Stage
+from outrider.progress_lines import ProgressLines
 from outrider.share_progress import share_progress as share_progress
 from outrider.summary import Value
 
@@ -50,8 +51,8 @@ _WORDS = {
 
 @contextmanager
 def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
-    """A bar for one flight; the callable takes stage and simulated seconds. Quiet when there is no
-    terminal. Without a thread of its own: a flight in real time forks while the bar stands."""
+    """A bar for one flight, or a line now and then when there is no terminal; the callable takes stage and
+    simulated seconds. Without a thread of its own: a flight in real time forks while the bar stands."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -63,11 +64,15 @@ def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
     with Progress(*columns, console=console, transient=True, disable=off, auto_refresh=False) as bar:
         task = bar.add_task(Stage.PREPARE.value, total=duration_s, seconds=0.0)
         shown = 0.0
+        lines = ProgressLines()
 
         def watch(stage: Stage, seconds: float) -> None:
             nonlocal shown
             now = time.monotonic()
-            if off or now - shown < _REFRESH_S:
+            if off:
+                lines.say(f"{stage.value}: {seconds:.1f} s simulated")
+                return
+            if now - shown < _REFRESH_S:
                 return
             shown = now
             done = min(seconds, duration_s) if stage is not Stage.PREPARE else 0.0

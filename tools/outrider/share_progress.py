@@ -1,4 +1,4 @@
-"""A bar on standard error for what is no flight."""
+"""A bar on standard error for what is no flight; without a terminal a line now and then."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from outrider.progress_lines import ProgressLines
+
 
 @contextmanager
 def share_progress() -> Iterator[Callable[[str, float], None]]:
@@ -16,8 +18,11 @@ def share_progress() -> Iterator[Callable[[str, float], None]]:
     columns = (TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=1.0)
+        lines = ProgressLines()
 
         def watch(what: str, share: float) -> None:
             bar.update(task, description=what, completed=share)
+            if not console.is_terminal:
+                lines.say(f"{what}: {100.0 * share:.0f} %")
 
         yield watch

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,10 +9,9 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
+from outrider.progress_lines import ProgressLines
 from outrider.sweeps.runs import Ending, run_of
 from outrider.sweeps.tasks import Entry
-
-LINE_S = 20.0
 
 
 class Watch:
@@ -22,7 +20,8 @@ class Watch:
     def __init__(self, total: int, finished: int, bar: Progress | None) -> None:
         self._total, self._before, self._left = total, finished, total - finished
         self._bar = bar
-        self._began = self._said = time.monotonic()
+        self._began = time.monotonic()
+        self._lines = ProgressLines()
         self._ended = 0
         self._count = dict.fromkeys(Ending, 0)
         self._task = None if bar is None else bar.add_task("", total=total, completed=finished, words="")
@@ -42,10 +41,8 @@ class Watch:
         """Time has passed."""
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self._before + self._ended, words=self._words())
-        elif time.monotonic() - self._said >= LINE_S:
-            self._said = time.monotonic()
-            sys.stderr.write(f"{self._before + self._ended}/{self._total} runs, {self._words()}\n")
-            sys.stderr.flush()
+        else:
+            self._lines.say(f"{self._before + self._ended}/{self._total} runs, {self._words()}")
 
     def _words(self) -> str:
         elapsed = time.monotonic() - self._began
