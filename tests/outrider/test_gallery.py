@@ -14,7 +14,8 @@ from outrider.gallery.page import page
 from outrider.gallery.showings import WAYS, cells_of, chosen, scenarios, showings
 from outrider.resources import config_root
 from outrider.sweeps.cells import scenario_of, task
-from outrider.sweeps.runs import Ending, Run
+from outrider.sweeps.runs import Ending, Run, run_of
+from outrider.sweeps.tasks import Entry
 
 
 def test_every_scenario_is_flown_in_every_way() -> None:
@@ -102,3 +103,10 @@ def test_a_scene_has_what_the_picture_needs() -> None:
     assert len(scene["position"][0]) == flown.size
     assert scene["vehicles"] == flown.vehicles == 1
     assert abs(min(scene["separation"]) - summary["min_separation_m"]) < 0.01
+
+
+@pytest.mark.parametrize(("separation", "whose"), [(0.4, ""), (0.6, " (target or obstacle)")])
+def test_whose_violation_it_was(separation: float, whose: str) -> None:
+    summary = {"converged": True, "convergence_time_s": 7.0, "min_separation_m": separation, "d_min_m": 0.5}
+    run = run_of(Entry("key", 1, "done", None, summary | {"d_min_violations": 1}, 0.0))
+    assert outcome(run) == f"7.0 s, least {separation:.2f} m, 1 violation{whose}"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from outrider.aboard.fly_config import FlyConfig
 from outrider.errors import Fault, InputError
 from outrider.scenario import Scenario
 from outrider.yaml_file import load
@@ -27,4 +28,27 @@ def resolved(directory: Path, allowed: str) -> Resolved:
     if not directory.is_dir():
         wrong = "not a directory" if directory.exists() else "no such directory"
         raise InputError(Fault(str(directory), f"{wrong}; {allowed}"))
-    return load(directory / CONFIGURATION, Resolved)
+    return configured(directory)
+
+
+def configured(directory: Path) -> Resolved:
+    """The same where ``directory`` and its file are known to be there. What ``outrider fly`` left knows of no
+    scenario: then InputError names the logs, which can be used."""
+    path = directory / CONFIGURATION
+    try:
+        return load(path, Resolved)
+    except InputError:
+        if not _is_of_one_companion(path):
+            raise
+    logs = " or ".join(str(log) for log in sorted(directory.glob("vehicle-*.tlog"))) or "a log"
+    raise InputError(
+        Fault(str(directory), f"what outrider fly left is no flight of a scenario; allowed: {logs}")
+    )
+
+
+def _is_of_one_companion(path: Path) -> bool:
+    try:
+        load(path, FlyConfig)
+    except InputError:
+        return False
+    return True

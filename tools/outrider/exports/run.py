@@ -10,9 +10,8 @@ from outrider import names
 from outrider.errors import Fault, InputError
 from outrider.exports.arrays import Motion, Plans, read_motion, read_plans
 from outrider.exports.log import Log
-from outrider.resolved import CONFIGURATION, Resolved
+from outrider.resolved import CONFIGURATION, configured
 from outrider.scenario import Scenario
-from outrider.yaml_file import load
 
 FLIGHT, PLANS, PLAN_TIMES = "flight.npz", "plans.npz", "plan_times.npz"
 ALLOWED: Final = "allowed: a directory that outrider swarm left, or a tlog"
@@ -52,7 +51,7 @@ def _bare(path: Path) -> Run:
 def _run(directory: Path) -> Run:
     if not (directory / CONFIGURATION).is_file():
         raise InputError(Fault(str(directory), f"not a run directory: no {CONFIGURATION} in it; {ALLOWED}"))
-    resolved = load(directory / CONFIGURATION, Resolved)
+    resolved = configured(directory)
     scenario = resolved.scenario
     motion = read_motion(directory / FLIGHT, len(scenario.systems), len(scenario.moving))
     gradients = plan_times = None

@@ -55,8 +55,14 @@ def outcome(run: Run) -> str:
     if run.separation is not None:
         words.append(f"least {run.separation:.2f} m")
     if run.violations:
-        words.append(f"{run.violations} violation{'s' * (run.violations > 1)}")
+        words.append(f"{run.violations} violation{'s' * (run.violations > 1)}{_elsewhere(run)}")
     return ", ".join(words) or "flown"
+
+
+def _elsewhere(run: Run) -> str:
+    """Of what a violation was, where it was none of two vehicles."""
+    apart = run.separation is not None and run.d_min is not None and run.separation >= run.d_min
+    return " (target or obstacle)" if apart else ""
 
 
 def _paths(axes: Axes, scene: Mapping[str, Any]) -> None:
