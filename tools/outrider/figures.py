@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _TARGET = "0.25"
 _LIMIT = "#b00020"
+_NAMED = 24
+"""Vehicles; the names of more would cover the picture."""
 
 
 def draw(flight: Outcome, summary: dict[str, Value], path: Path) -> None:
@@ -58,8 +60,10 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
     place."""
     from matplotlib.patches import Circle
 
+    few = len(flight.systems) <= _NAMED
     for k, system in enumerate(flight.systems):
-        (line,) = axes.plot(samples.position[:, k, 0], samples.position[:, k, 1], lw=1.0, label=f"{system}")
+        name = f"{system}" if few else "_nolegend_"
+        (line,) = axes.plot(samples.position[:, k, 0], samples.position[:, k, 1], lw=1.0, label=name)
         axes.plot(*samples.position[0, k, :2], "o", ms=4, mfc="none", color=line.get_color())
         axes.plot(*samples.position[-1, k, :2], "o", ms=5, color=line.get_color())
     for obstacle in flight.scenario.obstacles:
@@ -79,7 +83,8 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
     axes.set(title="paths from above (o start, ● end)", xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
-    axes.legend(loc="upper right", fontsize=8, ncols=2)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="upper right", fontsize=8, ncols=2)
 
 
 def _separation(axes: Axes, flight: Outcome, samples: Samples, time: np.ndarray) -> None:

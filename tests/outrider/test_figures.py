@@ -1,0 +1,51 @@
+"""The picture of a run, of however many vehicles: a warning of the library that draws is an error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from PIL import Image
+from shipped import scenario
+
+from outrider.figures import draw
+from outrider.outcome import Outcome
+from outrider.truth import Samples
+
+
+def circling(vehicles: int, count: int = 60) -> Samples:
+    """Each a bit further round a circle of 20 m, a sample every 20 ms."""
+    time = np.arange(count, dtype=np.int64) * 20_000
+    angle = np.linspace(0.0, 2.0 * np.pi, vehicles, endpoint=False) + 1e-6 * time[:, None]
+    place = np.stack([20.0 * np.cos(angle), 20.0 * np.sin(angle), np.full_like(angle, 5.0)], axis=2)
+    flat, still = np.zeros((count, vehicles)), np.empty((count, 0, 3))
+    target, apart = np.zeros((count, 3)), np.full(count, 4.0)
+    return Samples(time, place, place, place, place, place, flat, flat, target, apart, still)
+
+
+@pytest.mark.parametrize("vehicles", [1, 8, 24, 25, 200])
+def test_every_number_of_vehicles_has_a_picture(vehicles: int, tmp_path: Path) -> None:
+    flown = scenario("antipodal", vehicles=max(vehicles, 2))
+    samples = circling(vehicles)
+    flight: Any = SimpleNamespace(
+        truth=SimpleNamespace(samples=lambda: samples),
+        scenario=flown,
+        systems=tuple(range(11, 11 + vehicles)),
+        target_system=10,
+        starts=SimpleNamespace(goals=None),
+        seed=1,
+        span=0.63,
+        clock_start=200_000,
+        clock_end=1_000_000,
+        plan_logs=[],
+        tallies=[],
+    )
+    said = {"avoidance": "field", "method": "tangential", "converged": None}
+    said |= {"min_separation_m": 4.0, "d_min_violations": 0}
+    draw(cast("Outcome", flight), said, tmp_path / "flight.png")
+    with Image.open(tmp_path / "flight.png") as picture:
+        paper = np.asarray(picture.convert("L"))
+    assert (paper < 250).mean() > 0.02
