@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import sys
 from contextlib import ExitStack
@@ -39,7 +40,7 @@ def swarm(
     """Fly a scenario, in lock-step unless told otherwise, and leave logs, summary and picture in a run
     directory."""
     from outrider import swarm as flying
-    from outrider.console import progress, show
+    from outrider.console import progress, share_progress, show
     from outrider.report.command import NAME, make, write
     from outrider.summary import exit_status
 
@@ -57,7 +58,11 @@ def swarm(
         with progress(prepared.scenario.duration_s) as watch:
             pace = flying.Pace(real_time or realtime, realtime)
             summary = flying.fly(prepared, seed, directory, watch, pace, shown)
-        write(directory / NAME, make(directory).text)
+        # What many vehicles leave behind is a gigabyte, and their logs are read next.
+        gc.collect()
+        with share_progress() as reading:
+            made = make(directory, reading)
+        write(directory / NAME, made.text)
         if as_json:
             sys.stdout.write(json.dumps(summary) + "\n")
             sys.stdout.flush()

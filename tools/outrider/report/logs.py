@@ -57,7 +57,8 @@ class _Growing:
         self._mark.append(hash(frame))
 
     def stream(self) -> Stream:
-        return Stream(_whole(self._time), _whole(self._sequence), _whole(self._mark))
+        sequence = np.array(self._sequence, dtype=np.uint8)
+        return Stream(_whole(self._time), sequence, _whole(self._mark))
 
 
 def _whole(values: Iterable[int]) -> Times:

@@ -9,6 +9,7 @@ tell, from the first message that arrived to the last.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +65,7 @@ def losses(logs: tuple[Log, ...], offsets: dict[int, float]) -> Losses:
     """Of every sender that somebody heard or that has a log, to every log. ``offsets``: of the logs' clocks
     by owner, s (``clocks.offset``)."""
     own = {log.owner: log for log in logs}
-    ways, told, missed = [], [], []
+    ways, seconds = [], _Seconds()
     for log in logs:
         goal = log.begin - 1e6 * min(0.0, offsets.get(log.owner, 0.0))
         senders = {*log.heard} | {Sender(owner, 0) for owner in own if owner != log.owner}
@@ -72,26 +73,40 @@ def losses(logs: tuple[Log, ...], offsets: dict[int, float]) -> Losses:
             streams = [stream for sender, stream in log.heard.items() if sender.system == system]
             if system in own:
                 way, when, lost = _exact(own[system], log, streams, goal)
-                told.append(when * 1e-6 + offsets.get(system, 0.0))
-                missed.append(told[-1][lost])
+                seconds.add(when * 1e-6 + offsets.get(system, 0.0), lost)
             else:
                 way = _by_numbers(system, log.owner, streams, goal)
             if way.sent:
                 ways.append(way)
     ways.sort(key=lambda way: (way.sender, way.receiver))
-    return Losses(tuple(ways), *_by_second(told, missed))
+    return Losses(tuple(ways), *seconds.shares())
 
 
-def _by_second(told: list[Array], missed: list[Array]) -> tuple[int, Array]:
-    everything = np.concatenate([np.empty(0), *told])
-    everything = everything[np.abs(everything) < _LONGEST]
-    if not len(everything):
-        return 0, np.empty(0)
-    since = int(np.floor(everything.min()))
-    edges = np.arange(since, np.floor(everything.max()) + 2.0)
-    sent = np.histogram(everything, edges)[0]
-    lost = np.histogram(np.concatenate(missed), edges)[0]
-    return since, np.where(sent > 0, lost / np.maximum(sent, 1), np.nan)
+class _Seconds:
+    """Messages sent and lost in each second, way by way: of two hundred vehicles there are forty million."""
+
+    def __init__(self) -> None:
+        self._sent: Counter[int] = Counter()
+        self._lost: Counter[int] = Counter()
+
+    def add(self, told: Array, lost: NDArray[np.bool_]) -> None:
+        """When (n,) messages were told, s on the flight's clock, and whether (n,) they were lost."""
+        sane = np.abs(told) < _LONGEST
+        for counter, times in ((self._sent, told[sane]), (self._lost, told[sane & lost])):
+            seconds, counts = np.unique(np.floor(times).astype(np.int64), return_counts=True)
+            for second, count in zip(seconds.tolist(), counts.tolist(), strict=True):
+                counter[second] += count
+
+    def shares(self) -> tuple[int, Array]:
+        """The first second, and the share lost in each from there on."""
+        if not self._sent:
+            return 0, np.empty(0)
+        first, last = min(self._sent), max(self._sent)
+        sent, lost = (
+            np.array([counter[second] for second in range(first, last + 1)])
+            for counter in (self._sent, self._lost)
+        )
+        return first, np.where(sent > 0, lost / np.maximum(sent, 1), np.nan)
 
 
 def _exact(
@@ -139,7 +154,8 @@ def unwrapped(stream: Stream) -> Times:
     usual rate says."""
     if not len(stream.time):
         return np.empty(0, dtype=np.int64)
-    steps = np.diff(stream.sequence)
+    numbers: Times = stream.sequence.astype(np.int64)
+    steps = np.diff(numbers)
     steps = (steps + MODULO // 2) % MODULO - MODULO // 2
     waits = np.diff(stream.time) * 1e-6
     often = (waits >= 0.0) & (waits < _PAUSE)
@@ -152,9 +168,10 @@ def unwrapped(stream: Stream) -> Times:
 
 
 def _joined(streams: list[Stream]) -> Stream:
-    empty = np.empty(0, dtype=np.int64)
-    columns = zip(*streams, strict=True) if streams else ((empty,),) * 3
-    return Stream(*(np.concatenate(column) for column in columns))
+    if not streams:
+        nothing = np.empty(0, dtype=np.int64)
+        return Stream(nothing, nothing.astype(np.uint8), nothing)
+    return Stream(*(np.concatenate(column) for column in zip(*streams, strict=True)))
 
 
 def _silences(

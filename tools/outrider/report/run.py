@@ -14,6 +14,7 @@ from outrider.scenario import Scenario
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
+Numbers = NDArray[np.uint8]
 Said = Heartbeat | CommandAck | StatusText
 
 
@@ -75,7 +76,7 @@ class Stream(NamedTuple):
     """
 
     time: Times
-    sequence: Times
+    sequence: Numbers
     mark: Times
 
 
