@@ -72,10 +72,11 @@ class Earshot:
         ids: Sequence[int],
         states: Array,
         ages: Ages,
-        familiar: Callable[[int], bool],
+        familiar: Callable[[], NDArray[np.bool_]],
     ) -> None:
         """Find out whom to ignore from ``now`` on. ``states`` (M, 6) are the others' last positions and
-        velocities, fleet-local ENU, ``ages`` (M,) µs; ``familiar`` tells whose word counts."""
+        velocities, fleet-local ENU, ``ages`` (M,) µs; ``familiar`` tells whose word (M,)
+        counts."""
         self._until.clear()
         if self._all or own is None or own.age > self._config.guard.own_stale_us or not len(states):
             return
@@ -89,10 +90,12 @@ class Earshot:
         spare = apart - self._certainly - self._fastest * (age + 1e-6 * max(own.age, 0)) - _OFF_PLAN
         silence = np.minimum(spare / self._closing - self._silence, self._longest - age)
         silence[_norm(states[:, 3:6]) > self._fastest] = 0.0
+        silent = silence > 0.0
+        if not silent.any():
+            return
         until = self.now + (1e6 * silence).astype(np.int64)
-        for row in np.flatnonzero(silence > 0.0).tolist():
-            if familiar(ids[row]):
-                self._until[ids[row]] = int(until[row])
+        for row in np.flatnonzero(silent & familiar()).tolist():
+            self._until[ids[row]] = int(until[row])
 
     def near(self, places: Array, states: Array, ages: Ages) -> NDArray[np.bool_]:
         """Which (M,) of the others can act on a plan that is made at one of ``places`` (P, 3) now: all whose

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from companion.horizon import Horizon
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.horizon import Array, Located
 from companion.tracks import Track
 
 _STEADY = 3_000_000
@@ -20,32 +23,31 @@ _BESIDE = 1.0
 """m by which the plan may pass beside it."""
 
 
-class _Steady(NamedTuple):
+class _Story(NamedTuple):
     track: Track
     refused: int
-    since: int
 
 
 class Familiars:
-    """Those of one companion, by system id."""
+    """Those of one companion, row by row as it keeps their last states."""
 
     def __init__(self) -> None:
-        self._steady: dict[int, _Steady] = {}
+        self._stories: list[_Story] = []
+        self._since = np.zeros(0, dtype=np.int64)
 
-    def trusts(self, now: int, system: int, track: Track, plan: Horizon) -> bool:
-        """Whether ``system``, of this ``track`` and latest ``plan``, is one of them at ``now`` (µs); to be
-        asked several times a second as long as that matters."""
-        last = self._steady.get(system)
-        if last is None or last.track is not track or last.refused != track.refused or track.doubted:
-            self._steady[system] = _Steady(track, track.refused, now)
-            return False
-        return now - last.since >= _STEADY and _agree(track, plan)
+    def note(self, now: int, row: int, track: Track) -> None:
+        """The vehicle of ``row``, which is one of those there are or the next, was heard at ``now`` (µs)."""
+        if row == len(self._stories):
+            self._stories.append(_Story(track, -1))
+            self._since = np.append(self._since, now)
+        last, refused = self._stories[row], track.refused
+        if last.track is not track or last.refused != refused or track.doubted:
+            self._stories[row] = _Story(track, refused)
+            self._since[row] = now
 
-
-def _agree(track: Track, plan: Horizon) -> bool:
-    """Whether the last state lies on the plan."""
-    time = track.time
-    if time is None or not -plan.dt <= time - plan.epoch <= _FRESH:
-        return False
-    off = plan.at(time).position - track.last[0:3]
-    return bool(off @ off <= _BESIDE**2)
+    def trusted(self, now: int, states: Array, plans: Located) -> NDArray[np.bool_]:
+        """Which of them are (M,) at ``now`` (µs). ``states`` (M, 6): their last; ``plans``: where each one's
+        plan was when that was true."""
+        off = plans.positions - states[:, 0:3]
+        there = (plans.after >= -plans.dt) & (plans.after <= _FRESH) & (np.vecdot(off, off) <= _BESIDE**2)
+        return np.asarray(there & (now - self._since >= _STEADY))

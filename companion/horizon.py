@@ -67,6 +67,7 @@ class Horizon(NamedTuple):
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
 _COUNT = np.arange(64)
+_NEVER = 1 << 62
 
 
 def roll_out(epoch: int, dt: int, position: Array, velocity: Array, accelerations: Array) -> Horizon:
@@ -79,6 +80,15 @@ def roll_out(epoch: int, dt: int, position: Array, velocity: Array, acceleration
     knots[1:, 3:6] = S_v @ accelerations + velocity
     knots[:n, 6:9] = accelerations
     return Horizon(epoch, dt, knots)
+
+
+class Located(NamedTuple):
+    """Where each of M plans is at a time of its own: ``positions`` (M, 3) m; ``after`` (M,): how long after
+    its epoch that is, µs, and more than any plan's age where there is none; ``dt`` (M,): its step, µs."""
+
+    positions: Array
+    after: NDArray[np.int64]
+    dt: NDArray[np.int64]
 
 
 class HorizonTable:
@@ -108,10 +118,6 @@ class HorizonTable:
             self._latest[sender] = horizon
             self._fresh.add(sender)
 
-    def latest(self, sender: int) -> Horizon | None:
-        """The latest that is known."""
-        return self._latest.get(sender)
-
     def _put_down(self) -> None:
         """The fresh ones, row by row."""
         new = [sender for sender in self._fresh if sender not in self._rows]
@@ -138,14 +144,33 @@ class HorizonTable:
     def positions(self, senders: Sequence[int], start: int, oldest: int) -> tuple[Array, NDArray[np.bool_]]:
         """Positions (M, steps, 3) of ``senders`` at ``start + n·dt``, and which of them are not made before
         ``oldest`` (µs); the rows of the others mean nothing."""
-        if self._fresh:
-            self._put_down()
+        rows = self._rows_of(senders)
         if not self._rows:
             return np.zeros((len(senders), self._steps, 3)), np.zeros(len(senders), dtype=np.bool_)
-        rows = np.array([self._rows.get(sender, -1) for sender in senders])
-        epochs, dts = self._epochs[rows], self._dts[rows][:, None]
+        epochs = self._epochs[rows]
         known: NDArray[np.bool_] = (rows >= 0) & (epochs >= oldest)
-        elapsed = (start - epochs)[:, None] + self._ahead
+        return self._sampled(rows, (start - epochs)[:, None] + self._ahead), known
+
+    def at(self, senders: Sequence[int], times: NDArray[np.int64]) -> Located:
+        """Where each of ``senders`` (M,) is by its plan at its own one of ``times`` (M,), µs."""
+        rows = self._rows_of(senders)
+        if not self._rows:
+            none = np.full(len(senders), _NEVER)
+            return Located(np.zeros((len(senders), 3)), none, np.zeros_like(none))
+        after = times - self._epochs[rows]
+        positions = self._sampled(rows, after[:, None])[:, 0]
+        return Located(positions, np.where(rows >= 0, after, _NEVER), self._dts[rows])
+
+    def _rows_of(self, senders: Sequence[int]) -> NDArray[np.int64]:
+        """−1 for those without a horizon."""
+        if self._fresh:
+            self._put_down()
+        return np.array([self._rows.get(sender, -1) for sender in senders], dtype=np.int64)
+
+    def _sampled(self, rows: NDArray[np.int64], elapsed: NDArray[np.int64]) -> Array:
+        """Positions (M, n, 3) of ``rows`` (M,) when so much time (M, n), µs, has ``elapsed`` since their
+        epochs."""
+        dts = self._dts[rows][:, None]
         index = elapsed // dts
         np.maximum(index, 0, out=index)
         np.minimum(index, self._lasts[rows][:, None], out=index)
@@ -158,4 +183,4 @@ class HorizonTable:
         result += chosen[:, :, 3:6]
         result *= s
         result += chosen[:, :, 0:3]
-        return result, known
+        return result

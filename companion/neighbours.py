@@ -11,6 +11,7 @@ from functools import lru_cache
 from itertools import compress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.config import CompanionConfig
 from companion.earshot import Earshot
@@ -122,6 +123,7 @@ class Neighbours:
             self._times = np.append(self._times, now)
         self._tracks[system], self._by_autopilot[system] = track, by_autopilot
         self._fresh.add(system)
+        self._familiars.note(now, self._rows[system], track)
 
     def hear_plan(self, now: int, message: Tunnel) -> None:
         """A neighbour's horizon in a TUNNEL. One in another fleet frame, from the future or from long ago is
@@ -153,7 +155,7 @@ class Neighbours:
     def listen(self, now: int, own: State | None) -> None:
         """Find out whom to ignore for a while, the ``own`` state being what it is at ``now`` (µs)."""
         self._put_down()
-        self.earshot.look(own, self._ids, self._states, now - self._times, self._is_familiar)
+        self.earshot.look(own, self._ids, self._states, now - self._times, self._familiar)
 
     def ignores(self, system: int, component: int) -> bool:
         """Whether what this sender says of where it is and will be need not be decoded now."""
@@ -164,12 +166,14 @@ class Neighbours:
             self._spoken[system] = self.earshot.now
         return True
 
-    def _is_familiar(self, system: int) -> bool:
-        """Whether its word counts for a while, as of vehicles that fly by plans and limits like ours."""
-        plan = self._table.latest(system)
-        if plan is None or system in self._things:
-            return False
-        return self._familiars.trusts(self.earshot.now, system, self._tracks[system], plan)
+    def _familiar(self) -> NDArray[np.bool_]:
+        """Whose word counts for a while, as of vehicles that fly by plans and limits like ours."""
+        plans = self._table.at(self._ids, self._times)
+        trusted = self._familiars.trusted(self.earshot.now, self._states, plans)
+        for system in self._things:
+            if system in self._rows:
+                trusted[self._rows[system]] = False
+        return trusted
 
     def obstacles(self, now: int, places: Array | None = None) -> Obstacles:
         """All neighbours aligned with ``now + n·dt``, n = 0…N; only those that may act on a plan that begins
