@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +14,21 @@ from hypothesis import strategies as st
 from report_runs import Lost, leave
 
 from outrider.report import clocks
-from outrider.report.loss import Losses, Way, losses, unwrapped
+from outrider.report.loss import Ledger, Losses, Way, unwrapped
 from outrider.report.reading import read
-from outrider.report.run import Run, Stream
+from outrider.report.run import Log, Run, Stream
 
 
 def judged(run: Run) -> Losses:
+    return in_order(run, run.logs)
+
+
+def in_order(run: Run, logs: Iterable[Log]) -> Losses:
     assert run.motions is not None
-    return losses(run.logs, {log.owner: clocks.offset(log, run.motions) for log in run.logs})
+    ledger = Ledger()
+    for log in logs:
+        ledger.take(log, clocks.offset(log, run.motions))
+    return ledger.close()
 
 
 def ways(run: Run) -> dict[tuple[int, int], Way]:
@@ -36,6 +45,17 @@ def counted(lost: Lost, messages: int = 130) -> Counter[tuple[int, int]]:
     told = [2 * n for n in range(messages)] + [2 * n + 1 for n in range(0, messages, 10)]
     pairs = [(a, b) for a in (11, 12, 13) for b in (11, 12, 13) if a != b]
     return Counter({(a, b): sum(lost(a, b, n) for n in told) for a, b in pairs})
+
+
+def test_whichever_log_comes_first(tmp_path: Path) -> None:
+    run = read(leave(tmp_path, lost=some).directory)
+    first = judged(run)
+    assert first.share
+    for logs in permutations(run.logs):
+        found = in_order(run, logs)
+        assert found.ways == first.ways
+        assert found.since == first.since
+        np.testing.assert_array_equal(found.by_second, first.by_second)
 
 
 def test_the_matrix_is_what_was_lost(tmp_path: Path) -> None:

@@ -16,11 +16,11 @@ from outrider.report.charts import charts, histogram
 from outrider.report.distances import encounters
 from outrider.report.events import Event, events
 from outrider.report.headline import Headline, headline
-from outrider.report.loss import Losses, losses
+from outrider.report.loss import Ledger, Losses
 from outrider.report.page import MARK, page
 from outrider.report.reading import Watch, read
 from outrider.report.replay import document
-from outrider.report.run import Motions, Run
+from outrider.report.run import Log, Motions, Run
 from outrider.report.tables import event_table, fact_list, gap_list, loss_tables, summary_table
 from outrider.report.thinning import chosen
 
@@ -60,10 +60,16 @@ def report(directory: Path, out: Path | None = None, as_json: bool = False) -> i
 
 def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
     """The page of a run, not yet written. Raises InputError for what is no run."""
-    run = read(directory, watch)
-    motions = run.motions
-    ahead = {} if motions is None else {log.owner: clocks.offset(log, motions) for log in run.logs}
-    lost = losses(run.logs, ahead)
+    ledger, ahead = Ledger(), dict[int, float]()
+
+    def sift(log: Log, motions: Motions | None) -> Log:
+        if motions is not None:
+            ahead[log.owner] = clocks.offset(log, motions)
+        ledger.take(log, ahead.get(log.owner))
+        return log._replace(heard={})
+
+    run = read(directory, watch, sift)
+    motions, lost = run.motions, ledger.close()
     near = [] if motions is None else encounters(motions, _d_min(run), run.scenario)
     happened = events(run, near, ahead, 0.0 if motions is None else float(motions.time[-1]))
     replay = None if motions is None else _replay(run, motions, lost, ahead, happened)

@@ -14,7 +14,7 @@ from outrider import names
 from outrider.errors import Fault, InputError
 from outrider.report import arrays
 from outrider.report.logs import read_log
-from outrider.report.run import Gap, Log, Run
+from outrider.report.run import Gap, Log, Motions, Run
 from outrider.resolved import CONFIGURATION, Resolved
 from outrider.yaml_file import load
 
@@ -26,11 +26,17 @@ _DIGITS = 18
 """More has no count, and no floating point number holds them."""
 
 Watch = Callable[[str, float], None]
+Sift = Callable[[Log, Motions | None], Log]
 Value = TypeVar("Value")
 
 
-def read(directory: Path, watch: Watch = lambda _what, _share: None) -> Run:
-    """All that is left in ``directory``; ``watch`` hears what is read, and the share that is done.
+def read(
+    directory: Path,
+    watch: Watch = lambda _what, _share: None,
+    sift: Sift = lambda log, _motions: log,
+) -> Run:
+    """All that is left in ``directory``; ``watch`` hears what is read, and the share that is done. ``sift``
+    gets each log, and the true motions if they are there, and gives back what is to be kept of it.
 
     Raises InputError if it is no directory, or holds nothing of a run that can be read.
     """
@@ -55,7 +61,13 @@ def read(directory: Path, watch: Watch = lambda _what, _share: None) -> Run:
     motions = part(FLIGHT, arrays.motions)
     plans, plan_times = part(PLANS, arrays.plans), part(PLAN_TIMES, arrays.plan_times)
     scenario = None if resolved is None else resolved.scenario
-    logs = _logs(directory, () if scenario is None else scenario.systems, gaps, watch)
+    logs = _logs(
+        directory,
+        () if scenario is None else scenario.systems,
+        gaps,
+        watch,
+        lambda log: sift(log, motions),
+    )
     if summary is None and resolved is None and motions is None and not logs:
         why = "holds no run"
         for gap in gaps:
@@ -117,7 +129,13 @@ def _moderate(text: str) -> int:
     return int(text)
 
 
-def _logs(directory: Path, systems: range | tuple[()], gaps: list[Gap], watch: Watch) -> tuple[Log, ...]:
+def _logs(
+    directory: Path,
+    systems: range | tuple[()],
+    gaps: list[Gap],
+    watch: Watch,
+    sift: Callable[[Log], Log],
+) -> tuple[Log, ...]:
     """Those of the fleet, and whichever others are there."""
     there = {}
     for path in directory.iterdir():
@@ -136,7 +154,7 @@ def _logs(directory: Path, systems: range | tuple[()], gaps: list[Gap], watch: W
 
         try:
             log = read_log(system, path, at)
-            logs.append(log)
+            logs.append(sift(log))
             if log.report.bad or log.report.truncated:
                 gaps.append(Gap(path.name, _damage(log)))
         except LogError as error:
