@@ -75,8 +75,8 @@ class Earshot:
         familiar: Callable[[], NDArray[np.bool_]],
     ) -> None:
         """Find out whom to ignore from ``now`` on. ``states`` (M, 6) are the others' last positions and
-        velocities, fleet-local ENU, ``ages`` (M,) µs; ``familiar`` tells whose word (M,)
-        counts."""
+        velocities, fleet-local ENU, ``ages`` (M,) µs. ``familiar`` is asked
+        whose word counts (M,), if there is anybody to be ignored."""
         self._until.clear()
         if self._all or own is None or own.age > self._config.guard.own_stale_us or not len(states):
             return

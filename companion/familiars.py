@@ -36,13 +36,16 @@ class Familiars:
         self._since = np.zeros(0, dtype=np.int64)
 
     def note(self, now: int, row: int, track: Track) -> None:
-        """The vehicle of ``row``, which is one of those there are or the next, was heard at ``now`` (µs)."""
+        """The vehicle of ``row``, which is one of those there are or the next, was heard at ``now`` (µs). To
+        be told of every message that its track was given, or one that was refused or doubted is missed."""
+        story = _Story(track, track.refused)
         if row == len(self._stories):
-            self._stories.append(_Story(track, -1))
+            self._stories.append(story)
             self._since = np.append(self._since, now)
-        last, refused = self._stories[row], track.refused
-        if last.track is not track or last.refused != refused or track.doubted:
-            self._stories[row] = _Story(track, refused)
+            return
+        last = self._stories[row]
+        if last.track is not track or last.refused != story.refused or track.doubted:
+            self._stories[row] = story
             self._since[row] = now
 
     def trusted(self, now: int, states: Array, plans: Located) -> NDArray[np.bool_]:

@@ -93,7 +93,7 @@ class Located(NamedTuple):
 
 class HorizonTable:
     """The latest horizon of each of many senders, sampled together: ``steps`` positions at ``dt`` (µs) from
-    any time.
+    any time, or each at a time of its own.
 
     Aligned by time, not by index: the original implementation shared horizons without time stamps and never
     noticed their age.

@@ -27,7 +27,7 @@ class Turn(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Positions (n, 3) m and velocities (n, 3) m/s, fleet-local ENU."""
+    """Positions (n, 3) m and velocities (n, 3) m/s, fleet-local ENU; the latter may be read-only."""
 
     positions: Array
     velocities: Array
@@ -63,7 +63,7 @@ def carried(position: Array, velocity: Array, rate: float, seconds: Array) -> Pa
         straight = position + np.multiply.outer(seconds, velocity)
         return Path(straight, np.broadcast_to(velocity, straight.shape))
     angle = rate * seconds
-    # sin(ωt)/ω and (1 − cos(ωt))/ω, whole also where ω is 0.
+    # sin(ωt)/ω and (1 − cos(ωt))/ω, whole also where ω is nearly 0.
     along = seconds * np.sinc(angle / np.pi)
     aside = 0.5 * angle * seconds * np.sinc(0.5 * angle / np.pi) ** 2
     x, y, z = velocity

@@ -306,6 +306,39 @@ def test_a_familiar_one_far_away_is_ignored_and_the_own_place_has_to_be_known():
     assert not listener.earshot.ignores(OTHER)
 
 
+THING, BESIDE, TWO_STORIES, OLD_PLAN, NO_PLAN = range(21, 26)
+FAMILIAR = {31, 32}
+WITH_A_THING = CONFIG.model_copy(update={"moving": (BALL.model_copy(update={"system": THING}),)})
+
+
+def strange(system, place, now):
+    """What each of a mixed crowd says; all hover."""
+    where, plan = told(system, place, ZERO, now)
+    if system == BESIDE:
+        plan = told(system, place + np.array([2.0, 0.0, 0.0]), ZERO, now)[1]
+    elif system == TWO_STORIES and now == END - 10 * PERIOD:
+        where = told(system, place + np.array([60.0, 0.0, 0.0]), ZERO, now)[0]
+    keeps = system == NO_PLAN or (system == OLD_PLAN and now > END - 25 * PERIOD)
+    return (where,) if keeps else (where, plan)
+
+
+@QUICK
+@given(
+    order=st.permutations([THING, BESIDE, TWO_STORIES, OLD_PLAN, NO_PLAN, *FAMILIAR]),
+    later=st.integers(0, 5),
+)
+def test_among_many_only_those_are_ignored_whose_own_word_counts(order, later):
+    """Whoever is heard first, and however many only come later."""
+    listener = Listener(WITH_A_THING)
+    for now in range(NOW, END, PERIOD):
+        for k, system in enumerate(order[: len(order) if now > NOW + 5 * PERIOD else len(order) - later]):
+            place = FAR * np.array([np.cos(k), np.sin(k), 0.0])
+            listener.hear(now, *strange(system, place, now))
+        listener.look(now + PERIOD // 2)
+    listener.look(END)
+    assert {system for system in order if listener.earshot.ignores(system)} == FAMILIAR
+
+
 def test_ignoring_ends_by_itself():
     """A companion that hangs looks around no more."""
     listener = after_seconds(np.array([FAR, 0.0, 0.0]), ZERO)

@@ -165,3 +165,25 @@ def test_an_empty_table_knows_nobody():
     positions, known = HorizonTable(16, 100_000).positions([3, 4], EPOCH, 0)
     assert positions.shape == (2, 16, 3)
     assert not known.any()
+
+
+@LAWS
+@given(
+    fleet=st.dictionaries(st.integers(1, 250), horizons(), max_size=5),
+    unknown=st.sets(st.integers(251, 255)),
+    data=st.data(),
+)
+def test_a_table_locates_each_sender_at_a_time_of_its_own(fleet, unknown, data):
+    table = HorizonTable(1, 4)
+    for sender, horizon in fleet.items():
+        table.put(sender, horizon)
+    senders = data.draw(st.permutations([*fleet, *sorted(unknown)]))
+    times = EPOCH + np.array([data.draw(st.integers(-3_000_000, 9_000_000)) for _ in senders], np.int64)
+    found = table.at(senders, times)
+    assert found.positions.shape == (len(senders), 3)
+    for sender, time, position, after, dt in zip(senders, times.tolist(), *found, strict=True):
+        if sender in unknown:
+            assert after > 3_000_000_000
+            continue
+        assert (after, dt) == (time - EPOCH, fleet[sender].dt)
+        np.testing.assert_allclose(position, fleet[sender].at(time).position, atol=1e-9)

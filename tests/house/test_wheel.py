@@ -22,7 +22,7 @@ CONFIG = ("scenarios", "vehicles", "sweeps", "scenes", "logs", "schemas")
 EXTRA = {"numba", "llvmlite", "jsbsim", "viser", "mcap", "pyarrow"}
 """What no core install has."""
 SITL = {"numba", "llvmlite", "jsbsim"}
-ADVICE = "pip install 'outrider[sitl]'"
+ADVICE = "pip install '.[sitl]'"
 
 pytestmark = pytest.mark.slow
 
@@ -83,7 +83,7 @@ def core(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
 
 @pytest.fixture(scope="module")
 def full(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
-    """``pip install 'outrider[sitl]'``."""
+    """``pip install '.[sitl]'``."""
     return Installed(wheel, tmp_path_factory.mktemp("full"), ("sitl",))
 
 
@@ -244,7 +244,7 @@ def test_exports_need_the_core_alone_or_say_how_to_get_more(core: Installed) -> 
     for form in ("mcap", "csv", "parquet"):
         done = core.outrider("export", log, "--format", form, "--out", "out")
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (3, "", 1)
-        assert "pip install 'outrider[export]'" in done.stderr
+        assert "pip install '.[export]'" in done.stderr
     done = core.outrider("export", log, "--format", "ulog", "--out", "out")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert "no vehicle speaks in it" in done.stderr

@@ -161,7 +161,7 @@ def test_without_the_extra_it_says_what_to_install(
     ended = export(spoilt, "--format", form)
     assert (ended.status, ended.err.count("\n")) == (3, 1)
     assert f"needs {package}" in ended.err
-    assert "pip install 'outrider[export]'" in ended.err
+    assert "pip install '.[export]'" in ended.err
 
 
 @settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from PIL import Image
+from matplotlib.figure import Figure
 from shipped import scenario
 
 from outrider.figures import draw
@@ -26,13 +26,12 @@ def circling(vehicles: int, count: int = 60) -> Samples:
     return Samples(time, place, place, place, place, place, flat, flat, target, apart, still)
 
 
-@pytest.mark.parametrize("vehicles", [1, 8, 24, 25, 200])
-def test_every_number_of_vehicles_has_a_picture(vehicles: int, tmp_path: Path) -> None:
-    flown = scenario("antipodal", vehicles=max(vehicles, 2))
+def flown(vehicles: int) -> Outcome:
+    """All that a picture asks of a flight."""
     samples = circling(vehicles)
     flight: Any = SimpleNamespace(
         truth=SimpleNamespace(samples=lambda: samples),
-        scenario=flown,
+        scenario=scenario("antipodal", vehicles=max(vehicles, 2)),
         systems=tuple(range(11, 11 + vehicles)),
         target_system=10,
         starts=SimpleNamespace(goals=None),
@@ -43,9 +42,28 @@ def test_every_number_of_vehicles_has_a_picture(vehicles: int, tmp_path: Path) -
         plan_logs=[],
         tallies=[],
     )
+    return cast("Outcome", flight)
+
+
+@pytest.mark.parametrize("vehicles", [1, 8, 24, 25, 200])
+def test_every_path_is_drawn_and_few_are_named(
+    vehicles: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Figure] = []
+    save = Figure.savefig
+
+    def kept(figure: Figure, *arguments: Any, **more: Any) -> None:
+        drawn.append(figure)
+        save(figure, *arguments, **more)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
     said = {"avoidance": "field", "method": "tangential", "converged": None}
     said |= {"min_separation_m": 4.0, "d_min_violations": 0}
-    draw(cast("Outcome", flight), said, tmp_path / "flight.png")
-    with Image.open(tmp_path / "flight.png") as picture:
-        paper = np.asarray(picture.convert("L"))
-    assert (paper < 250).mean() > 0.02
+    draw(flown(vehicles), said, tmp_path / "flight.png")
+    paths = drawn[0].axes[0]
+    ways = [line for line in paths.lines if len(line.get_xdata()) == 60 and line.get_marker() == "None"]
+    assert len(ways) >= vehicles
+    legend = paths.get_legend()
+    assert legend is not None
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == [*([str(11 + k) for k in range(vehicles)] if vehicles <= 24 else []), "target"]

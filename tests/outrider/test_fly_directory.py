@@ -1,7 +1,9 @@
-"""What `outrider fly` leaves is no flight of a scenario: the commands that need one name the log instead."""
+"""What `outrider fly` leaves is no flight of a scenario: the commands that need one say what its log is good
+for, and it is."""
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -9,26 +11,48 @@ import yaml
 from said import Run
 
 from outrider.aboard.fly_config import FlyConfig
-from outrider.resources import find
+from outrider.resources import config_root, find
 from outrider.yaml_file import load
 
+LOG = config_root() / "logs" / "escort-target.tlog"
 
-@pytest.mark.parametrize(
-    "command",
-    [("export", "--format", "csv"), ("replay",), ("replay", "--certify"), ("view",)],
-    ids=" ".join,
-)
+
+def leave(directory: Path, name: str) -> Path:
+    """As `outrider fly` does; the log."""
+    directory.mkdir()
+    config = load(find("companions", name), FlyConfig).model_copy(update={"system": 3})
+    document = yaml.safe_dump(config.model_dump(mode="json"))
+    (directory / "configuration.yaml").write_text(document, encoding="utf-8")
+    return Path(shutil.copy(LOG, directory / "vehicle-3.tlog"))
+
+
 @pytest.mark.parametrize("name", ["px4", "ardupilot"])
-def test_its_log_is_named(run: Run, tmp_path: Path, name: str, command: tuple[str, ...]) -> None:
-    document = (
-        load(find("companions", name), FlyConfig).model_copy(update={"system": 3}).model_dump(mode="json")
-    )
-    (tmp_path / "configuration.yaml").write_text(yaml.safe_dump(document), encoding="utf-8")
-    (tmp_path / "vehicle-3.tlog").write_bytes(b"")
-    ended = run(command[0], str(tmp_path), *command[1:])
-    assert ended.status == 2
-    assert ended.err.count("\n") == 1
-    assert ended.err.endswith(f"allowed: {tmp_path / 'vehicle-3.tlog'}\n")
+@pytest.mark.parametrize(
+    ("command", "advice"),
+    [
+        (("export", "--format", "csv"), "{}"),
+        (("replay",), "{} with --own ID, or --list"),
+        (("view",), "tlog:{}"),
+        (("replay", "--certify"), None),
+    ],
+    ids=str,
+)
+def test_one_line_says_what_its_log_is_good_for(
+    run: Run, tmp_path: Path, name: str, command: tuple[str, ...], advice: str | None
+) -> None:
+    log = leave(tmp_path / "left", name)
+    ended = run(command[0], str(log.parent), *command[1:])
+    assert (ended.status, ended.out, ended.err.count("\n")) == (2, "", 1)
+    assert "what outrider fly left is no flight of a scenario" in ended.err
+    if advice is not None:
+        assert ended.err.endswith(f"allowed: {advice.format(log)}\n")
+
+
+def test_the_advice_can_be_followed(run: Run, tmp_path: Path) -> None:
+    log = str(leave(tmp_path / "left", "px4"))
+    assert run("replay", log, "--list").status == 0
+    assert run("export", log, "--format", "csv", "--out", "tables").status == 0
+    assert run("view", f"tlog:{log}", "--seconds", "0.1").status == 0
 
 
 def test_what_is_neither_says_what_is_wrong(run: Run, tmp_path: Path) -> None:

@@ -45,5 +45,5 @@ def test_without_the_package_it_says_how_to_get_it(
     assert ended.out == ""
     assert ended.err.count("\n") == 1
     assert "needs jsbsim" in ended.err
-    assert "pip install 'outrider[sitl]'" in ended.err
+    assert "pip install '.[sitl]'" in ended.err
     assert not (tmp_path / "out").exists()

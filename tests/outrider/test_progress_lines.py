@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from io import StringIO
+
 import pytest
 
 from outrider import progress_lines
@@ -43,3 +46,39 @@ def test_what_is_not_says_how_much_is_done(clock: list[float], capsys: pytest.Ca
         watch("reading", 0.25)
         watch("reading", 0.26)
     assert capsys.readouterr().err == "reading: 25 %\n"
+
+
+class Gone(StringIO):
+    """A pipe whose reader is gone, after ``room`` lines."""
+
+    def __init__(self, room: int) -> None:
+        super().__init__()
+        self._room = room
+        self.tried = 0
+
+    def write(self, text: str, /) -> int:
+        self.tried += 1
+        if self.tried > self._room:
+            raise BrokenPipeError
+        return super().write(text)
+
+
+@pytest.mark.parametrize("room", [0, 2])
+def test_who_reads_no_more_ends_nothing(
+    room: int, clock: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pipe = Gone(room)
+    monkeypatch.setattr(sys, "stderr", pipe)
+    with progress(60.0) as watch:
+        for second in range(0, 200, 10):
+            clock[0] = 1000.0 + second
+            watch(Stage.CLOCK, 0.1 * second)
+    assert pipe.tried == room + 1
+    assert pipe.getvalue().count("\n") == room
+
+
+def test_names_are_said_as_they_are(clock: list[float], capsys: pytest.CaptureFixture[str]) -> None:
+    with share_progress() as watch:
+        clock[0] += LINE_S
+        watch("a[b].tlog", 0.5)
+    assert capsys.readouterr().err == "a[b].tlog: 50 %\n"

@@ -120,7 +120,7 @@ def test_without_the_extra_it_says_what_to_install(
     for arguments in (("view", str(made.directory)), ("swarm", "antipodal-8", "--view")):
         ended = run(*arguments)
         assert (ended.status, ended.err.count("\n")) == (3, 1)
-        assert "pip install 'outrider[view]'" in ended.err
+        assert "pip install '.[view]'" in ended.err
     assert not Path("runs").exists()
 
 

@@ -89,7 +89,7 @@ def _words(error: Exception) -> str:
         if package in _EXTRAS:
             return (
                 f"this command needs {package}, which is not installed: "
-                f"pip install 'outrider[{_EXTRAS[package]}]'"
+                f"pip install '.[{_EXTRAS[package]}]' in a checkout of outrider"
             )
     return f"{type(error).__name__}: {error}; OUTRIDER_TRACEBACK=1 shows where"
 

@@ -70,7 +70,7 @@ def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
             nonlocal shown
             now = time.monotonic()
             if off:
-                lines.say(f"{stage.value}: {seconds:.1f} s simulated")
+                lines.say(lambda: f"{stage.value}: {seconds:.1f} s simulated")
                 return
             if now - shown < _REFRESH_S:
                 return

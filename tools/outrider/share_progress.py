@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from outrider.progress_lines import ProgressLines
@@ -21,8 +22,9 @@ def share_progress() -> Iterator[Callable[[str, float], None]]:
         lines = ProgressLines()
 
         def watch(what: str, share: float) -> None:
-            bar.update(task, description=what, completed=share)
-            if not console.is_terminal:
-                lines.say(f"{what}: {100.0 * share:.0f} %")
+            if console.is_terminal:
+                bar.update(task, description=escape(what), completed=share)
+            else:
+                lines.say(lambda: f"{what}: {100.0 * share:.0f} %")
 
         yield watch

@@ -1,4 +1,4 @@
-"""The commands of ``outrider``: what each takes and is called, and nothing else.
+"""The commands of ``outrider``: what each takes, and whom it asks.
 
 Heavy imports wait until one of them needs them.
 """

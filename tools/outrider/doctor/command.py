@@ -8,8 +8,6 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
-from rich.markup import escape
-
 from mavlink_bridge.clock import Clock, WallClock
 from mavlink_bridge.errors import EndpointError, LinkError, LogError
 from mavlink_bridge.framing import Frame, frame_at
@@ -69,7 +67,7 @@ def of_log(place: Replay, system: int | None) -> Verdict:
             if isinstance(frame, Frame):
                 hearing.hear(time, frame)
             if number % _OFTEN == 0:
-                watch(escape(path.name), reader.bytes_read / size)
+                watch(path.name, reader.bytes_read / size)
     hearing.bad, hearing.skipped_bytes = reader.report.bad, reader.report.skipped_bytes
     if not hearing.frames:
         raise LogError(f"{path}: holds no MAVLink frame; allowed: a .tlog, or a .tlog.gz")

@@ -31,12 +31,12 @@ class Run(NamedTuple):
     unread: tuple[str, ...]
 
 
-def read(source: Path) -> Run:
-    """What ``source`` holds. Raises InputError in one line if it is neither a run directory nor a tlog, or if
-    there is nothing in it to export."""
+def read(source: Path, of_log: str = "{}") -> Run:
+    """What ``source`` holds; ``of_log`` as for ``configured``. Raises InputError in one line if it is neither
+    a run directory nor a tlog, or if there is nothing in it to export."""
     if not source.exists():
         raise InputError(Fault(str(source), f"no such file or directory; {ALLOWED}"))
-    return _run(source) if source.is_dir() else _bare(source)
+    return _run(source, of_log) if source.is_dir() else _bare(source)
 
 
 def _bare(path: Path) -> Run:
@@ -48,10 +48,10 @@ def _bare(path: Path) -> Run:
     return Run(path, None, 0, None, None, None, (log,), ())
 
 
-def _run(directory: Path) -> Run:
+def _run(directory: Path, of_log: str) -> Run:
     if not (directory / CONFIGURATION).is_file():
         raise InputError(Fault(str(directory), f"not a run directory: no {CONFIGURATION} in it; {ALLOWED}"))
-    resolved = configured(directory)
+    resolved = configured(directory, ALLOWED, of_log)
     scenario = resolved.scenario
     motion = read_motion(directory / FLIGHT, len(scenario.systems), len(scenario.moving))
     gradients = plan_times = None

@@ -8,8 +8,6 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import Any
 
-from rich.markup import escape
-
 from mavlink_bridge.errors import LogError
 from outrider.console import share_progress
 from outrider.errors import Fault, InputError
@@ -29,7 +27,7 @@ def listing(path: Path, as_json: bool = False) -> int:
     _refuse_what_is_no_file(path)
     with share_progress() as watch:
         try:
-            census = count(path, lambda share: watch(escape(path.name), share))
+            census = count(path, lambda share: watch(path.name, share))
         except LogError as error:
             raise InputError(str(error)) from None
     if census is None:

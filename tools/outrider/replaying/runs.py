@@ -30,7 +30,7 @@ def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[
 
     Raises InputError where there is no run, or a vehicle's log or steps are missing.
     """
-    flown = resolved(directory, _ALLOWED)
+    flown = resolved(directory, _ALLOWED, "{} with --own ID, or --list")
     vehicle = load(find("vehicles", flown.scenario.vehicle), VehicleConfig)
     fleet = Fleet(flown.scenario, vehicle, flown.seed, config_root() / "logs")
     for system in fleet.systems:

@@ -62,8 +62,9 @@ class Losses(NamedTuple):
 
 
 class Ledger:
-    """Each sender's own log is laid beside every receiver's as soon as both are there. What was heard is kept
-    no longer: two hundred vehicles hear eighty million messages in less than two minutes."""
+    """Each sender's own log is laid beside every receiver's as soon as both are there. What was heard of a
+    sender is kept until then, and to the end of one without a log: two hundred vehicles hear eighty million
+    messages in less than two minutes."""
 
     def __init__(self) -> None:
         self._logs: dict[int, _Party] = {}

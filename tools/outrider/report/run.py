@@ -90,7 +90,8 @@ class Utterance(NamedTuple):
 class Log(NamedTuple):
     """One vehicle's tlog. ``begin``, ``end``: its first and last record, µs on its own clock.
 
-    ``told``: what the vehicle itself said on the swarm link; ``heard``: what arrived there. ``speeds``: at
+    ``told``: what the vehicle itself said on the swarm link; ``heard``: what arrived there, empty where that
+    has been compared already. ``speeds``: at
     ``moments`` (n,) µs the velocity (n, 3) that its autopilot told, ENU, m/s.
     """
 

@@ -42,7 +42,7 @@ class Watch:
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self._before + self._ended, words=self._words())
         else:
-            self._lines.say(f"{self._before + self._ended}/{self._total} runs, {self._words()}")
+            self._lines.say(lambda: f"{self._before + self._ended}/{self._total} runs, {self._words()}")
 
     def _words(self) -> str:
         elapsed = time.monotonic() - self._began

@@ -112,7 +112,7 @@ class Player:
 
 def load(directory: Path, watch: Watch = lambda _what, _share: None) -> Player:
     """The run in ``directory``. InputError if it is none, or was stopped before its motion was written."""
-    run = read(directory)
+    run = read(directory, "tlog:{}")
     if run.scenario is None or run.motion is None or not len(run.motion.time_s):
         wrong = "holds no flight.npz: it was stopped; allowed: a run that came to its end, or tlog:PATH"
         raise InputError(Fault(str(directory), wrong))
