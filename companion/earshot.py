@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.config import CompanionConfig, MethodName
+from companion.flown_on import THRUSTING, farthest
 from companion.horizon import Array
 from companion.methods.approach_angle import FADING
 from companion.tracks import State
@@ -49,6 +50,11 @@ class Earshot:
             _LONGEST, config.neighbour.extrapolate_us, config.guard.neighbour_lost_us // 4
         )
         self._shown = max(config.neighbour.extrapolate_us, config.guard.flown_on_us)
+        # By so much (m) may who has fallen silent have been driven off its course.
+        shown = np.array([1e-6 * config.guard.flown_on_us])
+        burn = np.minimum(shown, THRUSTING)
+        self._driven = config.limits.a_total * float(farthest(burn, shown)[0])
+        self._stale = config.guard.plan_stale_us
         self._closing = 2.0 * self._fastest
         self._certainly = float(self._reach(self._closing)) + self._closing * self._ahead
         self._below = config.guard.landing_clearance + config.field.margin(2)
@@ -108,6 +114,7 @@ class Earshot:
             return near
         closing = self._fastest + np.maximum(_norm(states[:, 3:6]), self._fastest)
         gone = 1e-6 * np.clip(ages, 0, self._shown) * (closing - self._fastest)
+        gone += self._driven * (ages > self._stale)
         near = apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN
         below = _norm(off[:, :, 0:2]).min(axis=1) <= self._below + gone + _OFF_PLAN
         return np.asarray(near | below)

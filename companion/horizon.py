@@ -161,6 +161,17 @@ class HorizonTable:
         positions = self._sampled(rows, after[:, None])[:, 0]
         return Located(positions, np.where(rows >= 0, after, _NEVER), self._dts[rows])
 
+    def accelerations(self, senders: Sequence[int], times: NDArray[np.int64]) -> Array:
+        """What each of ``senders`` (M,) means to accelerate (M, 3), m/s², by its plan at its own one of
+        ``times`` (M,), µs; zero before the plan, after it, and without one."""
+        rows = self._rows_of(senders)
+        if not self._rows:
+            return np.zeros((len(senders), 3))
+        elapsed = times - self._epochs[rows]
+        index = np.clip(elapsed // self._dts[rows], 0, self._lasts[rows])
+        meant: Array = self._knots[rows, index, 6:9]
+        return np.where(((rows >= 0) & (elapsed >= 0))[:, None], meant, 0.0)
+
     def _rows_of(self, senders: Sequence[int]) -> NDArray[np.int64]:
         """−1 for those without a horizon."""
         if self._fresh:

@@ -17,7 +17,8 @@ from companion.config import CompanionConfig
 from companion.earshot import Earshot
 from companion.estimator import Measured
 from companion.familiars import Familiars
-from companion.forces import Obstacles
+from companion.flown_on import flown_on
+from companion.forces import Obstacles, limit
 from companion.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.plan_clock import PlanClock
 from companion.reception import AUTOPILOT
@@ -181,13 +182,13 @@ class Neighbours:
 
         One that falls silent stays an obstacle where it was last, carried on for a bounded time: it may well
         be there. With ``guard.flown_on_us`` it may have stopped, or its autopilot flown on: it is an obstacle
-        that holds all of that way.
+        that holds all of that way (``flown_on``).
         """
         config = self._config
         steps = config.horizon.steps + 1
         self._put_down()
         age = now - self._times
-        ids, states = self._ids, self._states
+        ids, states, times = self._ids, self._states, self._times
         if places is not None and ids:
             near = self.earshot.near(places, states, age)
             for system in self._things:
@@ -195,17 +196,23 @@ class Neighbours:
                     near[self._rows[system]] = True
             if not near.all():
                 ids = tuple(compress(ids, near.tolist()))
-                age, states = age[near], states[near]
+                age, states, times = age[near], states[near], times[near]
         if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
         carried = np.minimum(np.maximum(age, 0), config.neighbour.extrapolate_us) * 1e-6
-        further = np.zeros(len(ids))
-        if config.guard.flown_on_us:
-            # Somewhere between where it was when it could still be known, and where it may be by now.
-            since = np.clip(age, 0, config.guard.flown_on_us) - config.guard.plan_stale_us
-            carried = np.where(since > 0, 1e-6 * (config.guard.plan_stale_us + since / 2), carried)
-            further = 0.5e-6 * np.maximum(since, 0) * np.linalg.norm(states[:, 3:6], axis=1)
         here = states[:, 0:3] + carried[:, None] * states[:, 3:6]
+        further = np.zeros(len(ids))
+        silent = age > config.guard.plan_stale_us
+        if config.guard.flown_on_us and silent.any():
+            # Somewhere between where it was when it could still be known, and where it may be by now.
+            most = 1e-6 * np.minimum(age[silent], config.guard.flown_on_us)
+            meant = limit(
+                self._table.accelerations(list(compress(ids, silent.tolist())), times[silent]),
+                config.limits.a_total,
+            )
+            here[silent], further[silent] = flown_on(
+                states[silent], meant, most, 1e-6 * config.guard.plan_stale_us
+            )
         positions, trusted = self._table.positions(ids, now, now - config.guard.plan_stale_us)
         off = positions[:, 0] - here
         trusted &= np.vecdot(off, off) <= _STRAYED**2

@@ -307,3 +307,25 @@ def test_a_silent_neighbour_is_wherever_it_stopped_or_was_flown_on_to(v, age, sh
     off = np.linalg.norm(found.positions[0, 0] - (X + flown * v))
     assert off + before.d_min[0] <= found.d_min[0] + 2 * GRAIN + 0.05 * np.linalg.norm(v)
     assert found.d_safe[0] - found.d_min[0] == pytest.approx(before.d_safe[0] - before.d_min[0])
+
+
+@LAWS
+@given(
+    v=vectors(3.0),
+    a=vectors(5.0),
+    age=st.integers(600_000, 20_000_000),
+    share=numbers(0.0, 1.0),
+    thrust=numbers(0.0, 1.0),
+)
+def test_a_silent_neighbour_may_have_been_driven_on_as_it_meant_to_accelerate(v, a, age, share, thrust):
+    """By the acceleration of its last set-point for a second at most, and at any time it may have stopped."""
+    stale = 1e-6 * WARY.guard.plan_stale_us
+    told = position(X, v), plan(X, v, np.tile(a, (16, 1)))
+    before, found = (hearing(*told, config=config).obstacles(NOW + age) for config in (CONFIG, WARY))
+    flown = stale + share * (1e-6 * min(age, FLOWN_ON) - stale)
+    burn = min(thrust, flown)
+    there = X + flown * v + burn * (flown - 0.5 * burn) * a
+    off = np.linalg.norm(found.positions[0, 0] - there)
+    # Who stops early has left the straight way between by an eighth of what it means to do, at most.
+    spare = 2 * GRAIN + 0.05 * np.linalg.norm(v) + np.linalg.norm(a) / 8 + 0.05
+    assert off + before.d_min[0] <= found.d_min[0] + spare
