@@ -1,8 +1,9 @@
 """Where a vehicle may be of which nothing has been heard for a while.
 
 Its companion may have ended. Then the autopilot flies on by the last set-point until its time-out: at the
-velocity, and for the first second with the acceleration, that this had (measured with ArduCopter 4.6.3, which
-extrapolates both; GUID_TIMEOUT is 3 s). One that meant to go round somebody flies on into them. Or it has
+velocity, and for a second with the acceleration, that this had. (ArduCopter 4.6.3 was measured to follow
+set-points that come once a second as well as those that come 50 times: so long it extrapolates both. For how
+much longer is not known; GUID_TIMEOUT is 3 s.) One that was about to turn flies on into somebody. Or it has
 stopped, as PX4 does after COM_OF_LOSS_T. So it is anywhere between: a ball that holds all of these places.
 """
 
