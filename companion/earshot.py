@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.config import CompanionConfig, MethodName
-from companion.flown_on import THRUSTING, farthest
+from companion.flown_on import further, norms
 from companion.horizon import Array
 from companion.methods.approach_angle import FADING
 from companion.tracks import State
@@ -51,9 +51,7 @@ class Earshot:
         )
         self._shown = max(config.neighbour.extrapolate_us, config.guard.flown_on_us)
         # By so much (m) may who has fallen silent have been driven off its course.
-        shown = np.array([1e-6 * config.guard.flown_on_us])
-        burn = np.minimum(shown, THRUSTING)
-        self._driven = config.limits.a_total * float(farthest(burn, shown)[0])
+        self._driven = config.limits.a_total * float(further(np.array(1e-6 * config.guard.flown_on_us)))
         self._stale = config.guard.plan_stale_us
         self._closing = 2.0 * self._fastest
         self._certainly = float(self._reach(self._closing)) + self._closing * self._ahead
@@ -81,21 +79,21 @@ class Earshot:
         familiar: Callable[[], NDArray[np.bool_]],
     ) -> None:
         """Find out whom to ignore from ``now`` on. ``states`` (M, 6) are the others' last positions and
-        velocities, fleet-local ENU, ``ages`` (M,) µs. ``familiar`` is asked
-        whose word counts (M,), if there is anybody to be ignored."""
+        velocities, fleet-local ENU, ``ages`` (M,) µs. ``familiar`` is asked whose word counts (M,), if there
+        is anybody to be ignored."""
         self._until.clear()
         if self._all or own is None or own.age > self._config.guard.own_stale_us or not len(states):
             return
         if float(np.sqrt(own.velocity @ own.velocity)) > self._fastest:
             return
-        apart = _norm(states[:, 0:3] - own.position)
+        apart = norms(states[:, 0:3] - own.position)
         if apart.max() <= self._certainly:
             return
         age = 1e-6 * np.maximum(ages, 0)
         # What is known of the own place may be old as well.
         spare = apart - self._certainly - self._fastest * (age + 1e-6 * max(own.age, 0)) - _OFF_PLAN
         silence = np.minimum(spare / self._closing - self._silence, self._longest - age)
-        silence[_norm(states[:, 3:6]) > self._fastest] = 0.0
+        silence[norms(states[:, 3:6]) > self._fastest] = 0.0
         silent = silence > 0.0
         if not silent.any():
             return
@@ -108,15 +106,15 @@ class Earshot:
         states (M, 6) of ``ages`` (M,) µs are within the bound for S = P = 0 of one, and whom a vehicle that
         lands there would come down on."""
         off = states[:, None, 0:3] - places
-        apart = _norm(off).min(axis=1)
+        apart = norms(off).min(axis=1)
         near: NDArray[np.bool_] = (apart <= self._certainly) | self._all
         if near.all():
             return near
-        closing = self._fastest + np.maximum(_norm(states[:, 3:6]), self._fastest)
+        closing = self._fastest + np.maximum(norms(states[:, 3:6]), self._fastest)
         gone = 1e-6 * np.clip(ages, 0, self._shown) * (closing - self._fastest)
         gone += self._driven * (ages > self._stale)
         near = apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN
-        below = _norm(off[:, :, 0:2]).min(axis=1) <= self._below + gone + _OFF_PLAN
+        below = norms(off[:, :, 0:2]).min(axis=1) <= self._below + gone + _OFF_PLAN
         return np.asarray(near | below)
 
     def _reach(self, closing: Array | float) -> Array:
@@ -127,7 +125,3 @@ class Earshot:
         braking = 0.0 if field.braking is None else np.square(closing) / (2.0 * field.braking)
         reach = field.d_safe + field.margin(2) + np.maximum(braking, band.d_band + band.reach_s * closing)
         return np.asarray(np.maximum(reach, config.approach_angle.reach + FADING), dtype=np.float64)
-
-
-def _norm(vectors: Array) -> Array:
-    return np.asarray(np.sqrt(np.vecdot(vectors, vectors)), dtype=np.float64)

@@ -12,11 +12,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.horizon import Array
 
-THRUSTING = 1.0
+_THRUSTING = 1.0
 """s for which the acceleration of the last set-point acts."""
 
 
@@ -32,19 +31,19 @@ def flown_on(states: Array, accelerations: Array, seconds: Array, known: float) 
     between where they were when they could still be ``known`` (s), and where they may have been flown on
     to."""
     place, velocity = states[:, 0:3], states[:, 3:6]
-    burn = np.minimum(seconds, THRUSTING)
     stopped = place + known * velocity
     coasted = place + seconds[:, None] * velocity
-    driven = coasted + farthest(burn, seconds)[:, None] * accelerations
+    driven = coasted + further(seconds)[:, None] * accelerations
     centre = 0.5 * (stopped + driven)
-    return Ball(centre, np.maximum(_norm(stopped - centre), _norm(coasted - centre)))
+    return Ball(centre, np.maximum(norms(stopped - centre), norms(coasted - centre)))
 
 
-def farthest(burn: NDArray[np.float64], seconds: NDArray[np.float64]) -> Array:
-    """m for each m/s² by which who accelerated for ``burn`` s and coasted then is further after
-    ``seconds``."""
+def further(seconds: Array) -> Array:
+    """m for each m/s² by which who accelerated as long as that lasts is further after ``seconds`` (M,)."""
+    burn = np.minimum(seconds, _THRUSTING)
     return np.asarray(burn * (seconds - 0.5 * burn), dtype=np.float64)
 
 
-def _norm(vectors: Array) -> Array:
+def norms(vectors: Array) -> Array:
+    """Of vectors (…, 3)."""
     return np.asarray(np.sqrt(np.vecdot(vectors, vectors)), dtype=np.float64)

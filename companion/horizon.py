@@ -168,8 +168,7 @@ class HorizonTable:
         if not self._rows:
             return np.zeros((len(senders), 3))
         elapsed = times - self._epochs[rows]
-        index = np.clip(elapsed // self._dts[rows], 0, self._lasts[rows])
-        meant: Array = self._knots[rows, index, 6:9]
+        meant: Array = self._knots[rows, self._segments(rows, elapsed[:, None])[:, 0], 6:9]
         return np.where(((rows >= 0) & (elapsed >= 0))[:, None], meant, 0.0)
 
     def _rows_of(self, senders: Sequence[int]) -> NDArray[np.int64]:
@@ -178,14 +177,18 @@ class HorizonTable:
             self._put_down()
         return np.array([self._rows.get(sender, -1) for sender in senders], dtype=np.int64)
 
+    def _segments(self, rows: NDArray[np.int64], elapsed: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Which segments (M, n) those are; the first before, the last knot after."""
+        index = elapsed // self._dts[rows][:, None]
+        np.maximum(index, 0, out=index)
+        np.minimum(index, self._lasts[rows][:, None], out=index)
+        return index
+
     def _sampled(self, rows: NDArray[np.int64], elapsed: NDArray[np.int64]) -> Array:
         """Positions (M, n, 3) of ``rows`` (M,) when so much time (M, n), µs, has ``elapsed`` since their
         epochs."""
-        dts = self._dts[rows][:, None]
-        index = elapsed // dts
-        np.maximum(index, 0, out=index)
-        np.minimum(index, self._lasts[rows][:, None], out=index)
-        s = ((elapsed - index * dts) * 1e-6)[:, :, None]
+        index = self._segments(rows, elapsed)
+        s = ((elapsed - index * self._dts[rows][:, None]) * 1e-6)[:, :, None]
         # Row by row of one long table: twice as fast as by two indices.
         count = self._knots.shape[1]
         chosen = self._knots.reshape(-1, 9).take(index + (rows * count)[:, None], axis=0, mode="wrap")

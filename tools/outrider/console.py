@@ -68,10 +68,10 @@ def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
 
         def watch(stage: Stage, seconds: float) -> None:
             nonlocal shown
-            now = time.monotonic()
             if off:
                 lines.say(lambda: f"{stage.value}: {seconds:.1f} s simulated")
                 return
+            now = time.monotonic()
             if now - shown < _REFRESH_S:
                 return
             shown = now
