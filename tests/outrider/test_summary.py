@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from shipped import scenario
 
-from companion.node import Tally
+from companion.planning import Tally
 from outrider.outcome import Messages, Outcome, Punctuality
 from outrider.scenario import Scenario
 from outrider.summary import (

@@ -26,6 +26,7 @@ from outrider.viewing.listener import Listener
 from outrider.viewing.moment import KNOTS, NO_PLAN, Moment, State
 from outrider.viewing.orders import Change
 from outrider.viewing.player import Player, load
+from outrider.viewing.recorded import Record
 from outrider.viewing.scene import Scene
 from outrider.viewing.wishes import Wishes
 
@@ -74,6 +75,18 @@ def test_pause_step_speed_and_a_time_that_is_chosen(made: Made) -> None:
     assert seen(player, 101.0) == []
 
 
+def test_who_is_disarmed_flies_no_plan() -> None:
+    plan = np.ones((KNOTS, 6), dtype=np.float32)
+    flown = Record([0, 500_000], [plan, plan], [], [], [0, 1_000_000], ["GUIDED", "GUIDED, disarmed"], {})
+    assert flown.mode(-1) == ""
+    assert flown.mode(999_999) == "GUIDED"
+    assert np.isfinite(flown.plan(999_999)).all()
+    assert flown.mode(1_000_000) == "GUIDED, disarmed"
+    assert np.isnan(flown.plan(1_000_000)).all()
+    # A link that fell silent says nothing any more.
+    assert flown.mode(10_000_000) == ""
+
+
 def test_a_real_run_has_plans_attitudes_and_ages(tmp_path: Path) -> None:
     directory = tmp_path / "run"
     directory.mkdir()
@@ -83,7 +96,7 @@ def test_a_real_run_has_plans_attitudes_and_ages(tmp_path: Path) -> None:
     assert np.isfinite(moment.plan).all()
     assert np.linalg.norm(moment.plan[:, 0, :3] - moment.position, axis=1).max() < 1.0
     for state in moment.states:
-        assert state.mode == "plans"
+        assert state.mode == "GUIDED"
         assert 0.0 <= state.age_s < 1.0
         assert state.plan_ms > 0.0
     # They lean into their way: not all of them stand upright.

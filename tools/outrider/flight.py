@@ -10,9 +10,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from companion.moving import MovingObstacles
-from companion.node import Tally
 from companion.obstacles import FixedObstacles
 from companion.pilot import Phase
+from companion.planning import Tally
 from mavlink_bridge.ether import Ether
 from mavlink_bridge.garbage import seldom_collected
 from mavlink_bridge.runtime import LockStep, Scheduled

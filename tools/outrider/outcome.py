@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from companion.node import Tally
 from companion.plan_log import PlanLog
+from companion.planning import Tally
 from outrider.scenario import Scenario
 from outrider.starts import Starts
 from outrider.truth import Truth

@@ -6,6 +6,10 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as dialect
 
+from companion.autopilots.ardupilot import ARDUPILOT
+from companion.vehicle import ARMED
+from mavlink_bridge.messages import Heartbeat
+
 _PREFIX: Final = "COPTER_MODE_"
 _COPTER: Final[dict[int, str]] = {
     number: entry.name.removeprefix(_PREFIX)
@@ -33,6 +37,7 @@ _AUTO: Final = {
     8: "FOLLOW",
     9: "PRECLAND",
 }
+DISARMED: Final = ", disarmed"
 
 
 def mode_name(flavour: str, custom_mode: int) -> str:
@@ -42,3 +47,9 @@ def mode_name(flavour: str, custom_mode: int) -> str:
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
     name = _AUTO.get(sub) if main == 4 else _MAIN.get(main)
     return name or f"{main}.{sub}"
+
+
+def told_mode(beat: Heartbeat) -> str:
+    """As an autopilot's HEARTBEAT (0) has it, and whether it is disarmed."""
+    flavour = "ardupilot" if beat.autopilot == ARDUPILOT.autopilot else "px4"
+    return mode_name(flavour, beat.custom_mode) + ("" if beat.base_mode & ARMED else DISARMED)

@@ -13,7 +13,7 @@ from types import FrameType
 
 import numpy as np
 
-from companion.node import Tally
+from companion.planning import Tally
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.histogram import Histogram
 from mavlink_bridge.realtime import RealTime

@@ -14,9 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from companion.node import Companion, Tally
+from companion.node import Companion
 from companion.pilot import Phase
 from companion.plan_log import PlanLog
+from companion.planning import Tally
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.garbage import IdleCollector
 from mavlink_bridge.histogram import Histogram

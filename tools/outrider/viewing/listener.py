@@ -16,7 +16,7 @@ from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, NamedValue, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
 from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
-from outrider.hangar.modes import mode_name
+from outrider.hangar.modes import told_mode
 from outrider.viewing.moment import NO_PLAN, Array, Moment, Single, State, euler_attitude, padded
 from outrider.viewing.scene import LEAST_REACH, Scene
 from outrider.viewing.wishes import Wishes
@@ -29,7 +29,7 @@ PICTURE, NEW_SCENE = 0.04, 1.0
 MOST = 250
 _ACCEPTED = {0, 30, 33, 251, 385}
 """HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, NAMED_VALUE_FLOAT, TUNNEL."""
-_AUTOPILOT, _ARDUPILOT, _ARMED, _SAMPLES = 1, 3, 0x80, 101
+_AUTOPILOT, _SAMPLES = 1, 101
 
 
 class _Fix(NamedTuple):
@@ -111,9 +111,7 @@ class Listener:
             heard.attitude = euler_attitude(message.roll, message.pitch, message.yaw)
         elif isinstance(message, Heartbeat):
             if component == _AUTOPILOT:
-                flavour = "ardupilot" if message.autopilot == _ARDUPILOT else "px4"
-                armed = "" if message.base_mode & _ARMED else ", disarmed"
-                heard.mode = mode_name(flavour, message.custom_mode) + armed
+                heard.mode = told_mode(message)
         elif isinstance(message, NamedValue):
             if message.name == "plan_ms":
                 heard.plan_ms = message.value

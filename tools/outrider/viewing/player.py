@@ -106,8 +106,7 @@ class Player:
     def _state(self, k: int, time: float, now: int) -> State:
         record, (times, spent) = self._records[k], self._spent[k]
         index = int(np.searchsorted(times, time, side="right")) - 1
-        planning = bool(np.isfinite(record.plan(now)).any())
-        return State("plans" if planning else "", record.age(now), spent[index] if index >= 0 else nan)
+        return State(record.mode(now), record.age(now), spent[index] if index >= 0 else nan)
 
 
 def load(directory: Path, watch: Watch = lambda _what, _share: None) -> Player:

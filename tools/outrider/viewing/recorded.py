@@ -1,4 +1,5 @@
-"""What the logs of a run say beside where its vehicles were: plans, attitudes, and who was heard when."""
+"""What the logs of a run say beside where its vehicles were: plans, attitudes, modes, and who was heard
+when."""
 
 from __future__ import annotations
 
@@ -10,36 +11,49 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.certified.committed import horizon_of
+from companion.reception import AUTOPILOT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError, PlanWireError
-from mavlink_bridge.messages import Attitude, GlobalPosition, Message, Tunnel
+from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, Source, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
 from mavlink_bridge.tlog import read_tlog
 from outrider import names
+from outrider.hangar.modes import DISARMED, told_mode
 from outrider.viewing.moment import NO_PLAN, Array, Single, euler_attitude, padded
 
 FRESH = 1_000_000
 """µs for which a plan is shown after its epoch."""
-_DECODED = {30, 33, 385}
-"""ATTITUDE, GLOBAL_POSITION_INT, TUNNEL."""
+_BEAT = 3_000_000
+"""µs for which a mode is believed: an autopilot tells it once a second."""
+_DECODED = {0, 30, 33, 385}
+"""HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, TUNNEL."""
 _SWARM, _AUTOPILOT = names.LINK_NUMBERS["swarm"], names.LINK_NUMBERS["autopilot"]
 _OFTEN = 4096
 
 
 class Record(NamedTuple):
     """Of one vehicle, by its own clock (Unix µs, rising): ``epochs`` and ``plans`` (KNOTS, 6); ``leant``
-    and the attitudes (4,), FLU in ENU, that its autopilot told; when each other was ``heard``."""
+    and the attitudes (4,), FLU in ENU, and ``beaten`` and the modes, that its autopilot told; when each
+    other was ``heard``."""
 
     epochs: list[int]
     plans: list[Single]
     leant: list[int]
     attitudes: list[Array]
+    beaten: list[int]
+    modes: list[str]
     heard: dict[int, list[int]]
 
     def plan(self, now: int) -> Single:
-        """Flown at ``now`` (µs); NaN if there is none that is fresh."""
+        """Flown at ``now`` (µs); NaN if there is none that is fresh, and where nothing can be flown."""
         index = bisect_right(self.epochs, now) - 1
-        return NO_PLAN if index < 0 or now - self.epochs[index] > FRESH else self.plans[index]
+        idle = index < 0 or now - self.epochs[index] > FRESH or self.mode(now).endswith(DISARMED)
+        return NO_PLAN if idle else self.plans[index]
+
+    def mode(self, now: int) -> str:
+        """The autopilot's at ``now`` (µs), as it told it; empty where that is not known."""
+        index = bisect_right(self.beaten, now) - 1
+        return "" if index < 0 or now - self.beaten[index] > _BEAT else self.modes[index]
 
     def attitude(self, now: int) -> Array | None:
         """Told at ``now`` (µs), or shortly before."""
@@ -56,7 +70,7 @@ def record(path: Path, owner: int, at: Callable[[int], None] = lambda _bytes: No
     """Of the vehicle ``owner`` in the log at ``path``; ``at`` hears how many bytes have been read. What is
     not there, or damaged, is left out."""
     codec = Codec(lambda identifier, _system, _component: identifier in _DECODED)
-    found = Record([], [], [], [], {})
+    found = Record([], [], [], [], [], [], {})
     size = 0
     try:
         for number, one in enumerate(read_tlog(path)):
@@ -82,6 +96,11 @@ def _take(found: Record, owner: int, time: int, link: int, message: Message) -> 
         if system == owner and link == _AUTOPILOT and (not found.leant or time >= found.leant[-1]):
             found.leant.append(time)
             found.attitudes.append(euler_attitude(message.roll, message.pitch, message.yaw))
+    elif isinstance(message, Heartbeat):
+        own = message.source == Source(owner, AUTOPILOT) and link == _AUTOPILOT
+        if own and (not found.beaten or time >= found.beaten[-1]):
+            found.beaten.append(time)
+            found.modes.append(told_mode(message))
     elif isinstance(message, GlobalPosition):
         if system != owner and link == _SWARM:
             found.heard.setdefault(system, []).append(time)

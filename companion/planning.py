@@ -1,0 +1,239 @@
+"""What the vehicle flies: the next plan when it is due, one that is held, or the one that is committed."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Sequence
+from math import hypot
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.aims import Aims
+from companion.certified.flight import CertifiedFlight
+from companion.certified.keeper import Why
+from companion.config import CompanionConfig
+from companion.errors import CompanionError, SurfaceError
+from companion.forces import Obstacles
+from companion.guard import Guard
+from companion.heading import Heading, Yaw
+from companion.horizon import Array, Motion
+from companion.pilot import Phase, Pilot
+from companion.plan_log import PlanLog
+from companion.planner import Aim, Plan, Planner
+from companion.world import View, World
+from mavlink_bridge.frames import LocalFrame
+
+_LONGEST_NS = (1 << 32) - 1
+_ZERO = np.zeros(3)
+_ZERO.flags.writeable = False
+
+
+class Tally(NamedTuple):
+    """What a companion counted so far; ``plan_ns`` holds one stopwatch reading per plan, at most 4.29 s, and
+    ``plan_at`` when that plan was due (µs on its clock)."""
+
+    plans: int
+    relaxed: int
+    solver_failures: int
+    held: int
+    anchored_anew: int
+    plan_ns: Sequence[int]
+    plan_at: Sequence[int] = ()
+
+
+class Planning:
+    """Of one vehicle, among what ``world`` knows, towards what ``aims`` says, while ``pilot`` has the
+    vehicle. ``certified`` makes the committed plans; without, ``planner`` makes them. ``stopwatch`` (ns) only
+    measures how long planning takes; nothing depends on it."""
+
+    def __init__(
+        self,
+        config: CompanionConfig,
+        world: World,
+        pilot: Pilot,
+        aims: Aims,
+        certified: CertifiedFlight | None,
+        stopwatch: Callable[[], int],
+    ) -> None:
+        self._config = config
+        self._world = world
+        self._pilot = pilot
+        self._aims = aims
+        self._certified = certified
+        self._stopwatch = stopwatch
+        self.planner = Planner(config)
+        self.guard = Guard(config)
+        self._heading = Heading(config.heading, config.horizon)
+        self._obstacles = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
+        self._frame: LocalFrame | None = None
+        self._fastest = hypot(*config.limits.v_max)
+        self._flown = 0
+        self._plans = self._relaxed = 0
+        self._plan_ns = array("I")
+        self._plan_at = array("q")
+        self.plan: Plan | None = None
+        self.log = PlanLog()
+        self.next_due = 0
+        """When (µs) the next plan is to be made."""
+
+    @property
+    def tally(self) -> Tally:
+        """Counters for the summary."""
+        failures, anchored = self.guard.failures, self.guard.anchored_anew
+        if self._certified is not None:
+            keeper = self._certified.keeper
+            failures, anchored = keeper.held[Why.UNSOLVED], keeper.anchored_anew
+        return Tally(
+            self._plans, self._relaxed, failures, self.held, anchored, self._plan_ns[:], self._plan_at[:]
+        )
+
+    @property
+    def held(self) -> int:
+        """How often an old plan was kept."""
+        certified = self._certified
+        return self.guard.held if certified is None else sum(certified.keeper.held.values())
+
+    @property
+    def spent(self) -> Sequence[int]:
+        """The stopwatch's reading (ns) of every plan since they were last taken away."""
+        return self._plan_ns
+
+    def shed(self) -> Sequence[int]:
+        """Take the stopwatch's readings (ns) away, and the log with them: for who runs for days."""
+        taken, self._plan_ns = self._plan_ns, array("I")
+        self._plan_at = array("q")
+        self.log = PlanLog()
+        return taken
+
+    def yaw(self, time: int) -> Yaw:
+        """As planned, at ``time`` (µs)."""
+        return self._heading.at(time)
+
+    def fly(self, now: int, view: View, *, cautious: bool) -> None:
+        """Plan when due; start from the measured state each time the vehicle becomes ours. ``cautious``: no
+        further than it can see."""
+        if view.local is not self._frame:
+            # Where the vehicle was in the old frame must not be flown to in the new one.
+            self._frame, self.guard.horizon = view.local, None
+        if self._certified is None and now - self._flown > self._config.guard.hold_us:
+            # It hung, and the autopilot did as it saw fit: the old plan leads from where nobody is any more.
+            self.guard.horizon = None
+        self._flown = now
+        if not self._pilot.streaming or view.own is None or view.local is None:
+            self.guard.horizon = None
+            return
+        stale = view.own.age > self._config.guard.own_stale_us
+        measured = Motion(view.own.position, self._bounded(view.own.velocity), _ZERO)
+        if self.guard.horizon is None:
+            if stale or view.yaw is None:
+                return
+            self._begin(now, view.yaw, measured)
+        if self._certified is not None:
+            self._fly_certified(now, view, measured, self._certified, stale=stale, cautious=cautious)
+            return
+        if now < self.next_due:
+            return
+        self.next_due += self._config.rates.replan_us * (
+            1 + (now - self.next_due) // self._config.rates.replan_us
+        )
+        if stale:
+            self.guard.hold(now, solver=False)
+            return
+        if not self._pilot.guided:
+            # Set-points flow before they steer: a plan would run away from the vehicle.
+            self.guard.start(now, measured)
+            return
+        self._plan(now, view, measured, cautious=cautious)
+
+    def _begin(self, now: int, yaw: float, measured: Motion) -> None:
+        """To steer, from the ``measured`` state on."""
+        self._heading.reset(yaw)
+        if self._aims.goal is None:
+            self._aims.goal = measured.position
+        self.guard.start(now, measured)
+        if self._certified is not None:
+            self._certified.stand(now, measured.position)
+
+    def _bounded(self, velocity: Array) -> Array:
+        """A measured ``velocity`` (3,) as a plan may begin with it: whatever the own autopilot, or who speaks
+        in its name, says of its speed, nothing faster than the limits is asked for."""
+        speed = float(np.sqrt(velocity @ velocity))
+        return velocity if speed <= self._fastest else velocity * (self._fastest / speed)
+
+    def _fly_certified(
+        self, now: int, view: View, measured: Motion, flight: CertifiedFlight, *, stale: bool, cautious: bool
+    ) -> None:
+        """As committed; the next epoch's plan when it is due."""
+        if not self._pilot.guided:
+            flight.stand(now, measured.position)
+        elif not stale:
+            flight.watch(now, measured)
+        if self._pilot.guided and flight.due(now):
+            started = self._stopwatch()
+            if self._pilot.phase is Phase.SETTLE:
+                here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
+                self._obstacles = self._world.obstacles(now, view, here)
+            aim = None if stale else self._aim(now, view, measured, cautious=cautious)
+            if aim is None:
+                flight.keeper.carry_on(Why.MISSING)
+            elif flight.lost:
+                flight.keeper.anchor(now, measured)
+            else:
+                self._plans += flight.plan(now, aim, self._world, view)
+            self._took(now, started)
+        self.guard.horizon = horizon = flight.horizon()
+        if horizon is not None and now >= self.next_due:
+            self.next_due = now + self._config.rates.replan_us
+            step, count = self._config.horizon.dt_us, self._config.horizon.steps + 1
+            self._face(now, view, horizon.positions(now + step, count, step))
+
+    def _plan(self, now: int, view: View, measured: Motion, *, cautious: bool) -> None:
+        aim = self._aim(now, view, measured, cautious=cautious)
+        if aim is None:
+            self.guard.hold(now, solver=False)
+            return
+        horizon, config = self.guard.horizon, self._config.horizon
+        state = self.guard.anchor(now, measured)
+        started = self._stopwatch()
+        try:
+            prediction = (
+                np.broadcast_to(state.position, (config.steps + 1, 3))
+                if horizon is None
+                else horizon.positions(now, config.steps + 1, config.dt_us)
+            )
+            self._obstacles = obstacles = self._world.obstacles(now, view, prediction)
+            self.plan = self.planner.plan(now, state.position, state.velocity, prediction, aim, obstacles)
+        except CompanionError:
+            self.guard.hold(now, solver=True)
+            return
+        finally:
+            self._took(now, started)
+        self._plans += 1
+        self.log.add(now, self.plan.gradient)
+        self._relaxed += self.plan.relaxed
+        self.guard.accept(now, self.plan.horizon)
+        self._face(now, view, self.plan.horizon.knots[1:, 0:3])
+
+    def _face(self, now: int, view: View, places: Array) -> None:
+        """Plan the yaw along the own ``places`` (N + 1, 3) of the next steps; a companion that plans nothing
+        keeps its yaw."""
+        if view.target is None:
+            return
+        ahead: Array = 1e-6 * self._config.horizon.dt_us * np.arange(1.0, len(places) + 1.0)
+        self._heading.plan(now, places, view.target.ahead(ahead).positions)
+
+    def _took(self, now: int, started: int) -> None:
+        """The plan that was due at ``now``, and begun when the stopwatch showed ``started``, is done."""
+        self._plan_at.append(now)
+        self._plan_ns.append(min(max(self._stopwatch() - started, 0), _LONGEST_NS))
+
+    def _aim(self, now: int, view: View, measured: Motion, *, cautious: bool) -> Aim | None:
+        """Where to; None when nobody knows."""
+        try:
+            aim = self._aims.aim(view, measured, self._obstacles, cautious=cautious)
+        except SurfaceError:
+            return None
+        if self._config.traffic is None:
+            return aim
+        return aim._replace(destination=self._world.sensed.aside(now, aim.destination, measured.position))
