@@ -33,12 +33,13 @@ _BESIDE = 30.0
 """m from the box, on each axis, from where a vehicle may start."""
 _FAR = 20_000.0
 """m between the fleet origin and the autopilot's own: beyond, one of the two is wrong."""
-_NEEDED = tuple(
-    (SET_MESSAGE_INTERVAL, (identifier, interval, 0.0, 0.0, 0.0, 0.0, 0.0))
-    for identifier, interval in ((32.0, 20_000.0), (30.0, 100_000.0), (1.0, 1_000_000.0), (245.0, 500_000.0))
-)
-"""Message id and interval (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
+STREAMS = {32: 20_000, 30: 100_000, 1: 1_000_000, 245: 500_000}
+"""Message ids and intervals (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
 EXTENDED_SYS_STATE. The attitude tells only where the nose points when the set-points begin."""
+_NEEDED = tuple(
+    (SET_MESSAGE_INTERVAL, (float(identifier), float(interval), 0.0, 0.0, 0.0, 0.0, 0.0))
+    for identifier, interval in STREAMS.items()
+)
 
 
 class Phase(Enum):

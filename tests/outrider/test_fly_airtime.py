@@ -13,7 +13,18 @@ from companion.pilot import Phase
 from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Serial, UdpIn
 from mavlink_bridge.messages import Source
-from outrider.aboard.airtime import FLEET, SHARE, carried, doubts, room, said, said_by_target
+from outrider.aboard.airtime import (
+    FLEET,
+    SHARE,
+    carried,
+    doubts,
+    doubts_of_autopilot,
+    room,
+    said,
+    said_by_target,
+    steered,
+    told,
+)
 from outrider.aboard.fly_config import RADIOS, FleetOrigin, FlyConfig
 from outrider.errors import InputError
 
@@ -86,6 +97,37 @@ def test_only_a_serial_line_is_doubted() -> None:
     assert "radio: 57600" in doubts(Serial("/dev/ttyUSB0", 57600), FAST.settings, False)
     with pytest.raises(InputError, match=f"{room(9600):.0f} bytes/s"):
         doubts(Serial("/dev/ttyUSB0", 9600), FAST.settings, False)
+
+
+@pytest.mark.parametrize("dry_run", [False, True])
+@pytest.mark.parametrize("signed", [False, True])
+def test_a_slow_line_to_the_autopilot_is_doubted(signed: bool, dry_run: bool) -> None:
+    def doubt(baud: int) -> str:
+        return doubts_of_autopilot(Serial("/dev/ttyUSB0", baud), FAST.settings, signed, dry_run=dry_run)
+
+    assert doubt(115200) == ""
+    assert doubts_of_autopilot(UdpIn("127.0.0.1", 14550), FAST.settings, signed, dry_run=dry_run) == ""
+    assert f"{told(signed):.0f} of 5760 bytes/s" in doubt(57600)
+    # Nothing steers in a dry run.
+    assert (f"set-points {steered(FAST.settings, signed):.0f}" in doubt(57600)) is not dry_run
+
+
+@pytest.mark.parametrize("key", [None, KEY], ids=["plain", "signed"])
+def test_what_goes_to_an_autopilot_is_what_is_stated(key: Key | None) -> None:
+    bench = Bench("px4", key=key, others=key)
+    bench.fly(1.0)
+    bench.take_off()
+    step, sizes = bench.companion.step, []
+
+    def weighed(now, inbox):
+        leaving = step(now, inbox)
+        sizes.extend(len(datagram.data) for datagram in leaving if datagram.link == "autopilot")
+        return leaving
+
+    bench.companion.step = weighed
+    bench.fly(float(SECONDS))
+    stated = SECONDS * steered(bench.config, key is not None)
+    assert 0.85 * stated < sum(sizes) <= stated + 3 * 160
 
 
 def test_it_is_said_before_anything_is_opened(run: Run, tmp_path: Path) -> None:

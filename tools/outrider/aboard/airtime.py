@@ -1,14 +1,28 @@
-"""What a swarm says over its link each second, and how many vehicles a line has room for."""
+"""What a swarm says over its link each second, what goes to an autopilot and back, and what a line has room
+for."""
 
 from __future__ import annotations
 
 from typing import Final
 
 from companion.config import CompanionConfig
+from companion.pilot import STREAMS
 from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.endpoints import Endpoint, Serial
-from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, Source, Tunnel
+from mavlink_bridge.messages import (
+    Attitude,
+    ExtendedSysState,
+    GlobalPosition,
+    Heartbeat,
+    LocalPosition,
+    Message,
+    SetpointLocal,
+    Source,
+    SysStatus,
+    Tunnel,
+    Vector,
+)
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE
 from outrider.errors import InputError
 
@@ -25,6 +39,17 @@ _ONE: Final = Source(1, 1)
 _STATE: Final = GlobalPosition(_ONE, 1, 1.0, 1.0, 1.0, 1.0, (1.0, 1.0, 1.0), 1.0)
 _PLAN: Final = Tunnel(_ONE, 0, 0, PAYLOAD_TYPE, b"\xff" * 128)
 _BEAT: Final = Heartbeat(_ONE, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+_ANY: Final[Vector] = (1.0, 1.0, 1.0)
+_SETPOINT: Final = SetpointLocal(_ONE, 1, 1, 1, 1, 1, _ANY, _ANY, _ANY, 1.0, 1.0)
+_TOLD: Final[dict[int, Message]] = {
+    1: SysStatus(_ONE, 1, 1, 1, 1.0, 1.0),
+    30: Attitude(_ONE, 1, 1.0, 1.0, 1.0, _ANY),
+    32: LocalPosition(_ONE, 1, _ANY, _ANY),
+    245: ExtendedSysState(_ONE, 1, 1),
+}
+_FULL: Final = 0.4
+"""Share of an autopilot's line, one way, from which on it is told. A half-duplex radio, which carries 0.7
+both ways together, has no room for as much again, be it set-points or a ground station's telemetry."""
 
 
 def said(config: CompanionConfig, signed: bool) -> float:
@@ -66,6 +91,31 @@ def doubts(endpoint: Endpoint, config: CompanionConfig, signed: bool) -> str:
             "rates: radio: 57600 in the file, or state_us and plan_us of companion.rates"
         )
     return f"{has}, enough for {vehicles} vehicles of {each}; for {FLEET} write radio: 57600 in the file"
+
+
+def steered(config: CompanionConfig, signed: bool) -> float:
+    """Bytes a second that go to an autopilot that is steered."""
+    setpoints = _size(_SETPOINT, signed) * _SECOND / config.rates.setpoint_us
+    return setpoints + _size(_BEAT, signed)
+
+
+def told(signed: bool) -> float:
+    """Bytes a second of what is asked of an autopilot."""
+    streams = sum(_size(_TOLD[number], signed) * _SECOND / each for number, each in STREAMS.items())
+    return streams + _size(_BEAT, signed)
+
+
+def doubts_of_autopilot(endpoint: Endpoint, config: CompanionConfig, signed: bool, *, dry_run: bool) -> str:
+    """What is to be known of ``endpoint`` as the way to the autopilot; empty if it has room."""
+    if not isinstance(endpoint, Serial):
+        return ""
+    whole, to, back = endpoint.baud / _BITS, steered(config, signed), told(signed)
+    if max(back, 0.0 if dry_run else to) <= _FULL * whole:
+        return ""
+    asked = f"--autopilot {endpoint}: what is asked of the autopilot takes {back:.0f} of {whole:.0f} bytes/s"
+    if dry_run:
+        return f"{asked}; on a radio that leaves little for a ground station: 115200 baud or more is better"
+    return f"{asked}, set-points {to:.0f} the other way: too much for a radio; needed: 115200 baud or more"
 
 
 def _size(message: Message, signed: bool) -> int:

@@ -10,7 +10,7 @@ from companion.target_source import GlobalPositionSource
 from mavlink_bridge.errors import EndpointError
 from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Endpoint, Replay, parse_endpoint
-from outrider.aboard.airtime import doubts
+from outrider.aboard.airtime import doubts, doubts_of_autopilot
 from outrider.aboard.fly_config import FlyConfig
 from outrider.errors import InputError
 from outrider.exposure import exposed
@@ -104,8 +104,13 @@ def checked(options: Options) -> Request:
     key = None if options.signing_key is None else key_of(options.signing_key)
     if key is None:
         _warn(endpoints)
-    if doubt := doubts(swarm, config.settings, key is not None):
-        sys.stderr.write(f"outrider fly: {doubt}\n")
+    signed = key is not None
+    for doubt in (
+        doubts(swarm, config.settings, signed),
+        doubts_of_autopilot(endpoints["autopilot"], config.settings, signed, dry_run=options.dry_run),
+    ):
+        if doubt:
+            sys.stderr.write(f"outrider fly: {doubt}\n")
     return Request(
         config,
         options.config,
