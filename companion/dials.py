@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from companion.config import CompanionConfig
 from mavlink_bridge.messages import NamedValue, Source
 
@@ -22,22 +20,25 @@ class Dials:
         self._period_ns = 1000 * (config.certified.epoch_us if certified else config.rates.replan_us)
         self._boot: int | None = None
         self._next = 0
-        self._seen = self._misses = 0
+        self._misses = 0
+        self._longest: int | None = None
 
-    def due(self, now: int, plan_ns: Sequence[int], held: int, target_age: int | None) -> list[NamedValue]:
-        """The figures, if it is time (µs): of stopwatch readings (ns) of all plans so far, old plans kept,
-        and the target's age (µs)."""
+    def note(self, plan_ns: int) -> None:
+        """A plan took so long (ns)."""
+        self._longest = max(self._longest or 0, plan_ns)
+        self._misses += plan_ns > self._period_ns
+
+    def due(self, now: int, held: int, target_age: int | None) -> list[NamedValue]:
+        """The figures, if it is time (µs): of the plans noted, the old plans ``held`` so far, and the
+        target's age (µs)."""
         if not self._on or now < self._next:
             return []
         if self._boot is None:
             self._boot = self._next = now
         self._next += _SECOND * (1 + (now - self._next) // _SECOND)
-        new = plan_ns[self._seen :]
-        self._seen += len(new)
-        self._misses += sum(reading > self._period_ns for reading in new)
         found = {"misses": float(self._misses), "held": float(held)}
-        if new:
-            found["plan_ms"] = 1e-6 * max(new)
+        if self._longest is not None:
+            found["plan_ms"], self._longest = 1e-6 * self._longest, None
         if target_age is not None:
             found["target_s"] = 1e-6 * target_age
         since = now - self._boot

@@ -9,11 +9,12 @@ from companion.aims import Aims
 from companion.certified.flight import CertifiedFlight
 from companion.config import CompanionConfig, MethodName
 from companion.dials import Dials
+from companion.guard import Guard
 from companion.horizon import Horizon
 from companion.orders import Orders
 from companion.pilot import Phase, Pilot
 from companion.plan_log import PlanLog
-from companion.planner import Plan
+from companion.planner import Plan, Planner
 from companion.planning import Planning, Tally
 from companion.reactions import Reactions
 from companion.reception import LINKS, accepts
@@ -78,8 +79,9 @@ class Companion:
         certified = self._certified
         self._aims = Aims(config, system, self.pilot, ahead if certified is None else certified.seconds)
         self._orders = Orders(config, self._source, fleet, self.pilot, self._aims)
-        self._planning = Planning(config, self.world, self.pilot, self._aims, certified, stopwatch)
-        self.planner, self.guard = self._planning.planner, self._planning.guard
+        self._planning = Planning(
+            config, self.world, self.pilot, self._aims, certified, stopwatch, self._dials.note
+        )
         self._boot: int | None = None
         self._next_setpoint = 0
         self.not_finite = 0
@@ -96,13 +98,23 @@ class Companion:
         return self._planning.held
 
     @property
+    def planner(self) -> Planner:
+        """Makes the plans, unless they are committed."""
+        return self._planning.planner
+
+    @property
+    def guard(self) -> Guard:
+        """Has what is flown."""
+        return self._planning.guard
+
+    @property
     def plan(self) -> Plan | None:
-        """The last that the planner made."""
+        """The last of the planner."""
         return self._planning.plan
 
     @property
     def plan_log(self) -> PlanLog:
-        """Of all plans since they were last taken away."""
+        """Of all plans of the planner since the log was last taken away."""
         return self._planning.log
 
     @property
@@ -172,7 +184,7 @@ class Companion:
             return _NOTHING
         self.world.say(now, self.voice)
         said: list[Message] = [*self.voice.due(now)]
-        said += self._dials.due(now, self._planning.spent, self.held, self.world.target.age(now))
+        said += self._dials.due(now, self.held, self.world.target.age(now))
         return {link: said if link in self.config.voice.links else [] for link in ("autopilot", "ground")}
 
     def _has_to_act(self, now: int) -> bool:

@@ -8,7 +8,9 @@ vehicle over by its mode, on the way up and down too, keeps it until a new go is
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import Enum
+from types import MappingProxyType
 
 import numpy as np
 
@@ -33,7 +35,7 @@ _BESIDE = 30.0
 """m from the box, on each axis, from where a vehicle may start."""
 _FAR = 20_000.0
 """m between the fleet origin and the autopilot's own: beyond, one of the two is wrong."""
-STREAMS = {32: 20_000, 30: 100_000, 1: 1_000_000, 245: 500_000}
+STREAMS: Mapping[int, int] = MappingProxyType({32: 20_000, 30: 100_000, 1: 1_000_000, 245: 500_000})
 """Message ids and intervals (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
 EXTENDED_SYS_STATE. The attitude tells only where the nose points when the set-points begin."""
 _NEEDED = tuple(

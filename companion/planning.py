@@ -44,8 +44,8 @@ class Tally(NamedTuple):
 
 class Planning:
     """Of one vehicle, among what ``world`` knows, towards what ``aims`` says, while ``pilot`` has the
-    vehicle. ``certified`` makes the committed plans; without, ``planner`` makes them. ``stopwatch`` (ns) only
-    measures how long planning takes; nothing depends on it."""
+    vehicle. ``certified`` makes plans, committed ones; without it ``planner`` does. ``stopwatch`` (ns) only
+    measures how long planning takes, and ``took`` is told of each plan (ns); nothing depends on it."""
 
     def __init__(
         self,
@@ -55,13 +55,14 @@ class Planning:
         aims: Aims,
         certified: CertifiedFlight | None,
         stopwatch: Callable[[], int],
+        took: Callable[[int], None],
     ) -> None:
         self._config = config
         self._world = world
         self._pilot = pilot
         self._aims = aims
         self._certified = certified
-        self._stopwatch = stopwatch
+        self._stopwatch, self._told = stopwatch, took
         self.planner = Planner(config)
         self.guard = Guard(config)
         self._heading = Heading(config.heading, config.horizon)
@@ -73,9 +74,11 @@ class Planning:
         self._plan_ns = array("I")
         self._plan_at = array("q")
         self.plan: Plan | None = None
+        """The last of the ``planner``."""
         self.log = PlanLog()
+        """Of all its plans since the log was last taken away."""
         self.next_due = 0
-        """When (µs) the next plan is to be made."""
+        """When (µs) the next plan is to be made; where plans are committed, the next yaw."""
 
     @property
     def tally(self) -> Tally:
@@ -112,7 +115,7 @@ class Planning:
 
     def fly(self, now: int, view: View, *, cautious: bool) -> None:
         """Plan when due; start from the measured state each time the vehicle becomes ours. ``cautious``: no
-        further than it can see."""
+        further in a horizon than ``guard.cautious_speed`` goes."""
         if view.local is not self._frame:
             # Where the vehicle was in the old frame must not be flown to in the new one.
             self._frame, self.guard.horizon = view.local, None
@@ -226,7 +229,9 @@ class Planning:
     def _took(self, now: int, started: int) -> None:
         """The plan that was due at ``now``, and begun when the stopwatch showed ``started``, is done."""
         self._plan_at.append(now)
-        self._plan_ns.append(min(max(self._stopwatch() - started, 0), _LONGEST_NS))
+        spent = min(max(self._stopwatch() - started, 0), _LONGEST_NS)
+        self._plan_ns.append(spent)
+        self._told(spent)
 
     def _aim(self, now: int, view: View, measured: Motion, *, cautious: bool) -> Aim | None:
         """Where to; None when nobody knows."""

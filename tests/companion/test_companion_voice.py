@@ -123,17 +123,34 @@ def test_figures_come_once_a_second_by_the_links_that_are_named(links):
         assert all(0.0 <= m.value <= 0.2 for m in named.get("target_s", []))
 
 
+def test_figures_are_the_same_whoever_takes_the_readings_away():
+    def told(shedding):
+        bench = Bench(task="escort", voice={"values": True}, rates={"replan_us": 20_000})
+        bench.target = seen_at(1, np.array([8.0, 0.0, 0.0]))
+        bench.take_off(5.0)
+        sent = []
+        for _ in range(10):
+            sent += bench.fly(0.7)
+            if shedding:
+                assert len(bench.companion.shed()) > 0
+        return [(m.name, m.value) for m in only(NamedValue, sent, "ground")]
+
+    assert told(shedding=True) == told(shedding=False)
+
+
 def test_figures_are_those_of_the_plans():
     dials = Dials(CompanionConfig(voice=VoiceConfig(values=True)), OWN)
     period = CompanionConfig().rates.replan_us * 1000
-    readings = [2_000_000, period, 3_000_000]
+    for reading in (2_000_000, period, 3_000_000):
+        dials.note(reading)
 
     def told(now, held):
-        return {m.name: m.value for m in dials.due(now, readings, held, None)}
+        return {m.name: m.value for m in dials.due(now, held, None)}
 
     assert told(START, 0) == {"plan_ms": period * 1e-6, "misses": 0.0, "held": 0.0}
     assert told(START + TICK, 0) == {}
-    readings += [period + 1, 5]
+    for reading in (period + 1, 5):
+        dials.note(reading)
     assert told(START + 1_000_000, 2) == {"plan_ms": (period + 1) * 1e-6, "misses": 1.0, "held": 2.0}
     assert told(START + 5_500_000, 2) == {"misses": 1.0, "held": 2.0}
     assert told(START + 6_000_000, 2) == {"misses": 1.0, "held": 2.0}

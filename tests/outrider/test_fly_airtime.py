@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from companion_bench import TARGET, Bench, seen_at
 from said import Run
+from shipped import FIREFLY
 
-from companion.pilot import Phase
+from companion.pilot import STREAMS, Phase
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Serial, UdpIn
-from mavlink_bridge.messages import Source
+from mavlink_bridge.messages import CommandLong, Source
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.signing import Signing
 from outrider.aboard.airtime import (
     FLEET,
     SHARE,
@@ -27,6 +33,8 @@ from outrider.aboard.airtime import (
 )
 from outrider.aboard.fly_config import RADIOS, FleetOrigin, FlyConfig
 from outrider.errors import InputError
+from sitl.autopilot_config import AutopilotConfig
+from sitl.node import Autopilot
 
 HERE = FleetOrigin(latitude=47.4, longitude=8.5, altitude=500.0)
 FAST = FlyConfig(system=1, target=100, origin=HERE)
@@ -99,17 +107,60 @@ def test_only_a_serial_line_is_doubted() -> None:
         doubts(Serial("/dev/ttyUSB0", 9600), FAST.settings, False)
 
 
+def doubt(baud: int, config: FlyConfig = FAST, *, signed: bool = False, dry_run: bool = False) -> str:
+    return doubts_of_autopilot(Serial("/dev/ttyUSB0", baud), config.settings, signed, dry_run=dry_run)
+
+
 @pytest.mark.parametrize("dry_run", [False, True])
 @pytest.mark.parametrize("signed", [False, True])
 def test_a_slow_line_to_the_autopilot_is_doubted(signed: bool, dry_run: bool) -> None:
-    def doubt(baud: int) -> str:
-        return doubts_of_autopilot(Serial("/dev/ttyUSB0", baud), FAST.settings, signed, dry_run=dry_run)
-
-    assert doubt(115200) == ""
-    assert doubts_of_autopilot(UdpIn("127.0.0.1", 14550), FAST.settings, signed, dry_run=dry_run) == ""
-    assert f"{told(signed):.0f} of 5760 bytes/s" in doubt(57600)
+    assert doubt(115200, signed=signed, dry_run=dry_run) == ""
+    narrow = doubt(57600, signed=signed, dry_run=dry_run)
+    assert f"{told(signed):.0f}, of 5760 bytes/s" in narrow
+    assert narrow.endswith("needed: 115200 baud")
     # Nothing steers in a dry run.
-    assert (f"set-points {steered(FAST.settings, signed):.0f}" in doubt(57600)) is not dry_run
+    assert (f"set-points take {steered(FAST.settings, signed):.0f}" in narrow) is not dry_run
+    assert "even for a cable" in doubt(9600, signed=signed, dry_run=dry_run)
+
+
+def test_a_line_to_the_autopilot_is_doubted_by_what_goes_over_it() -> None:
+    def rare(period: int) -> FlyConfig:
+        rates = FAST.companion.rates.model_copy(update={"setpoint_us": period})
+        return FAST.model_copy(update={"companion": FAST.companion.model_copy(update={"rates": rates})})
+
+    assert doubt(57600, rare(100_000)) == ""
+    assert doubt(115200, rare(10_000)).endswith("needed: 230400 baud")
+
+
+def test_what_has_no_baud_rate_is_not_doubted() -> None:
+    for endpoint in (UdpIn("127.0.0.1", 14550), Serial("/dev/ttyACM0", 57600)):
+        assert doubts_of_autopilot(endpoint, FAST.settings, True, dry_run=False) == ""
+
+
+@pytest.mark.parametrize("key", [None, KEY], ids=["plain", "signed"])
+def test_what_an_autopilot_says_is_what_is_stated(key: Key | None) -> None:
+    """The emulated one, asked as a companion asks."""
+    config = AutopilotConfig(system_id=1, latitude=47.4, longitude=8.5, altitude=500.0, start_height=20.0)
+    signing = None if key is None else Signing(key)
+    autopilot = Autopilot(config, FIREFLY, FleetFrame(47.4, 8.5, 500.0), 1, signing=signing)
+    asking = Codec(None, None if key is None else Signing(key))
+    wishes = [
+        CommandLong(Source(1, 195), 1, 1, 511, 0, (float(number), float(each), 0.0, 0.0, 0.0, 0.0, 0.0))
+        for number, each in STREAMS.items()
+    ]
+    autopilot.step(0, [Datagram("autopilot", asking.encode(wish)) for wish in wishes])
+    sizes: Counter[int] = Counter()
+    for tick in range(100, 100 * (SECONDS + 1)):
+        for datagram in autopilot.step(10_000 * tick, []):
+            data = datagram.data
+            while data:
+                size = 12 + data[1] + (13 if data[2] & 1 else 0)
+                sizes[int.from_bytes(data[7:10], "little")] += size
+                data = data[size:]
+    counted = sum(sizes[number] for number in (0, *STREAMS))
+    stated = SECONDS * told(key is not None)
+    # Zeros at a message's end are left out, and the time may begin and end with one of each kind.
+    assert 0.97 * stated < counted <= stated + 300
 
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["plain", "signed"])
@@ -126,8 +177,7 @@ def test_what_goes_to_an_autopilot_is_what_is_stated(key: Key | None) -> None:
 
     bench.companion.step = weighed
     bench.fly(float(SECONDS))
-    stated = SECONDS * steered(bench.config, key is not None)
-    assert 0.85 * stated < sum(sizes) <= stated + 3 * 160
+    assert sum(sizes) == SECONDS * steered(bench.config, key is not None)
 
 
 def test_it_is_said_before_anything_is_opened(run: Run, tmp_path: Path) -> None:
@@ -139,3 +189,13 @@ def test_it_is_said_before_anything_is_opened(run: Run, tmp_path: Path) -> None:
     assert ended.status == 2
     assert "enough for 2 vehicles" in ended.err.splitlines()[0]
     assert "cannot open the port" in ended.err.splitlines()[1]
+
+
+@pytest.mark.parametrize("dry_run", [False, True])
+def test_of_the_autopilots_line_it_is_said_too(run: Run, tmp_path: Path, dry_run: bool) -> None:
+    ways = ("--swarm=udpin:127.0.0.1:0", "--config=px4", "--system=1", "--seconds=0")
+    port = f"{tmp_path}/no-such-port,57600"
+    ended = run("fly", *ways, f"--autopilot={port}", *(["--dry-run"] if dry_run else []))
+    assert ended.status == 2
+    assert f"--autopilot {port}: {'what comes back' if dry_run else 'set-points'}" in ended.err
+    assert "cannot open the port" in ended.err.splitlines()[-1]

@@ -15,6 +15,7 @@ from shipped import FIREFLY, LOGS
 from view_flights import small
 
 from mavlink_bridge.links.link import LinkCounters
+from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.runtime import Direction
 from outrider import names, swarm
@@ -77,14 +78,16 @@ def test_pause_step_speed_and_a_time_that_is_chosen(made: Made) -> None:
 
 def test_who_is_disarmed_flies_no_plan() -> None:
     plan = np.ones((KNOTS, 6), dtype=np.float32)
-    flown = Record([0, 500_000], [plan, plan], [], [], [0, 1_000_000], ["GUIDED", "GUIDED, disarmed"], {})
+    flying, landed = (Heartbeat(Source(1, 1), 2, 12, mode, 6 << 16, 4) for mode in (0x80, 0))
+    flown = Record([0, 500_000], [plan, plan], [], [], [0, 1_000_000], [flying, landed], {})
     assert flown.mode(-1) == ""
-    assert flown.mode(999_999) == "GUIDED"
+    assert flown.mode(999_999) == "OFFBOARD"
     assert np.isfinite(flown.plan(999_999)).all()
-    assert flown.mode(1_000_000) == "GUIDED, disarmed"
+    assert flown.mode(1_000_000) == "OFFBOARD, disarmed"
     assert np.isnan(flown.plan(1_000_000)).all()
-    # A link that fell silent says nothing any more.
-    assert flown.mode(10_000_000) == ""
+    # An autopilot that fell silent says nothing any more.
+    assert flown.mode(4_000_000) == "OFFBOARD, disarmed"
+    assert flown.mode(4_000_001) == ""
 
 
 def test_a_real_run_has_plans_attitudes_and_ages(tmp_path: Path) -> None:

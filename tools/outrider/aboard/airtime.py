@@ -9,7 +9,7 @@ from companion.config import CompanionConfig
 from companion.pilot import STREAMS
 from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from mavlink_bridge.codec import Codec
-from mavlink_bridge.links.endpoints import Endpoint, Serial
+from mavlink_bridge.links.endpoints import BAUD_RATES, Endpoint, Serial
 from mavlink_bridge.messages import (
     Attitude,
     ExtendedSysState,
@@ -47,9 +47,8 @@ _TOLD: Final[dict[int, Message]] = {
     32: LocalPosition(_ONE, 1, _ANY, _ANY),
     245: ExtendedSysState(_ONE, 1, 1),
 }
-_FULL: Final = 0.4
-"""Share of an autopilot's line, one way, from which on it is told. A half-duplex radio, which carries 0.7
-both ways together, has no room for as much again, be it set-points or a ground station's telemetry."""
+_USB: Final = "ttyACM"
+"""A device whose baud rate is a number without a meaning."""
 
 
 def said(config: CompanionConfig, signed: bool) -> float:
@@ -94,28 +93,36 @@ def doubts(endpoint: Endpoint, config: CompanionConfig, signed: bool) -> str:
 
 
 def steered(config: CompanionConfig, signed: bool) -> float:
-    """Bytes a second that go to an autopilot that is steered."""
+    """Bytes a second that go to an autopilot that is steered, without ``voice``."""
     setpoints = _size(_SETPOINT, signed) * _SECOND / config.rates.setpoint_us
     return setpoints + _size(_BEAT, signed)
 
 
 def told(signed: bool) -> float:
-    """Bytes a second of what is asked of an autopilot."""
+    """Bytes a second that an autopilot says: what it is asked for, and its heartbeat."""
     streams = sum(_size(_TOLD[number], signed) * _SECOND / each for number, each in STREAMS.items())
     return streams + _size(_BEAT, signed)
 
 
 def doubts_of_autopilot(endpoint: Endpoint, config: CompanionConfig, signed: bool, *, dry_run: bool) -> str:
-    """What is to be known of ``endpoint`` as the way to the autopilot; empty if it has room."""
-    if not isinstance(endpoint, Serial):
+    """What is to be known of ``endpoint`` as the way to the autopilot; empty if a radio of that baud rate
+    would have room, in a dry run for as much again, which is a ground station's."""
+    if not isinstance(endpoint, Serial) or _USB in endpoint.device:
         return ""
-    whole, to, back = endpoint.baud / _BITS, steered(config, signed), told(signed)
-    if max(back, 0.0 if dry_run else to) <= _FULL * whole:
+    to, back = 0.0 if dry_run else steered(config, signed), told(signed)
+    need = 2.0 * back if dry_run else to + back
+    if need <= room(endpoint.baud):
         return ""
-    asked = f"--autopilot {endpoint}: what is asked of the autopilot takes {back:.0f} of {whole:.0f} bytes/s"
-    if dry_run:
-        return f"{asked}; on a radio that leaves little for a ground station: 115200 baud or more is better"
-    return f"{asked}, set-points {to:.0f} the other way: too much for a radio; needed: 115200 baud or more"
+    whole = endpoint.baud / _BITS
+    enough = next((baud for baud in BAUD_RATES if need <= room(baud)), BAUD_RATES[-1])
+    setpoints = "" if dry_run else f"set-points take {to:.0f} bytes/s, and "
+    short = "too much even for a cable" if max(to, back) > whole else "too much for a radio"
+    if dry_run and need <= 2.0 * room(endpoint.baud):
+        short = "on a radio too little is left for a ground station"
+    return (
+        f"--autopilot {endpoint}: {setpoints}what comes back takes {back:.0f}, of {whole:.0f} bytes/s each "
+        f"way: {short}; needed: {enough} baud"
+    )
 
 
 def _size(message: Message, signed: bool) -> int:

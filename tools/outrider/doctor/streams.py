@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
+from companion.pilot import STREAMS
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
+
+_ASKED: Final = {number: 1e6 / each for number, each in STREAMS.items()}
+"""Hz, by message id."""
 
 
 class Need(NamedTuple):
@@ -22,10 +26,17 @@ class Need(NamedTuple):
 
 
 NEEDS: Final = (
-    Need(32, "LOCAL_POSITION_NED", 50.0, 2.0, True, "Every plan begins where this says that it is."),
-    Need(30, "ATTITUDE", 10.0, 2.0, True, "It says where the nose points when set-points begin."),
-    Need(1, "SYS_STATUS", 1.0, 0.2, True, "It has the pre-arm check and the battery."),
-    Need(245, "EXTENDED_SYS_STATE", 2.0, 0.5, False, "It says whether an armed vehicle stands or flies."),
+    Need(32, "LOCAL_POSITION_NED", _ASKED[32], 2.0, True, "Every plan begins where this says that it is."),
+    Need(30, "ATTITUDE", _ASKED[30], 2.0, True, "It says where the nose points when set-points begin."),
+    Need(1, "SYS_STATUS", _ASKED[1], 0.2, True, "It has the pre-arm check and the battery."),
+    Need(
+        245,
+        "EXTENDED_SYS_STATE",
+        _ASKED[245],
+        0.5,
+        False,
+        "It says whether an armed vehicle stands or flies.",
+    ),
     Need(
         33,
         "GLOBAL_POSITION_INT",

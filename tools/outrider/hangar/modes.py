@@ -37,7 +37,6 @@ _AUTO: Final = {
     8: "FOLLOW",
     9: "PRECLAND",
 }
-DISARMED: Final = ", disarmed"
 
 
 def mode_name(flavour: str, custom_mode: int) -> str:
@@ -50,6 +49,11 @@ def mode_name(flavour: str, custom_mode: int) -> str:
 
 
 def told_mode(beat: Heartbeat) -> str:
-    """As an autopilot's HEARTBEAT (0) has it, and whether it is disarmed."""
+    """The name of the mode in an autopilot's HEARTBEAT (0), and whether it is disarmed, to be shown."""
     flavour = "ardupilot" if beat.autopilot == ARDUPILOT.autopilot else "px4"
-    return mode_name(flavour, beat.custom_mode) + ("" if beat.base_mode & ARMED else DISARMED)
+    return mode_name(flavour, beat.custom_mode) + ("" if is_armed(beat) else ", disarmed")
+
+
+def is_armed(beat: Heartbeat) -> bool:
+    """Whether an autopilot's HEARTBEAT (0) says so."""
+    return bool(beat.base_mode & ARMED)

@@ -16,7 +16,7 @@ from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, NamedValue, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
 from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
-from outrider.hangar.modes import told_mode
+from outrider.hangar.modes import is_armed, told_mode
 from outrider.viewing.moment import NO_PLAN, Array, Moment, Single, State, euler_attitude, padded
 from outrider.viewing.scene import LEAST_REACH, Scene
 from outrider.viewing.wishes import Wishes
@@ -48,9 +48,19 @@ class _Heard:
         self.attitude: Array | None = None
         self.planned = -np.inf
         self.plan: Single = NO_PLAN
-        self.mode = ""
+        self.beat: Heartbeat | None = None
         self.plan_ms = float("nan")
         self.held: int | None = None
+
+    def flown(self, wall: float) -> Single:
+        """The plan (KNOTS, 6), if it is fresh and its vehicle has not said that it is disarmed."""
+        idle = self.beat is not None and not is_armed(self.beat)
+        return NO_PLAN if idle or wall - self.planned >= FRESH else self.plan
+
+    @property
+    def mode(self) -> str:
+        """As its autopilot told it; empty before."""
+        return "" if self.beat is None else told_mode(self.beat)
 
 
 class Listener:
@@ -111,7 +121,7 @@ class Listener:
             heard.attitude = euler_attitude(message.roll, message.pitch, message.yaw)
         elif isinstance(message, Heartbeat):
             if component == _AUTOPILOT:
-                heard.mode = told_mode(message)
+                heard.beat = message
         elif isinstance(message, NamedValue):
             if message.name == "plan_ms":
                 heard.plan_ms = message.value
@@ -169,7 +179,7 @@ class Listener:
             "live",
             np.array([_carried(one.fix, wall) for one in shown], np.float32),
             np.array([_turned(one, wall) for one in shown], np.float32),
-            np.array([one.plan if wall - one.planned < FRESH else NO_PLAN for one in shown]),
+            np.array([one.flown(wall) for one in shown]),
             np.array(np.full(3, np.nan) if target is None else _carried(target.fix, wall), np.float32),
             np.empty((0, 3), np.float32),
             tuple(State(one.mode, wall - one.fix.at, one.plan_ms, one.held) for one in shown),

@@ -12,19 +12,18 @@ import numpy as np
 
 from companion.certified.committed import horizon_of
 from companion.reception import AUTOPILOT
+from companion.vehicle import HEARTBEAT_LOST
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, Source, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
 from mavlink_bridge.tlog import read_tlog
 from outrider import names
-from outrider.hangar.modes import DISARMED, told_mode
+from outrider.hangar.modes import is_armed, told_mode
 from outrider.viewing.moment import NO_PLAN, Array, Single, euler_attitude, padded
 
 FRESH = 1_000_000
 """µs for which a plan is shown after its epoch."""
-_BEAT = 3_000_000
-"""µs for which a mode is believed: an autopilot tells it once a second."""
 _DECODED = {0, 30, 33, 385}
 """HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, TUNNEL."""
 _SWARM, _AUTOPILOT = names.LINK_NUMBERS["swarm"], names.LINK_NUMBERS["autopilot"]
@@ -33,7 +32,7 @@ _OFTEN = 4096
 
 class Record(NamedTuple):
     """Of one vehicle, by its own clock (Unix µs, rising): ``epochs`` and ``plans`` (KNOTS, 6); ``leant``
-    and the attitudes (4,), FLU in ENU, and ``beaten`` and the modes, that its autopilot told; when each
+    and the attitudes (4,), FLU in ENU, and ``beaten`` and its heartbeats, that its autopilot told; when each
     other was ``heard``."""
 
     epochs: list[int]
@@ -41,24 +40,30 @@ class Record(NamedTuple):
     leant: list[int]
     attitudes: list[Array]
     beaten: list[int]
-    modes: list[str]
+    beats: list[Heartbeat]
     heard: dict[int, list[int]]
 
     def plan(self, now: int) -> Single:
-        """Flown at ``now`` (µs); NaN if there is none that is fresh, and where nothing can be flown."""
+        """Flown at ``now`` (µs); NaN if there is none that is fresh, and where the autopilot said that it is
+        disarmed."""
         index = bisect_right(self.epochs, now) - 1
-        idle = index < 0 or now - self.epochs[index] > FRESH or self.mode(now).endswith(DISARMED)
-        return NO_PLAN if idle else self.plans[index]
+        beat = self._beat(now)
+        idle = beat is not None and not is_armed(beat)
+        return NO_PLAN if idle or index < 0 or now - self.epochs[index] > FRESH else self.plans[index]
 
     def mode(self, now: int) -> str:
         """The autopilot's at ``now`` (µs), as it told it; empty where that is not known."""
-        index = bisect_right(self.beaten, now) - 1
-        return "" if index < 0 or now - self.beaten[index] > _BEAT else self.modes[index]
+        beat = self._beat(now)
+        return "" if beat is None else told_mode(beat)
 
     def attitude(self, now: int) -> Array | None:
         """Told at ``now`` (µs), or shortly before."""
         index = bisect_right(self.leant, now) - 1
         return None if index < 0 or now - self.leant[index] > FRESH else self.attitudes[index]
+
+    def _beat(self, now: int) -> Heartbeat | None:
+        index = bisect_right(self.beaten, now) - 1
+        return None if index < 0 or now - self.beaten[index] > HEARTBEAT_LOST else self.beats[index]
 
     def age(self, now: int) -> float:
         """s, of what was heard of the other unheard of for longest; NaN if nobody was yet."""
@@ -100,7 +105,7 @@ def _take(found: Record, owner: int, time: int, link: int, message: Message) -> 
         own = message.source == Source(owner, AUTOPILOT) and link == _AUTOPILOT
         if own and (not found.beaten or time >= found.beaten[-1]):
             found.beaten.append(time)
-            found.modes.append(told_mode(message))
+            found.beats.append(message)
     elif isinstance(message, GlobalPosition):
         if system != owner and link == _SWARM:
             found.heard.setdefault(system, []).append(time)
