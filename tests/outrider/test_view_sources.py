@@ -14,9 +14,12 @@ from said import Run
 from shipped import FIREFLY, LOGS
 from view_flights import small
 
+from companion.node import COMPONENT
+from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.link import LinkCounters
-from mavlink_bridge.messages import Heartbeat, Source
+from mavlink_bridge.messages import GlobalPosition, Heartbeat, Source, Tunnel
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
 from mavlink_bridge.runtime import Direction
 from outrider import names, swarm
 from outrider.flight import Flight
@@ -231,6 +234,23 @@ def test_who_listens_sees_the_flight_and_is_silent(avoidance: str) -> None:
     assert np.linalg.norm(begin, axis=2).min(axis=1).max() < 1.0
     np.testing.assert_allclose(np.linalg.norm(last.attitude, axis=1), 1.0, atol=1e-5)
     assert all(state.mode == "GUIDED" for state in last.states)
+
+
+@pytest.mark.parametrize("armed", [True, False])
+def test_who_listens_sees_no_plan_of_who_is_disarmed(armed: bool) -> None:
+    ear, codec, own = Ear(), Codec(), Source(1, 1)
+    place = GlobalPosition(own, 1, 47.4, 8.5, 500.0, 10.0, (0.0, 0.0, 0.0), 0.0)
+    plan = pack(quantise(0, 100_000, np.zeros(3), np.zeros(3), np.zeros((16, 3)), 1))
+    said = [
+        place,
+        Heartbeat(own, 2, 3, 0x80 if armed else 0, 4, 4),
+        Tunnel(Source(1, COMPONENT), 0, 0, PAYLOAD_TYPE, plan),
+    ]
+    ear.arrived = [codec.encode(message) for message in said]
+    *_, moment = Listener([ear], [True], 10, "").poll(1.0)
+    assert isinstance(moment, Moment)
+    assert np.isfinite(moment.plan).all() == armed
+    assert moment.states[0].mode == ("GUIDED" if armed else "GUIDED, disarmed")
 
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
