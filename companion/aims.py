@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import hypot, inf
+
 import numpy as np
 
 from companion.bearings import turned
@@ -16,6 +18,8 @@ from companion.world import View
 
 _BACK, _STILL = 0.5, 0.5
 """m and m/s: so near to where it started, and so slow, it is back."""
+_BESIDE, _PATIENCE = 5.0, 10_000_000
+"""m and µs: who is so near and has come no nearer for so long is back too."""
 
 
 class Aims:
@@ -28,19 +32,33 @@ class Aims:
         self._seconds = seconds
         self._surface = config.surface_of(system)
         self._settling = Settling(config)
+        self._phase: Phase | None = None
         self._held: Array | None = None
+        self._began: Array | None = None
+        self._nearest, self._nearer_at = inf, 0
+        limits = config.limits.within(config.field.margin(1))
+        self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self.goal: Array | None = None
-        """(3,) m, fleet-local ENU: of the task ``goto``; None for where it is."""
+        """(3,) m, fleet-local ENU: as ordered, of the task ``goto``; None for where it began to steer."""
+
+    def begin(self, place: Array) -> None:
+        """It steers from ``place`` (3,) on, the first time or again."""
+        self._began = place
 
     def forget(self, view: View) -> None:
-        """Once it escorts again, it stays elsewhere the next time."""
-        if self._pilot.phase not in (Phase.HOLD, Phase.RETURN) and view.target is not None:
+        """What was for another phase, or for a target that was lost before, counts no more."""
+        phase = self._pilot.phase
+        if phase is not self._phase:
+            self._phase, self._held = phase, None
+            self._settling = Settling(self._config)
+            self._nearest = inf
+        elif phase is Phase.ESCORT and self._config.task == "escort" and view.target is not None:
             self._held = None
 
-    def aim(self, view: View, measured: Motion, obstacles: Obstacles, *, cautious: bool) -> Aim:
-        """For a plan from ``measured`` on, ``cautious`` no further than that speed goes; ``obstacles``: as
-        planned among last, of which it settles clear. SurfaceError where the surface has no nearest point."""
-        aim = self._destination(view, measured, obstacles)
+    def aim(self, now: int, view: View, measured: Motion, obstacles: Obstacles, *, cautious: bool) -> Aim:
+        """For a plan at ``now`` (µs) from ``measured`` on, ``cautious`` no further than that speed goes;
+        ``obstacles``: of which it settles clear. SurfaceError where the surface has no nearest point."""
+        aim = self._destination(now, view, measured, obstacles)
         speed = self._config.guard.cautious_speed
         return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
 
@@ -54,16 +72,17 @@ class Aims:
             return aim
         return aim._replace(destination=measured.position + drift + most / far * way)
 
-    def _destination(self, view: View, measured: Motion, obstacles: Obstacles) -> Aim:
+    def _destination(self, now: int, view: View, measured: Motion, obstacles: Obstacles) -> Aim:
         target, phase, task = view.target, self._pilot.phase, self._config.task
         if phase is Phase.RETURN:
-            place = self._way_back(measured)
+            place = self._way_back(now, measured)
         elif phase is Phase.SETTLE:
             place = self._settling.rest(measured, obstacles)
             if self._settling.clear:
                 self._pilot.settled()
         elif phase is not Phase.HOLD and task == "goto":
-            place = measured.position if self.goal is None else self.goal
+            began = measured.position if self._began is None else self._began
+            place = began if self.goal is None else self.goal
         elif phase is not Phase.HOLD and target is not None:
             return self._around(target, measured)
         else:
@@ -87,15 +106,20 @@ class Aims:
             self._held = measured.position.copy()
         return self._held
 
-    def _way_back(self, measured: Motion) -> Array:
-        """Above where it started, as high as it flies now and allowed; told to the pilot when it is there."""
-        limits, start = self._config.limits, self._pilot.start
+    def _way_back(self, now: int, measured: Motion) -> Array:
+        """Above where it started, as high as it flies now, or as near to that as it is allowed; told to the
+        pilot when it is there, or beside it and comes no nearer."""
+        start = self._pilot.start
         if start is None:
             return measured.position
         height = float(self._place_to_hold(measured)[2])
-        height = min(max(height, limits.box_min[2]), limits.box_max[2])
-        above = np.array([start[0], start[1], height])
+        above: Array = np.clip(np.array([start[0], start[1], height]), self._low, self._high)
         off = above - measured.position
-        if float(off[:2] @ off[:2]) < _BACK**2 and float(measured.velocity @ measured.velocity) < _STILL**2:
+        far = hypot(off[0], off[1])
+        if far < self._nearest - _BACK:
+            self._nearest, self._nearer_at = far, now
+        there = far < _BACK and float(measured.velocity @ measured.velocity) < _STILL**2
+        # Who finds the place taken may go round it for ever.
+        if there or (far < _BESIDE and now - self._nearer_at > _PATIENCE):
             self._pilot.returned()
         return above

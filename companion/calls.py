@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 from mavlink_bridge.messages import CommandAck, CommandLong, Message, Source
 
 ACCEPTED, IN_PROGRESS = 0, 5
@@ -9,30 +11,42 @@ _RETRY = 500_000
 _EXPIRY = 15_000_000
 """µs after which an acknowledged command without effect is sent again; longer than a take-off."""
 
+_REFUSALS = 16
+
 _Call = tuple[int, tuple[float, ...]]
 
 
 class Calls:
-    """What was asked of the autopilot of ``own``'s system, and what it answered; ``refusals`` in words."""
+    """What was asked of the autopilot of ``own``'s system, and what it answered; ``refusals``: the last, in
+    words."""
 
     def __init__(self, own: Source) -> None:
         self._own = own
-        self.refusals: list[str] = []
+        self.refusals: deque[str] = deque(maxlen=_REFUSALS)
+        self.refused = 0
+        """How many refusals there were; one that is but repeated counts once."""
+        self._results: dict[_Call, int] = {}
         self._acknowledged: set[_Call] = set()
         self._answered: set[_Call] = set()
         self._sent: dict[_Call, int] = {}
         self._asked: dict[int, _Call] = {}
 
     def hear(self, message: CommandAck) -> None:
-        """An answer; it names the command alone and is taken for the last one of that kind."""
+        """An answer, unless it is to somebody else; it names the command alone and is taken for the last one
+        of that kind. MAVLink 1 does not say whom it answers."""
+        own = self._own
+        if message.target_system not in (0, own.system) or message.target_component not in (0, own.component):
+            return
         call = self._asked.pop(message.command, None)
         if call is None:
             return
         self._answered.add(call)
         if message.result in (ACCEPTED, IN_PROGRESS):
             self._acknowledged.add(call)
-        else:
+        elif self._results.get(call) != message.result:
+            self.refused += 1
             self.refusals.append(f"command {message.command}: result {message.result}")
+        self._results[call] = message.result
 
     def sent_at(self, command: int, params: tuple[float, ...]) -> int:
         """When (µs) it was last sent, 0 for never."""
@@ -48,6 +62,7 @@ class Calls:
         self._asked.clear()
         self._acknowledged.clear()
         self._answered.clear()
+        self._results.clear()
 
     def call(self, now: int, command: int, params: tuple[float, ...]) -> list[Message]:
         """The command, unless it was acknowledged, sent less than half a second ago, or must wait for its

@@ -42,6 +42,10 @@ class Guard:
         self._fresh_at = now
         self.state = Holding.FRESH
 
+    def rest(self) -> None:
+        """Nothing is flown, for nothing is steered: what failed then is over."""
+        self.failing = self.horizon = None
+
     def accept(self, now: int, horizon: Horizon) -> None:
         """A good plan."""
         self.failing = None

@@ -31,6 +31,8 @@ REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
 OPERATORS_GO = "the operator's go"
 """What it waits for when all else is ready."""
 _NAN = float("nan")
+_ARMS = 2_000_000
+"""µs after the last asking to arm in which a heartbeat may still say that it is not."""
 _BESIDE = 30.0
 """m from the box, on each axis, from where a vehicle may start."""
 _FAR = 20_000.0
@@ -80,6 +82,7 @@ class Pilot:
         self._calls = Calls(own)
         self._custody = Custody(self.vehicle)
         self._owner = Owner.OURS
+        self._arming = 0
         self._takeoff = Takeoff(self.vehicle, self._calls, origin_altitude)
 
     @property
@@ -94,8 +97,13 @@ class Pilot:
 
     @property
     def refusals(self) -> list[str]:
-        """Commands that the autopilot refused, in words."""
-        return self._calls.refusals
+        """Commands that the autopilot refused last, in words."""
+        return list(self._calls.refusals)
+
+    @property
+    def refused(self) -> int:
+        """How many refusals there were."""
+        return self._calls.refused
 
     @property
     def guided(self) -> bool:
@@ -110,6 +118,7 @@ class Pilot:
         profile = self.profile
         return (
             self.phase is Phase.PREPARE
+            and self.vehicle.alive
             and profile is not None
             and profile.streams_first
             and self._takeoff.step(profile) is Step.MODE
@@ -130,10 +139,18 @@ class Pilot:
             return True
         if self.phase not in (Phase.CONNECT, Phase.PREPARE, Phase.YIELDED) or not 0.5 <= height <= 120.0:
             return False
+        if self.phase is Phase.PREPARE and self._height not in (None, height):
+            # The autopilot may have been told the other height already.
+            return False
         if self.phase is Phase.YIELDED:
             self._start_anew()
         self._height, self._go_at = height, None
         return True
+
+    def take_back(self) -> None:
+        """A go that waits for something is none; one that has begun goes on."""
+        if self.phase is Phase.CONNECT:
+            self._height = None
 
     def hold(self) -> bool:
         """The operator's order to stay where it is. Whether it is taken."""
@@ -159,14 +176,18 @@ class Pilot:
     def land(self) -> bool:
         """The operator's order to land. A vehicle under way first comes to a hover clear of the others,
         because an autopilot that lands looks out for nobody. Whether it is taken: not for a vehicle that
-        somebody else has, nor for one in the air that is not as we would leave it."""
+        somebody else has, nor for one in the air that is not as we would leave it, nor for one that is not
+        heard, but that a go is taken back."""
         if self.phase in STEERED:
             self.phase = Phase.SETTLE
         elif self.phase is Phase.PREPARE:
             self._alight()
         elif self.phase is Phase.CONNECT:
-            # An earlier go is taken back.
-            self._height = None
+            waited = self._height is not None
+            self.take_back()
+            if not self.vehicle.alive:
+                # Whether it flies, and whose it is, is not known.
+                return waited
             if self.vehicle.flies:
                 if not self.vehicle.left_by_us:
                     return False
@@ -191,6 +212,7 @@ class Pilot:
 
     def _alight(self) -> None:
         self.phase = Phase.LAND
+        self._arming = self._takeoff.asked_to_arm
         self._calls.forget()
         self._passage = Passage(self.vehicle.mode)
 
@@ -216,12 +238,16 @@ class Pilot:
         return self._land(now) if self.phase is Phase.LAND else []
 
     def _land(self, now: int) -> list[Message]:
-        """Told once: an autopilot that lands and then does something else was told so by somebody."""
+        """Told once: an autopilot that lands and then does something else was told so by somebody. And not
+        unheard: a pilot may have it."""
         vehicle, profile = self.vehicle, self.profile
         if vehicle.heartbeat is not None and not vehicle.armed:
-            self.phase = Phase.DONE
+            if vehicle.beat_at - self._arming > _ARMS:
+                self.phase = Phase.DONE
             return []
-        if profile is not None and vehicle.alive and vehicle.flies:
+        if not vehicle.alive:
+            return []
+        if profile is not None and vehicle.flies:
             # Without set-points it may hold until it is told.
             before = profile.loss_modes | {profile.guided_custom_mode}
             if self._passage.strays(vehicle.mode, profile.land_modes, before):
@@ -294,7 +320,7 @@ class Pilot:
     def _unseen(self, view: View) -> str:
         """What has not been heard that every plan needs."""
         vehicle = self.vehicle
-        if vehicle.heartbeat is None:
+        if vehicle.heartbeat is None or not vehicle.alive:
             return "a heartbeat of the autopilot"
         if vehicle.profile is None:
             kind = vehicle.heartbeat.autopilot
@@ -350,14 +376,19 @@ class Pilot:
             return []
         if not self.vehicle.armed:
             self._expire(now)
-        if self.vehicle.alive:
-            ways = profile.takeoff_modes | {profile.guided_custom_mode}
-            if takeoff.risen(view.own, height):
-                ways |= {profile.hold_mode}
-            if self._passage.strays(self.vehicle.mode, ways):
-                self._yield()
-                if not self.vehicle.armed:
-                    self._start_anew()
+        if not self.vehicle.alive:
+            # Who has it nobody knows: the next heartbeat says, before anything is asked of it.
+            return []
+        ways = profile.takeoff_modes | {profile.guided_custom_mode}
+        if takeoff.risen(view.own, height):
+            ways |= {profile.hold_mode}
+        if self._passage.strays(self.vehicle.mode, ways):
+            self._yield()
+            if not self.vehicle.armed:
+                self._start_anew()
+        elif self.vehicle.flies and view.own.age > self._config.guard.own_lost_us:
+            # It would never be seen to have arrived.
+            self._alight()
         if self.phase is not Phase.PREPARE:
             return []
         step = takeoff.step(profile)

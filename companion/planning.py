@@ -124,7 +124,7 @@ class Planning:
             self.guard.horizon = None
         self._flown = now
         if not self._pilot.streaming or view.own is None or view.local is None:
-            self.guard.horizon = None
+            self.guard.rest()
             return
         stale = view.own.age > self._config.guard.own_stale_us
         measured = Motion(view.own.position, self._bounded(view.own.velocity), _ZERO)
@@ -152,8 +152,7 @@ class Planning:
     def _begin(self, now: int, yaw: float, measured: Motion) -> None:
         """To steer, from the ``measured`` state on."""
         self._heading.reset(yaw)
-        if self._aims.goal is None:
-            self._aims.goal = measured.position
+        self._aims.begin(measured.position)
         self.guard.start(now, measured)
         if self._certified is not None:
             self._certified.stand(now, measured.position)
@@ -174,9 +173,6 @@ class Planning:
             flight.watch(now, measured)
         if self._pilot.guided and flight.due(now):
             started = self._stopwatch()
-            if self._pilot.phase is Phase.SETTLE:
-                here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
-                self._obstacles = self._world.obstacles(now, view, here)
             aim = None if stale else self._aim(now, view, measured, cautious=cautious)
             if aim is None:
                 flight.keeper.carry_on(Why.MISSING)
@@ -235,8 +231,12 @@ class Planning:
 
     def _aim(self, now: int, view: View, measured: Motion, *, cautious: bool) -> Aim | None:
         """Where to; None when nobody knows."""
+        if self._pilot.phase is Phase.SETTLE:
+            # Of the others as they are now: who begins to steer has no plan yet that was made among them.
+            here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
+            self._obstacles = self._world.obstacles(now, view, here)
         try:
-            aim = self._aims.aim(view, measured, self._obstacles, cautious=cautious)
+            aim = self._aims.aim(now, view, measured, self._obstacles, cautious=cautious)
         except SurfaceError:
             return None
         if self._config.traffic is None:

@@ -30,6 +30,8 @@ class Takeoff:
         self._flying_already = False
         self._calm_since: int | None = None
         self._step = 0
+        self.asked_to_arm = 0
+        """When (µs) it was last told to arm, 0 before the first time."""
 
     def begin(self, own: State) -> None:
         """From here, on the ground or where it flies already."""
@@ -62,6 +64,8 @@ class Takeoff:
         elif step is Step.ARM:
             done = vehicle.armed
             call = self._calls.call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            if call:
+                self.asked_to_arm = now
         else:
             climbed = float(own.position[2]) - self._ground
             done = self._flying_already or self._is_up(now, own, climbed, height)
@@ -81,6 +85,8 @@ class Takeoff:
         """Still at the height asked for; or still for a while in the air, for an estimate of height that
         drifts by more than one may ask: the autopilot measures its height from its own origin."""
         still = float(abs(own.velocity).max()) < _STILL
+        if self._vehicle.landed_state == ON_GROUND:
+            return False
         if not still or self._vehicle.landed_state != IN_AIR or climbed < 0.5 * height:
             self._calm_since = None
         elif self._calm_since is None:

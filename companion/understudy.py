@@ -47,11 +47,13 @@ class Onlooker(Pilot):
     def land(self) -> bool:
         return False
 
+    def alight(self) -> None:
+        """The vehicle is somebody else's to land."""
+
     def step(self, now: int, view: View) -> list[Message]:
         """No commands, ever."""
         self.vehicle.tick(now)
-        silent = self.vehicle.heartbeat is not None and not self.vehicle.alive
-        self.waiting_for = "a heartbeat of the autopilot" if silent else self._unseen(view)
+        self.waiting_for = self._unseen(view)
         self.phase = Phase.CONNECT if self.waiting_for else Phase.ESCORT
         return []
 

@@ -62,6 +62,11 @@ class Vehicle:
             self._extended_seen, self._extended_at = self._extended, now
 
     @property
+    def beat_at(self) -> int:
+        """When (µs) the last heartbeat came, 0 before the first."""
+        return self._beat_at
+
+    @property
     def alive(self) -> bool:
         """Whether its heart beats: whether what it said of its mode still counts."""
         return self.heartbeat is not None and self.now - self._beat_at <= HEARTBEAT_LOST

@@ -211,3 +211,26 @@ def test_who_took_the_vehicle_over_while_it_settles_keeps_it(flavour):
     taken = beat(flavour, armed=True, guided=False)
     assert rig.run(CompanionConfig().guard.settle_us * 1e-6 + 1.0, taken) == []
     assert not rig.pilot.streaming
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_nothing_is_sent_on_the_way_up_to_an_autopilot_that_is_not_heard(flavour):
+    """A pilot may have it meanwhile; then it is the pilot's."""
+    rig = climbing(flavour, HEIGHT)
+    rig.run(3.1)
+    assert rig.run(60.0) == []
+    assert not rig.pilot.streaming
+    assert rig.tick(beat(flavour, armed=True, mode=MANUAL[flavour][1])) == []
+    assert rig.pilot.phase is Phase.YIELDED
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_nothing_is_sent_on_the_way_down_to_an_autopilot_that_is_not_heard(flavour):
+    rig = climbing(flavour, HEIGHT)
+    assert rig.pilot.land()
+    mode = next(iter(PROFILES[flavour].takeoff_modes), PROFILES[flavour].guided_custom_mode)
+    assert rig.run(1.0, beat(flavour, armed=True, mode=mode), landed(2))
+    rig.run(3.1)
+    assert rig.run(60.0) == []
+    assert rig.tick(beat(flavour, armed=True, mode=MANUAL[flavour][1]), landed(2)) == []
+    assert rig.pilot.phase is Phase.YIELDED

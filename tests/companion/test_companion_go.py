@@ -9,7 +9,9 @@ import pytest
 from companion_bench import (
     ARM,
     INTERVAL,
+    LAND,
     MODE,
+    PROFILES,
     REQUEST,
     TAKEOFF,
 )
@@ -154,3 +156,88 @@ def test_what_was_said_of_landing_long_ago_is_forgotten():
     assert rig.pilot.go(HEIGHT)
     rig.run(1.0, beat("ardupilot", armed=True), HEALTHY, acks=True)
     assert "EXTENDED_SYS_STATE" in rig.pilot.waiting_for
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_go_waits_for_an_autopilot_that_is_heard(flavour):
+    rig = Rig(flavour)
+    rig.run(1.0, beat(flavour), HEALTHY, acks=True)
+    rig.run(10.0, HEALTHY, acks=True)
+    assert rig.pilot.go(HEIGHT)
+    rig.run(5.0, HEALTHY, acks=True)
+    assert rig.pilot.phase is Phase.CONNECT
+    assert rig.pilot.waiting_for == "a heartbeat of the autopilot"
+    rig.run(0.1, beat(flavour), HEALTHY, acks=True)
+    assert rig.pilot.phase is Phase.PREPARE
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_an_order_to_land_that_cannot_be_obeyed_yet_is_refused(flavour):
+    """A companion that was started anew in the air, before its first heartbeat."""
+    rig = Rig(flavour)
+    assert not rig.pilot.land()
+    rig.run(0.2, beat(flavour, armed=True, guided=True), landed(2))
+    assert rig.pilot.land()
+    assert rig.pilot.phase is Phase.LAND
+
+
+def test_a_go_that_waits_can_be_taken_back_and_one_that_has_begun_goes_on():
+    rig = Rig()
+    assert rig.pilot.go(HEIGHT)
+    rig.pilot.take_back()
+    rig.run(5.0, beat("ardupilot"), HEALTHY, acks=True)
+    assert rig.pilot.phase is Phase.CONNECT
+    rig.prepared()
+    rig.pilot.take_back()
+    sent = rig.run(1.0, beat("ardupilot", guided=True), HEALTHY, acks=True)
+    assert ARM in {command for command, _ in sent}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_another_height_is_refused_once_the_way_up_has_begun(flavour):
+    rig = Rig(flavour)
+    rig.prepared()
+    assert not rig.pilot.go(HEIGHT + 1.0)
+    assert rig.pilot.go(HEIGHT)
+    assert rig.pilot.phase is Phase.PREPARE
+
+
+def test_who_stands_on_the_ground_is_not_up_however_low_it_is_to_rise():
+    rig = Rig("ardupilot")
+    rig.run(0.2, beat("ardupilot"), HEALTHY, acks=True)
+    assert rig.pilot.go(0.5)
+    rig.tick()
+    rig.view = READY._replace(own=state(0.25))
+    sent = rig.run(1.0, beat("ardupilot", armed=True, guided=True), landed(1), acks=True)
+    assert rig.pilot.phase is Phase.PREPARE
+    assert TAKEOFF in {command for command, _ in sent}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_landing_before_it_is_known_to_be_armed_ends_when_it_is_known_not_to_be(flavour):
+    rig = Rig(flavour)
+    rig.prepared()
+    waiting, armed = beat(flavour, guided=flavour == "ardupilot"), beat(flavour, armed=True)
+    while ARM not in {command for _, command, _ in rig.sent}:
+        rig.run(0.01, waiting, HEALTHY, landed(1), acks=True)
+    assert rig.pilot.land()
+    # The heartbeats of a whole second may have left before.
+    rig.run(1.0, waiting, HEALTHY, landed(1), acks=True)
+    assert rig.pilot.phase is Phase.LAND
+    sent = rig.run(1.0, armed, HEALTHY, landed(1), acks=True)
+    assert LAND in {command for command, _ in sent}
+    rig.run(3.0, beat(flavour), HEALTHY, landed(1))
+    assert rig.pilot.phase is Phase.DONE
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_whose_place_is_lost_for_long_on_the_way_up_lands(flavour):
+    rig = Rig(flavour)
+    rig.prepared()
+    armed = beat(flavour, armed=True, mode=next(iter(PROFILES[flavour].takeoff_modes), 4))
+    rig.run(2.0, armed, HEALTHY, landed(2), acks=True)
+    assert rig.pilot.phase is Phase.PREPARE
+    rig.view = READY._replace(own=state(0.3 * HEIGHT, age=5_100_000))
+    sent = rig.run(1.0, armed, HEALTHY, landed(2), acks=True)
+    assert rig.pilot.phase is Phase.LAND
+    assert LAND in {command for command, _ in sent}

@@ -27,6 +27,7 @@ from pilot_rig import (
     HEIGHT,
     ILL,
     NOTHING,
+    OWN,
     READY,
     Rig,
     ack,
@@ -35,6 +36,7 @@ from pilot_rig import (
     state,
 )
 
+from companion.calls import Calls
 from companion.config import CompanionConfig
 from companion.pilot import Phase
 from companion.world import View
@@ -207,7 +209,7 @@ ORDERS = [
     Order(Phase.CONNECT, "go", 121.0, False, Phase.CONNECT),
     Order(Phase.CONNECT, "go", math.nan, False, Phase.CONNECT),
     Order(Phase.CONNECT, "go", math.inf, False, Phase.CONNECT),
-    Order(Phase.CONNECT, "land", 0.0, True, Phase.CONNECT),
+    Order(Phase.CONNECT, "land", 0.0, False, Phase.CONNECT),
     Order(Phase.PREPARE, "go", 6.0, True, Phase.PREPARE),
     Order(Phase.PREPARE, "land", 0.0, True, Phase.LAND),
     Order(Phase.ESCORT, "go", 6.0, True, Phase.ESCORT),
@@ -327,3 +329,35 @@ def test_a_height_that_drifts_does_not_hold_up_the_take_off(flavour):
     rig.run(1.0, beat(flavour, armed=True, guided=True), landed(2), acks=True)
     assert rig.pilot.phase is Phase.ESCORT
     assert TAKEOFF not in {command for _, command, _ in rig.sent[before:]}
+
+
+def test_a_refusal_that_is_but_repeated_counts_once():
+    calls, now = Calls(OWN), 0
+
+    def refused(result):
+        nonlocal now
+        now += 1_000_000
+        assert calls.call(now, MODE, (1.0,) * 7)
+        calls.hear(ack(MODE, result))
+        return calls.refused
+
+    assert {refused(4) for _ in range(100)} == {1}
+    assert list(calls.refusals) == [f"command {MODE}: result 4"]
+    assert refused(2) == 2
+    calls.forget()
+    assert refused(2) == 3
+    for result in (1, 2) * 100:
+        refused(result)
+    assert len(calls.refusals) <= 16
+
+
+@pytest.mark.parametrize(("system", "component"), [(255, 190), (OWN.system, 1)])
+def test_an_answer_to_somebody_else_settles_nothing(system, component):
+    rig = Rig("ardupilot")
+    rig.prepared()
+    rig.run(0.1, beat("ardupilot"), HEALTHY)
+    rig.tick(ack(MODE)._replace(target_system=system, target_component=component))
+    assert MODE in {command for command, _ in rig.run(2.0, beat("ardupilot"), HEALTHY)}
+    # MAVLink 1 does not say whom it answers.
+    rig.tick(ack(MODE)._replace(target_system=0, target_component=0))
+    assert MODE not in {command for command, _ in rig.run(2.0, beat("ardupilot"), HEALTHY)}

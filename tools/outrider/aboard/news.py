@@ -86,7 +86,7 @@ class News:
         self._phase: Phase | None = None
         self._states = 0
         self._plan_ms = (0.0, 0.0)
-        self._told = self._refusals = self._steps = 0
+        self._told = self._refused = self._steps = 0
         self._judged = self._twin = False
         self._concerns: dict[str, Concern] = {}
         self._sentences: dict[str, str] = {}
@@ -162,9 +162,10 @@ class News:
             for text in list(vehicle.texts)[len(vehicle.texts) - new :]:
                 self._event(at, "autopilot", text.text)
             self._told = vehicle.told
-        for refusal in pilot.refusals[self._refusals :]:
-            self._event(at, "refused", refusal)
-        self._refusals = len(pilot.refusals)
+        if pilot.refused != self._refused:
+            for refusal in pilot.refusals[-(pilot.refused - self._refused) :]:
+                self._event(at, "refused", refusal)
+            self._refused = pilot.refused
         concerns = node.watch.concerns
         if concerns is not self._concerns:
             for name, concern in concerns.items():
