@@ -7,7 +7,7 @@ well. It answers no order.
 from __future__ import annotations
 
 from companion.node import Companion
-from companion.pilot import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
+from companion.readiness import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
 from companion.understudy import Onlooker, Understudy
 from companion.world import View
 from mavlink_bridge.messages import CommandLong, Heartbeat, Message, Source, StatusText
@@ -27,8 +27,8 @@ class _Asking(Onlooker):
     def step(self, now: int, view: View) -> list[Message]:
         """Requests for messages alone."""
         super().step(now, view)
-        self.lacking = self._missing(view)
-        return self._requests(now, view)
+        self.lacking = self._readiness.missing(view, go=self._height is not None)
+        return self._readiness.requests(now)
 
 
 class DryRun(Understudy):

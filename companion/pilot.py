@@ -8,42 +8,25 @@ vehicle over by its mode, on the way up and down too, keeps it until a new go is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from enum import Enum
-from types import MappingProxyType
-
-import numpy as np
 
 from companion.autopilots import Profile, Step
 from companion.calls import Calls
 from companion.config import CompanionConfig
 from companion.custody import Custody, Owner, Passage
 from companion.horizon import Array
+from companion.readiness import Readiness
 from companion.takeoff import DO_SET_MODE, NAV_TAKEOFF, Takeoff
-from companion.vehicle import UNDEFINED, Vehicle
+from companion.vehicle import Vehicle
 from companion.world import View
 from mavlink_bridge.messages import CommandAck, Message, Source
 
 __all__ = ["NAV_LAND", "NAV_TAKEOFF", "Phase", "Pilot"]
 
 NAV_LAND = 21
-REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
-OPERATORS_GO = "the operator's go"
-"""What it waits for when all else is ready."""
 _NAN = float("nan")
 _ARMS = 2_000_000
 """µs after the last asking to arm in which a heartbeat may still say that it is not."""
-_BESIDE = 30.0
-"""m from the box, on each axis, from where a vehicle may start."""
-_FAR = 20_000.0
-"""m between the fleet origin and the autopilot's own: beyond, one of the two is wrong."""
-STREAMS: Mapping[int, int] = MappingProxyType({32: 20_000, 30: 100_000, 1: 1_000_000, 245: 500_000})
-"""Message ids and intervals (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
-EXTENDED_SYS_STATE. The attitude tells only where the nose points when the set-points begin."""
-_NEEDED = tuple(
-    (SET_MESSAGE_INTERVAL, (float(identifier), float(interval), 0.0, 0.0, 0.0, 0.0, 0.0))
-    for identifier, interval in STREAMS.items()
-)
 
 
 class Phase(Enum):
@@ -80,6 +63,7 @@ class Pilot:
         self._go_at: int | None = None
         self._passage = Passage(0)
         self._calls = Calls(own)
+        self._readiness = Readiness(config, self.vehicle, self._calls)
         self._custody = Custody(self.vehicle)
         self._owner = Owner.OURS
         self._arming = 0
@@ -289,20 +273,10 @@ class Pilot:
         if blind or now - since > self._config.guard.settle_us:
             self._alight()
 
-    def _requests(self, now: int, view: View) -> list[Message]:
-        """For the messages that are needed; they change nothing of what the vehicle does."""
-        calls: list[Message] = []
-        if self.vehicle.heartbeat is not None:
-            for command, params in sorted(_NEEDED, key=lambda call: self._calls.sent_at(*call)):
-                calls += self._calls.call(now, command, params)
-            # Again from time to time: an autopilot that began anew elsewhere has another origin.
-            calls += self._calls.call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-        return calls
-
     def _connect(self, now: int, view: View) -> list[Message]:
-        self.waiting_for = self._missing(view)
+        self.waiting_for = self._readiness.missing(view, go=self._height is not None)
         self._expire(now)
-        calls = self._requests(now, view)
+        calls = self._readiness.requests(now)
         if not self.waiting_for and view.own is not None and view.local is not None:
             self._takeoff.begin(view.own)
             self._passage = Passage(self.vehicle.mode)
@@ -316,56 +290,6 @@ class Pilot:
         self._go_at = now if self._go_at is None else self._go_at
         if now - self._go_at > self._config.guard.go_keeps_us:
             self._start_anew()
-
-    def _unseen(self, view: View) -> str:
-        """What has not been heard that every plan needs."""
-        vehicle = self.vehicle
-        if vehicle.heartbeat is None or not vehicle.alive:
-            return "a heartbeat of the autopilot"
-        if vehicle.profile is None:
-            kind = vehicle.heartbeat.autopilot
-            return f"an autopilot that is known (ArduPilot 3, PX4 12; this is {kind})"
-        if view.local is None:
-            return "GPS_GLOBAL_ORIGIN"
-        far = float(np.linalg.norm(view.local.origin_fleet))
-        if not far < _FAR:
-            return f"a fleet origin that is not {far / 1000.0:.0f} km away from the vehicle's"
-        if view.own is None or view.own.age > self._config.guard.own_stale_us:
-            return "LOCAL_POSITION_NED"
-        return "" if view.yaw is not None else "ATTITUDE"
-
-    def _missing(self, view: View) -> str:
-        vehicle = self.vehicle
-        if unseen := self._unseen(view):
-            return unseen
-        if astray := self._astray(view):
-            return astray
-        if vehicle.armed and vehicle.landed_state == UNDEFINED:
-            # A vehicle that may be flying must not be told to take off.
-            return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
-        if not vehicle.healthy:
-            return "the autopilot's pre-arm checks"
-        if not all(self._calls.answered(*call) for call in _NEEDED):
-            return "the autopilot's answers to SET_MESSAGE_INTERVAL"
-        if self._height is None:
-            return OPERATORS_GO
-        return ""
-
-    def _astray(self, view: View) -> str:
-        """Whether it stands where nobody can mean it to start: then the fleet origin is wrong, or the
-        vehicle's."""
-        limits, guard = self._config.limits, self._config.guard
-        if view.own is None:
-            return ""
-        place = view.own.position
-        x, y, z = place.tolist()
-        off = np.maximum(np.array(limits.box_min) - place, place - np.array(limits.box_max))
-        far = guard.fence_radius is not None and x * x + y * y > guard.fence_radius**2
-        if far or not float(off.max()) <= _BESIDE:
-            return f"a start near the box: it is at {x:.0f} m east, {y:.0f} m north, {z:.0f} m up"
-        status, low = self.vehicle.status, guard.battery_low
-        left = None if status is None else status.battery_remaining
-        return "" if left is None or left >= low else f"a battery above {100 * low:.0f} %"
 
     def _prepare(self, now: int, view: View) -> list[Message]:
         profile, height, takeoff = self.profile, self._height, self._takeoff

@@ -53,7 +53,7 @@ class Onlooker(Pilot):
     def step(self, now: int, view: View) -> list[Message]:
         """No commands, ever."""
         self.vehicle.tick(now)
-        self.waiting_for = self._unseen(view)
+        self.waiting_for = self._readiness.unseen(view)
         self.phase = Phase.CONNECT if self.waiting_for else Phase.ESCORT
         return []
 

@@ -11,7 +11,8 @@ from companion_bench import TARGET, Bench, seen_at
 from said import Run
 from shipped import FIREFLY
 
-from companion.pilot import STREAMS, Phase
+from companion.pilot import Phase
+from companion.readiness import STREAMS
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key

@@ -23,7 +23,8 @@ from damage import WIRE_EDITS, absurd, damaged, framed
 from recorded_logs import PIECES, SHIPPED, WHOLE
 
 from companion.node import COMPONENT
-from companion.pilot import OPERATORS_GO, Phase
+from companion.pilot import Phase
+from companion.readiness import OPERATORS_GO
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_ID
 from mavlink_bridge.framing import leading_frames

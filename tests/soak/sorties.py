@@ -23,7 +23,8 @@ from mishaps import MISHAPS, NO_PLAN, OLD, UNHEARD, Mishap, Scene
 from setpoint_laws import SetpointLaws
 
 from companion.guard import Holding
-from companion.pilot import OPERATORS_GO, STEERED, Phase
+from companion.pilot import STEERED, Phase
+from companion.readiness import OPERATORS_GO
 from mavlink_bridge.messages import SetpointLocal
 
 LOOK = 100_000

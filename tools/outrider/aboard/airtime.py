@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Final
 
 from companion.config import CompanionConfig
-from companion.pilot import STREAMS
+from companion.readiness import STREAMS
 from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.endpoints import BAUD_RATES, Endpoint, Serial

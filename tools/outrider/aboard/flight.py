@@ -16,7 +16,8 @@ from typing import Any, Final
 from companion.dry_run import ONLOOKER
 from companion.last_word import LastWord
 from companion.node import COMPONENT
-from companion.pilot import OPERATORS_GO, Phase
+from companion.pilot import Phase
+from companion.readiness import OPERATORS_GO
 from companion.reception import AUTOPILOT
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.messages import Heartbeat, Source

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from companion.dry_run import DryRun
-from companion.pilot import OPERATORS_GO, Phase
+from companion.pilot import Phase
+from companion.readiness import OPERATORS_GO
 from companion.vehicle import Vehicle
 from companion.watch import Concern
 from mavlink_bridge.followed_clock import FollowedClock

@@ -1,0 +1,97 @@
+"""What a companion waits for before it starts, and what it asks the autopilot for so that it comes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from companion.calls import Calls
+from companion.config import CompanionConfig
+from companion.vehicle import UNDEFINED, Vehicle
+from companion.world import View
+from mavlink_bridge.messages import Message
+
+REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
+OPERATORS_GO = "the operator's go"
+"""What it waits for when all else is ready."""
+_BESIDE = 30.0
+"""m from the box, on each axis, from where a vehicle may start."""
+_FAR = 20_000.0
+"""m between the fleet origin and the autopilot's own: beyond, one of the two is wrong."""
+STREAMS: Mapping[int, int] = MappingProxyType({32: 20_000, 30: 100_000, 1: 1_000_000, 245: 500_000})
+"""Message ids and intervals (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
+EXTENDED_SYS_STATE. The attitude tells only where the nose points when the set-points begin."""
+_NEEDED = tuple(
+    (SET_MESSAGE_INTERVAL, (float(identifier), float(interval), 0.0, 0.0, 0.0, 0.0, 0.0))
+    for identifier, interval in STREAMS.items()
+)
+
+
+class Readiness:
+    """Of one ``vehicle``, whose autopilot is asked by ``calls``."""
+
+    def __init__(self, config: CompanionConfig, vehicle: Vehicle, calls: Calls) -> None:
+        self._config = config
+        self._vehicle = vehicle
+        self._calls = calls
+
+    def unseen(self, view: View) -> str:
+        """What has not been heard that every plan needs."""
+        vehicle = self._vehicle
+        if vehicle.heartbeat is None or not vehicle.alive:
+            return "a heartbeat of the autopilot"
+        if vehicle.profile is None:
+            kind = vehicle.heartbeat.autopilot
+            return f"an autopilot that is known (ArduPilot 3, PX4 12; this is {kind})"
+        if view.local is None:
+            return "GPS_GLOBAL_ORIGIN"
+        far = float(np.linalg.norm(view.local.origin_fleet))
+        if not far < _FAR:
+            return f"a fleet origin that is not {far / 1000.0:.0f} km away from the vehicle's"
+        if view.own is None or view.own.age > self._config.guard.own_stale_us:
+            return "LOCAL_POSITION_NED"
+        return "" if view.yaw is not None else "ATTITUDE"
+
+    def missing(self, view: View, *, go: bool) -> str:
+        """What is not yet as it has to be before the start; ``go``: whether one was given."""
+        vehicle = self._vehicle
+        if unseen := self.unseen(view):
+            return unseen
+        if astray := self._astray(view):
+            return astray
+        if vehicle.armed and vehicle.landed_state == UNDEFINED:
+            # A vehicle that may be flying must not be told to take off.
+            return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
+        if not vehicle.healthy:
+            return "the autopilot's pre-arm checks"
+        if not all(self._calls.answered(*call) for call in _NEEDED):
+            return "the autopilot's answers to SET_MESSAGE_INTERVAL"
+        return "" if go else OPERATORS_GO
+
+    def _astray(self, view: View) -> str:
+        """Whether it stands where nobody can mean it to start: then the fleet origin is wrong, or the
+        vehicle's."""
+        limits, guard = self._config.limits, self._config.guard
+        if view.own is None:
+            return ""
+        place = view.own.position
+        x, y, z = place.tolist()
+        off = np.maximum(np.array(limits.box_min) - place, place - np.array(limits.box_max))
+        far = guard.fence_radius is not None and x * x + y * y > guard.fence_radius**2
+        if far or not float(off.max()) <= _BESIDE:
+            return f"a start near the box: it is at {x:.0f} m east, {y:.0f} m north, {z:.0f} m up"
+        status, low = self._vehicle.status, guard.battery_low
+        left = None if status is None else status.battery_remaining
+        return "" if left is None or left >= low else f"a battery above {100 * low:.0f} %"
+
+    def requests(self, now: int) -> list[Message]:
+        """For the messages that are needed; they change nothing of what the vehicle does."""
+        calls: list[Message] = []
+        if self._vehicle.heartbeat is not None:
+            for command, params in sorted(_NEEDED, key=lambda call: self._calls.sent_at(*call)):
+                calls += self._calls.call(now, command, params)
+            # Again from time to time: an autopilot that began anew elsewhere has another origin.
+            calls += self._calls.call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        return calls
