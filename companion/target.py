@@ -31,7 +31,7 @@ class Target:
         self._fixed = None
         if isinstance(source, FixedSource):
             self._fixed = State(np.array(source.at), np.zeros(3), 0, 0.0)
-        self._track = Track(config.target)
+        self._track = self._before = Track(config.target)
         self._speaker: Source | None = None
         self._heard = 0
         self.refused = 0
@@ -51,17 +51,28 @@ class Target:
     def at(self, now: int) -> State | None:
         """The target at ``now`` (µs); None before the first message, and when it is unheard of for too
         long."""
-        state = self._track.at(now) if self._fixed is None else self._fixed
-        if state is not None and state.age > self._config.guard.target_stale_us:
-            return None
-        return state
+        return self.fresh(self.last(now))
+
+    def last(self, now: int) -> State | None:
+        """The same however long it is unheard of: carried on for a bounded time, it may well be there."""
+        return self._known.at(now) if self._fixed is None else self._fixed
+
+    def fresh(self, state: State | None) -> State | None:
+        """``state`` where it is no older than a target may be that is followed."""
+        old = state is not None and state.age > self._config.guard.target_stale_us
+        return None if old else state
 
     def age(self, now: int) -> int | None:
         """Age (µs) of what is known; None before the first message."""
         if self._fixed is not None:
             return 0
-        time = self._track.time
+        time = self._known.time
         return None if time is None else now - time
+
+    @property
+    def _known(self) -> Track:
+        """The speaker's track, or the last one's until anything has come of the new one's messages."""
+        return self._before if self._track.time is None else self._track
 
     def _may_speak(self, now: int, source: Source) -> bool:
         """Two components of one system may both tell of a target, each with its own clock and errors: who has
@@ -76,7 +87,7 @@ class Target:
             if now - self._heard <= self._config.guard.target_stale_us:
                 return False
             # Another clock, other errors.
-            self._track = Track(self._config.target)
+            self._before, self._track = self._known, Track(self._config.target)
         self._speaker, self._heard = source, now
         return True
 

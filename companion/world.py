@@ -42,12 +42,15 @@ class View(NamedTuple):
     """The picture at one time: fleet-local ENU, SI; None where nothing has been heard yet.
 
     ``yaw`` is ENU (counter-clockwise from east), None also when it is older than the own state may be.
+    ``target`` is None also when it has been unheard of for too long to be followed; ``target_last`` is where
+    it was last, whatever its age: who falls silent may well be there.
     """
 
     own: State | None
     yaw: float | None
     target: State | None
     local: LocalFrame | None
+    target_last: State | None = None
 
 
 def reach(config: CompanionConfig) -> float:
@@ -103,9 +106,10 @@ class World:
             self._hear_own(now, message)
 
     def at(self, now: int) -> View:
-        """The view at ``now`` (µs); a target unheard of for too long is none."""
+        """The view at ``now`` (µs)."""
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
-        return View(self._own.at(now), yaw, self.target.at(now), self._local)
+        last = self.target.last(now)
+        return View(self._own.at(now), yaw, self.target.fresh(last), self._local, last)
 
     def say(self, now: int, voice: Voice) -> None:
         """Let ``voice`` tell who has fallen silent, and who is back."""
@@ -141,9 +145,10 @@ class World:
         obstacles = self.neighbours.obstacles(now, places)
         if len(self._moving):
             obstacles = self._moving.among(obstacles, prediction, field.d_min, field.d_safe, field.margin(1))
-        if view.target is not None and config.target_d_min is not None and config.target_d_safe is not None:
+        target = view.target_last
+        if target is not None and config.target_d_min is not None and config.target_d_safe is not None:
             ahead: Array = 1e-6 * config.horizon.dt_us * np.arange(config.horizon.steps + 1.0)
-            moving = view.target.ahead(ahead).positions
+            moving = target.ahead(ahead).positions
             margin = np.array([field.margin(2)])
             obstacles = obstacles.joined(
                 Obstacles(

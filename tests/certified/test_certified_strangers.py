@@ -31,12 +31,12 @@ def config(kind: str | None = None, **certified: float) -> CompanionConfig:
     )
 
 
-def told(world: World, place: Array, velocity: Array) -> None:
+def told(world: World, place: Array, velocity: Array, link: str = "swarm") -> None:
     """The other says where it is, and how fast."""
     latitude, longitude, altitude = FLEET.to_geodetic(place)
     ned = (float(velocity[1]), float(velocity[0]), float(-velocity[2]))
     message = GlobalPosition(Source(OTHER, 1), NOW // 1000, latitude, longitude, altitude, 0.0, ned, None)
-    world.hear(NOW, "swarm", message)
+    world.hear(NOW, link, message)
 
 
 def hovering(of: CompanionConfig, place: Array, velocity: Array) -> Array:
@@ -90,6 +90,18 @@ def test_a_thing_is_where_it_says_and_a_vehicle_only_nearly() -> None:
     sigma = own.sigmas * config().field.position_sigma
     assert np.isclose(least[0], 0.5 + 0.4 + own.tube + clock + sigma)
     assert np.isclose(least[1], 0.5 + 2.0 * (own.tube + clock) + np.sqrt(2.0) * sigma)
+
+
+def test_a_target_that_falls_silent_is_kept_clear_of_where_it_was_last() -> None:
+    of = config().model_copy(update={"target_d_min": 1.0, "target_d_safe": 4.0})
+    world, place = World(of, OWN, OTHER, FLEET), HERE + np.array([3.0, 0.0, 0.0])
+    told(world, place, np.zeros(3), "target")
+    strangers, silence = Strangers(of, STEPS), 10 * of.guard.target_stale_us
+    (heard,), (silent,) = (strangers.target(world.at(NOW + later)) for later in (0, silence))
+    assert world.at(NOW + silence).target is None
+    for before, after in zip(heard, silent, strict=True):
+        np.testing.assert_allclose(after, before, atol=1e-6)
+    np.testing.assert_allclose(silent[0], np.broadcast_to(place, (STEPS, 3, 3)), atol=0.02)
 
 
 def test_a_member_is_no_stranger() -> None:

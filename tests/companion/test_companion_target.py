@@ -135,6 +135,38 @@ def test_of_two_that_speak_the_first_counts_until_it_is_silent(anyone):
     np.testing.assert_allclose(found.at(now).position, there, atol=1e-3)
 
 
+def test_what_was_known_last_stays_until_the_next_speaker_makes_sense():
+    found = target("follow_target", anyone=True)
+    here, there = np.zeros(3), np.array([5.0, 0.0, 0.0])
+    assert found.hear(START, *told("follow_target", here, None))
+    link, sense = told("follow_target", there, None, source=Source(7, 20))
+    for later in (10, 20):
+        now = START + later * 10**6
+        assert not found.hear(now, link, sense._replace(latitude=-47.0, longitude=-171.0))
+        assert found.at(now) is None
+        np.testing.assert_allclose(found.last(now).position, here, atol=1e-3)
+        assert found.age(now) > later * 10**6
+    assert found.hear(now, link, sense)
+    np.testing.assert_allclose(found.last(now).position, there, atol=1e-3)
+
+
+@pytest.mark.parametrize("avoidance", ["field", "certified"])
+@pytest.mark.parametrize("silent", [False, True])
+def test_nobody_flies_through_a_target_whether_it_is_heard_or_not(avoidance, silent):
+    bench = Bench(avoidance=avoidance, target_d_min=2.0, target_d_safe=4.0)
+    place = np.array([6.0, 0.3, 5.0])
+    bench.target = told("global_position", place, None)[1]
+    bench.take_off().fly(1.0)
+    if silent:
+        bench.target = None
+        bench.fly(1e-6 * bench.config.guard.target_stale_us + 1.0)
+    bench.go_to((12.0, 0.0, 5.0))
+    for _ in range(100):
+        bench.fly(0.1)
+        assert np.linalg.norm(bench.autopilot.position - place) > 2.0
+    assert bench.autopilot.position[0] > 3.0
+
+
 @pytest.mark.parametrize("source", [Source(0, 1), Source(2, 1), Source(SYSTEM, 1)])
 def test_strangers_are_no_target(source):
     assert not target("follow_target").hear(START, *told("follow_target", np.zeros(3), None, source=source))

@@ -46,7 +46,7 @@ def world(*heard, config=CONFIG):
 
 def test_at_first_nothing_is_known():
     view = world().at(NOW)
-    assert view == (None, None, None, None)
+    assert view == (None,) * 5
 
 
 def test_without_an_origin_a_local_position_means_nothing():
@@ -88,7 +88,7 @@ def test_the_own_origin_makes_no_difference(place, ned):
 @pytest.mark.parametrize("link", ["swarm", "target", "ground"])
 def test_the_own_state_comes_from_the_autopilots_link_alone(link):
     heard = [(link, AT_FLEET_ZERO), (link, local((1, 2, -3))), (link, attitude(0.5))]
-    assert world(*heard).at(NOW) == (None, None, None, None)
+    assert world(*heard).at(NOW) == (None,) * 5
 
 
 def test_another_systems_state_is_not_the_own():
@@ -130,6 +130,22 @@ def test_the_target_is_an_obstacle_only_if_told_so():
     np.testing.assert_allclose(
         obstacles.positions[1], view.target.position + ahead * np.array([-1.0, 0.5, 0.0]), atol=1e-9
     )
+
+
+@LAWS
+@given(x=vectors(8.0), v=vectors(3.0), silence=st.integers(0, 10**10))
+def test_a_target_that_falls_silent_is_not_followed_but_stays_an_obstacle(x, v, silence):
+    """Carried on for a bounded time, as everybody: it may well be there."""
+    config = CompanionConfig(target_d_min=1.0, target_d_safe=4.0)
+    ned = (float(v[1]), float(v[0]), float(-v[2]))
+    picture = world(("target", target(x, ned)), config=config)
+    now = NOW - config.target.delay_us + silence
+    view = picture.at(now)
+    assert (view.target is None) == (silence > config.guard.target_stale_us)
+    obstacles = picture.obstacles(now, view, HERE)
+    assert (obstacles.ids, obstacles.d_min) == ((TARGET.system,), [1.0])
+    carried = 1e-6 * min(silence, config.target.extrapolate_us)
+    np.testing.assert_allclose(obstacles.positions[0, 0], x + carried * v, atol=0.05)
 
 
 @pytest.mark.parametrize(
