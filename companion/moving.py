@@ -55,18 +55,25 @@ class MovingObstacles:
         return len(self._radius)
 
     def among(
-        self, others: Obstacles, prediction: Array, d_min: float, d_safe: float, margin: float
+        self,
+        others: Obstacles,
+        prediction: Array,
+        d_min: float,
+        d_safe: float,
+        margin: float,
+        vehicles: float,
     ) -> Obstacles:
         """``others`` with the sizes of those that are no vehicles: ``d_min``, ``d_safe`` (m, of a point) grow
         by radius and ``margin``, and a post is at the point of its axis nearest to the own ``prediction`` (N
-        + 1, 3)."""
+        + 1, 3). By what the radius of one is more than the margin of ``vehicles`` (m) nobody knows where it
+        is: as much larger is it here."""
         found = [(j, self._rows[name]) for j, name in enumerate(others.ids) if name in self._rows]
         if not found:
             return others
         here, rows = (list(part) for part in zip(*found, strict=True))
         positions, least, safe = others.positions.copy(), others.d_min.copy(), others.d_safe.copy()
         radius = np.broadcast_to(others.radius, len(others.ids)).copy()
-        radius[here] = self._radius[rows] + margin
+        radius[here] = self._radius[rows] + margin + (radius[here] - vehicles)
         least[here], safe[here] = d_min + radius[here], d_safe + radius[here]
         for j, row in found:
             if not self._ball[row]:

@@ -144,7 +144,8 @@ class World:
             places = prediction[:1] if view.own is None else np.stack([prediction[0], view.own.position])
         obstacles = self.neighbours.obstacles(now, places)
         if len(self._moving):
-            obstacles = self._moving.among(obstacles, prediction, field.d_min, field.d_safe, field.margin(1))
+            margins = field.margin(1), field.margin(2)
+            obstacles = self._moving.among(obstacles, prediction, field.d_min, field.d_safe, *margins)
         target = view.target_last
         if target is not None and config.target_d_min is not None and config.target_d_safe is not None:
             ahead: Array = 1e-6 * config.horizon.dt_us * np.arange(config.horizon.steps + 1.0)

@@ -138,6 +138,25 @@ def test_with_a_plan_it_is_where_that_says_and_without_where_it_was_heard(x, v, 
     np.testing.assert_allclose(carried, straight(x, v), atol=0.05)
 
 
+@LAWS
+@given(kinds, radii, vectors(4.0), st.integers(0, 20_000_000))
+def test_who_falls_silent_may_be_as_far_off_as_a_vehicle_and_keeps_its_size(kind, radius, v, age):
+    """It is larger than a vehicle by the same, whatever is known of where it is."""
+    prediction, now = straight(ZERO, ZERO), NOW + age
+    found = []
+    for things in ((), (moving(kind, radius),)):
+        settings = {"field": FIELD, "guard": {"flown_on_us": 3_000_000}, "moving": things}
+        world = World(CompanionConfig.model_validate(settings), OWN, TARGET, FLEET)
+        world.hear(NOW + DELAY, "swarm", told(ZERO, v))
+        found.append(world.obstacles(now, world.at(now), prediction))
+    vehicle, thing = found
+    field = world.config.field
+    larger = radius + field.margin(1) - field.margin(2)
+    np.testing.assert_array_equal(thing.positions[..., :2], vehicle.positions[..., :2])
+    for part in ("d_min", "d_safe", "radius"):
+        np.testing.assert_allclose(getattr(thing, part), getattr(vehicle, part) + larger, atol=1e-12)
+
+
 def test_neighbours_beside_it_stay_vehicles():
     prediction = straight(np.array([0.0, 0.0, 5.0]), ZERO)
     messages = [told(np.array([2.0, 0.0, 5.0]), system=12), told(np.array([-2.0, 0.0, 5.0]))]
