@@ -163,13 +163,14 @@ class HorizonTable:
 
     def accelerations(self, senders: Sequence[int], times: NDArray[np.int64]) -> Array:
         """What each of ``senders`` (M,) means to accelerate (M, 3), m/s², by its plan at its own one of
-        ``times`` (M,), µs; zero before the plan, after it, and without one."""
+        ``times`` (M,), µs; zero after the plan and without one. Before it, what it begins with: a plan comes
+        with the state that it begins at, and that may be dated a little earlier."""
         rows = self._rows_of(senders)
         if not self._rows:
             return np.zeros((len(senders), 3))
         elapsed = times - self._epochs[rows]
         meant: Array = self._knots[rows, self._segments(rows, elapsed[:, None])[:, 0], 6:9]
-        return np.where(((rows >= 0) & (elapsed >= 0))[:, None], meant, 0.0)
+        return np.where((rows >= 0)[:, None], meant, 0.0)
 
     def _rows_of(self, senders: Sequence[int]) -> NDArray[np.int64]:
         """−1 for those without a horizon."""

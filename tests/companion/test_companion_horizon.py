@@ -187,3 +187,18 @@ def test_a_table_locates_each_sender_at_a_time_of_its_own(fleet, unknown, data):
             continue
         assert (after, dt) == (time - EPOCH, fleet[sender].dt)
         np.testing.assert_allclose(position, fleet[sender].at(time).position, atol=1e-9)
+
+
+@LAWS
+@given(fleet=st.dictionaries(st.integers(1, 250), horizons(), max_size=5), data=st.data())
+def test_a_table_says_what_each_sender_means_to_accelerate(fleet, data):
+    """Before its plan begins, what that begins with; nothing after it, nor of one without a plan."""
+    table = HorizonTable(1, 4)
+    for sender, horizon in fleet.items():
+        table.put(sender, horizon)
+    senders = [*fleet, 251]
+    times = EPOCH + np.array([data.draw(st.integers(-3_000_000, 9_000_000)) for _ in senders], np.int64)
+    meant = table.accelerations(senders, times)
+    np.testing.assert_array_equal(meant[-1], 0.0)
+    for sender, time, a in zip(fleet, times.tolist(), meant, strict=False):
+        np.testing.assert_array_equal(a, fleet[sender].at(max(time, EPOCH)).acceleration)

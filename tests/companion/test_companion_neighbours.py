@@ -316,11 +316,15 @@ def test_a_silent_neighbour_is_wherever_it_stopped_or_was_flown_on_to(v, age, sh
     age=st.integers(600_000, 20_000_000),
     share=numbers(0.0, 1.0),
     thrust=numbers(0.0, 1.0),
+    quicker=st.integers(0, DELAY // 4),
 )
-def test_a_silent_neighbour_may_have_been_driven_on_as_it_meant_to_accelerate(v, a, age, share, thrust):
-    """By the acceleration of its last set-point for a second at most, and at any time it may have stopped."""
+def test_a_silent_neighbour_may_have_been_driven_on_as_it_meant_to_accelerate(
+    v, a, age, share, thrust, quicker
+):
+    """By the acceleration of its last set-point for a second at most, and at any time it may have stopped.
+    Where the link is quicker than messages are taken to be, the plan begins after the state it came with."""
     stale = 1e-6 * WARY.guard.plan_stale_us
-    told = position(X, v), plan(X, v, np.tile(a, (16, 1)))
+    told = position(X, v), plan(X, v, np.tile(a, (16, 1)), epoch=NOW + 4 * quicker)
     before, found = (hearing(*told, config=config).obstacles(NOW + age) for config in (CONFIG, WARY))
     flown = stale + share * (1e-6 * min(age, FLOWN_ON) - stale)
     burn = min(thrust, flown)
