@@ -104,9 +104,7 @@ class Neighbours:
         if system == self._system:
             return
         by_autopilot = component == AUTOPILOT
-        if not by_autopilot:
-            self._spoken[system] = now
-        elif now - self._spoken.get(system, now - _VOICE) < _VOICE:
+        if by_autopilot and now - self._spoken.get(system, now - _VOICE) < _VOICE:
             # Its companion says it already, by another clock.
             return
         track = self._tracks.get(system)
@@ -114,7 +112,11 @@ class Neighbours:
             track = Track(self._config.neighbour)
             track.brief = self._brief
         placed = _placed(self._fleet, message, self._config.neighbour.velocity_up)
-        track.take(now, placed, message.time_boot)
+        refused = track.refused
+        told = track.take(now, placed, message.time_boot) or track.refused > refused
+        if told and not by_autopilot:
+            # What is of no use, as of a receiver without a fix, keeps nobody's word out.
+            self._spoken[system] = now
         if track.time is None:
             return
         if system not in self._rows:
@@ -162,7 +164,7 @@ class Neighbours:
         """Whether what this sender says of where it is and will be need not be decoded now."""
         if not self.earshot.ignores(system):
             return False
-        if component != AUTOPILOT:
+        if component != AUTOPILOT and not self._by_autopilot.get(system, True):
             # It goes on being its vehicle's voice.
             self._spoken[system] = self.earshot.now
         return True

@@ -112,6 +112,20 @@ def after_seconds(place, velocity, config=CONFIG, *, plan=True, own=ZERO):
     return listener
 
 
+def test_of_whom_its_autopilot_tells_nobody_else_becomes_the_voice_unheard():
+    """A receiver without a fix beside it, far off: the autopilot's next word is heard and counts."""
+    listener = Listener()
+    place, nothing = FAR * np.array([1.0, 0.0, 0.0]), Source(OTHER, 220)
+    for now in range(NOW, END + 20 * PERIOD, PERIOD):
+        state, plan = told(OTHER, place, ZERO, now)
+        lost = state._replace(source=nothing, latitude=0.0, longitude=0.0)
+        listener.hear(now, lost, state._replace(source=Source(OTHER, 1)), plan)
+        listener.look(now + PERIOD // 2)
+        age = listener.world.neighbours.ages(now)[OTHER]
+        assert age <= listener.earshot._longest * 1e6 + PERIOD
+    assert listener.decoded() < 3 * (END + 20 * PERIOD - NOW) // PERIOD
+
+
 def planned(config, now, position, velocity, prediction, aim, obstacles):
     """The second of two plans: methods weigh by the first one's gradient."""
     planner = Planner(config)

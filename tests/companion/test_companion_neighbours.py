@@ -235,6 +235,39 @@ def test_who_is_silent_for_too_long_rests_over_the_whole_horizon(v, silence, mor
     np.testing.assert_allclose(both[1], -X + AHEAD * V, atol=GRAIN + 0.02)
 
 
+def nowhere(component=220):
+    """What a receiver says that has no fix."""
+    return GlobalPosition(Source(OTHER, component), 1, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0), None)
+
+
+@LAWS
+@given(silent=st.lists(st.booleans(), min_size=25, max_size=25), v=vectors(4.0))
+def test_who_says_nothing_of_use_keeps_no_autopilots_word_out(silent, v):
+    with_it, without = (Neighbours(CONFIG, OWN, FLEET) for _ in range(2))
+    for k, quiet in enumerate(silent):
+        now = NOW + k * 100_000
+        heard = position(X + 0.1 * k * v, v)._replace(source=Source(OTHER, 1))
+        if not quiet:
+            with_it.hear_position(now + DELAY, nowhere())
+        for neighbours in (with_it, without):
+            neighbours.hear_position(now + DELAY, heard)
+        one, other = (neighbours.obstacles(now).positions for neighbours in (with_it, without))
+        np.testing.assert_array_equal(one, other)
+        np.testing.assert_allclose(one[0, 0], X + 0.1 * k * v, atol=2 * GRAIN)
+
+
+def test_of_a_companion_that_loses_its_fix_the_autopilot_is_heard_after_a_second():
+    neighbours = Neighbours(CONFIG, OWN, FLEET)
+    for k in range(100):
+        now, x = NOW + k * 100_000, X + 0.1 * k * V
+        neighbours.hear_position(now + DELAY, position(x, V) if k < 50 else nowhere(195))
+        # Its autopilot is a metre off, by another filter.
+        apart = position(x + (0.0, 1.0, 0.0), V)._replace(source=Source(OTHER, 1))
+        neighbours.hear_position(now + DELAY, apart)
+        there = neighbours.obstacles(now).positions[0, 0]
+        np.testing.assert_allclose(there, x if k < 59 else x + (0.0, 1.0, 0.0), atol=0.1)
+
+
 @pytest.mark.parametrize("off", [-0.3, -0.1, 0.08, -5.0, 5.0])
 def test_the_plans_of_a_wrong_clock_are_laid_where_their_sender_is(off):
     """Plans at 10 Hz of one at 4 m/s; a quarter of a metre is what fifty milliseconds are worth."""
