@@ -214,7 +214,8 @@ class World:
         elif isinstance(message, GpsGlobalOrigin):
             origin = (message.latitude, message.longitude, message.altitude)
             if origin != self._origin:
-                self._left = self._own.at(now)
+                # Of two origins before a position the first one's leave counts.
+                self._left = self._own.at(now) if self._left is None else self._left
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
                 # Where the vehicle was in the old frame must not be flown to in the new one.

@@ -167,6 +167,21 @@ def test_a_state_that_no_vehicle_can_have_is_not_taken(nonsense):
     np.testing.assert_allclose(known.velocity, ZERO, atol=1e-6)
 
 
+@pytest.mark.parametrize("origins", [1, 2, 3])
+@pytest.mark.parametrize("shift", [3e-5, 1e-3])
+def test_a_move_of_the_origin_is_noticed_however_many_come_before_a_position(origins, shift):
+    picture = world(("autopilot", AT_FLEET_ZERO), ("autopilot", local((1, 2, -3))))
+    was = picture.at(NOW).own.position
+    for k in range(origins):
+        latitude = FLEET.latitude + shift * (k + 1) / origins
+        picture.hear(NOW + k, "autopilot", AT_FLEET_ZERO._replace(latitude=latitude))
+    later = NOW + 20_000
+    picture.hear(later, "autopilot", local((1, 2, -3)))
+    moved = float(np.linalg.norm(picture.at(later).own.position - was))
+    assert moved > 3.0
+    assert (picture.moves, picture.displaced) == (1, pytest.approx(moved, abs=1e-6))
+
+
 STALE = CONFIG.guard.own_stale_us
 
 
