@@ -82,6 +82,8 @@ class World:
         self._yaw_time = 0
         self._yaw_rate = 0.0
         self._left: State | None = None
+        # Of the tracks in the frames before.
+        self._clock_steps = 0
         self.moves = 0
         """How often the autopilot's origin has moved in flight."""
         self.displaced = 0.0
@@ -132,7 +134,7 @@ class World:
     @property
     def clock_steps(self) -> int:
         """How often the autopilot's clock was found to be another."""
-        return self._own.clock_steps
+        return self._clock_steps + self._own.clock_steps
 
     def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
         """Neighbours and what else moves, the target where it is one, and what stands near the own
@@ -218,6 +220,7 @@ class World:
                 self._left = self._own.at(now) if self._left is None else self._left
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
+                self._clock_steps += self._own.clock_steps
                 # Where the vehicle was in the old frame must not be flown to in the new one.
                 simulated, self._own = self.simulated, Track(self.config.own)
                 self.simulated = simulated

@@ -167,6 +167,22 @@ def test_a_state_that_no_vehicle_can_have_is_not_taken(nonsense):
     np.testing.assert_allclose(known.velocity, ZERO, atol=1e-6)
 
 
+def test_another_origin_is_no_other_clock():
+    picture, now = world(("autopilot", AT_FLEET_ZERO)), NOW
+    for boot in (10_000_000, 1_000_000):
+        for k in range(80):
+            now += 20_000
+            heard = local((1, 2, -3))._replace(time_boot=boot + 20_000 * k)
+            picture.hear(now, "autopilot", heard)
+    assert picture.clock_steps == 1
+    picture.hear(now, "autopilot", AT_FLEET_ZERO._replace(latitude=FLEET.latitude + 1e-7))
+    assert picture.clock_steps == 1
+    for k in range(80, 90):
+        now += 20_000
+        picture.hear(now, "autopilot", local((1, 2, -3))._replace(time_boot=1_000_000 + 20_000 * k))
+        assert picture.clock_steps == 1
+
+
 @pytest.mark.parametrize("origins", [1, 2, 3])
 @pytest.mark.parametrize("shift", [3e-5, 1e-3])
 def test_a_move_of_the_origin_is_noticed_however_many_come_before_a_position(origins, shift):
