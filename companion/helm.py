@@ -27,6 +27,7 @@ from companion.config import CompanionConfig
 from companion.heading import Yaw
 from companion.horizon import Horizon
 from companion.node import COMPONENT
+from companion.origins import Origins
 from companion.pilot import NAV_LAND
 from companion.reception import AUTOPILOT
 from companion.setpoint import setpoint
@@ -99,6 +100,7 @@ class Helm:
         self._heard: tuple[int, SetpointLocal] | None = None
         self._beat: tuple[int, Heartbeat] | None = None
         self._local: LocalFrame | None = None
+        self._origins = Origins()
         self._next = self._next_beat = 0
         self._boot: int | None = None
         self.carried = 0
@@ -147,7 +149,7 @@ class Helm:
         match message:
             case Heartbeat():
                 self._beat = now, message
-            case GpsGlobalOrigin():
+            case GpsGlobalOrigin() if self._origins.counts(now, message):
                 self._local = self._fleet.local(message.latitude, message.longitude, message.altitude)
             case SetpointLocal():
                 self._heard = (now, message) if self._agrees(now, message) else None

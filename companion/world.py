@@ -14,6 +14,7 @@ from companion.horizon import Array
 from companion.moving import MovingObstacles
 from companion.neighbours import Neighbours
 from companion.obstacles import FixedObstacles
+from companion.origins import Origins
 from companion.reception import AUTOPILOT
 from companion.sensed import Sensed, Stance
 from companion.target import Target
@@ -78,6 +79,7 @@ class World:
         self._reach = reach(config)
         self._local: LocalFrame | None = None
         self._origin: tuple[float, float, float] | None = None
+        self._origins = Origins()
         self._yaw: float | None = None
         self._yaw_time = 0
         self._yaw_rate = 0.0
@@ -215,7 +217,7 @@ class World:
                 self._yaw_rate = _turns(message)
         elif isinstance(message, GpsGlobalOrigin):
             origin = (message.latitude, message.longitude, message.altitude)
-            if origin != self._origin:
+            if self._origins.counts(now, message) and origin != self._origin:
                 # Of two origins before a position the first one's leave counts.
                 self._left = self._own.at(now) if self._left is None else self._left
                 self._origin = origin

@@ -167,6 +167,36 @@ def test_a_state_that_no_vehicle_can_have_is_not_taken(nonsense):
     np.testing.assert_allclose(known.velocity, ZERO, atol=1e-6)
 
 
+def origin_at(step, time):
+    latitude = FLEET.latitude + step * 3e-5
+    return AT_FLEET_ZERO._replace(latitude=latitude, time=time)
+
+
+@LAWS
+@given(
+    late=st.lists(st.tuples(st.integers(0, 4), st.integers(0, 2_000_000)), max_size=8),
+    boot=st.integers(1, 10**10),
+)
+def test_an_origin_from_before_that_comes_late_or_again_changes_nothing(late, boot):
+    """One that came from the autopilot earlier by its own clock."""
+    picture = world(*(("autopilot", origin_at(k, boot + k)) for k in range(6)))
+    frame = picture.at(NOW).local
+    for step, later in late:
+        picture.hear(NOW + later, "autopilot", origin_at(step, boot + step))
+        assert picture.at(NOW).local is frame
+
+
+@pytest.mark.parametrize("time", [0, 7])
+def test_an_autopilot_that_began_anew_or_says_no_time_has_the_origin_that_it_says(time):
+    picture = world(("autopilot", origin_at(1, 10**9)))
+    later = NOW + (2_000_001 if time else 0)
+    picture.hear(later, "autopilot", origin_at(2, time))
+    expected = FLEET.local(*origin_at(2, time)[1:4])
+    np.testing.assert_array_equal(
+        picture.at(later).local.position_to_fleet(ZERO), expected.position_to_fleet(ZERO)
+    )
+
+
 def test_another_origin_is_no_other_clock():
     picture, now = world(("autopilot", AT_FLEET_ZERO)), NOW
     for boot in (10_000_000, 1_000_000):
