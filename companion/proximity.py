@@ -26,9 +26,9 @@ BODY = 12
 _NORTH = (0, 1)
 """MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED: from north."""
 _SENSORS = 8
-"""So many are listened to."""
+"""So many are listened to, and as many messages within ``_OFTEN``."""
 _OFTEN = 20_000
-"""µs; what one sensor says sooner after its last is passed over."""
+"""µs; what one sensor says sooner after its last, of the same sectors, is passed over."""
 _LEAST_SECTOR = 1e-3
 """rad."""
 
@@ -56,6 +56,16 @@ class Returns(NamedTuple):
 
     angles: Array
     ranges: Array
+
+
+class _Look(NamedTuple):
+    """Who says it, and of which sectors: a component may have several sensors of one type."""
+
+    source: Source
+    sensor: int
+    frame: int
+    offset: float
+    increment: float
 
 
 class _Post(NamedTuple):
@@ -100,6 +110,7 @@ class Proximity:
         self._posts: list[_Post] = []
         self._next_id = FIRST_ID
         self._heard: dict[tuple[Source, int], int] = {}
+        self._lately: dict[_Look, int] = {}
         self.refused = 0
 
     def hear(
@@ -109,14 +120,16 @@ class Proximity:
         then, and its angles counting clockwise from ``zero`` (rad, ENU); ``known`` (K, 3): where neighbours
         are."""
         sensor = scan.source, scan.sensor
-        last = self._heard.get(sensor)
-        if last is not None and now - last < _OFTEN:
+        look = _Look(*sensor, scan.frame, scan.offset, scan.increment)
+        self._lately = {one: heard for one, heard in self._lately.items() if now - heard < _OFTEN}
+        if look in self._lately:
             return
         found = returns(scan, self._config.reach)
-        if found is None or (last is None and not self._room(now)):
+        full = len(self._lately) >= _SENSORS or (sensor not in self._heard and not self._room(now))
+        if found is None or full:
             self.refused += 1
             return
-        self._heard[sensor] = now
+        self._heard[sensor] = self._lately[look] = now
         direction = zero - found.angles
         points = place[:2] + found.ranges[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])
         arcs = 2.0 * found.ranges * sin(0.25 * min(abs(scan.increment), 2.0 * pi))

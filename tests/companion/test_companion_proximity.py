@@ -164,6 +164,34 @@ def test_a_neighbour_that_is_seen_is_that_neighbour():
     assert len(posts(sensed(message, (0, 0, HEIGHT), None, known=above), (0, 0, HEIGHT)).ids) == 2
 
 
+TOGETHER = st.tuples(st.sampled_from((0, BODY)), angles, st.sampled_from((STEP, -STEP)))
+
+
+@LAWS
+@given(looks=st.lists(TOGETHER, min_size=1, max_size=8, unique=True), bursts=st.integers(1, 4))
+def test_of_sensors_that_speak_together_each_counts(looks, bursts):
+    """Of one component and one type; the first sector of each sees something."""
+    found, place = Proximity(CONFIG), np.array([0.0, 0.0, HEIGHT])
+    for k in range(bursts):
+        now = START + 20_000 * k
+        for row, (frame, offset, increment) in enumerate(looks):
+            message = scan({0: 2.0 + row}, frame, increment, offset)
+            # What each says once more at the same time is passed over.
+            for told in (message, message._replace(distances=scan({0: 1.0}).distances)):
+                found.hear(now, now, told, place, 0.0, NOBODY)
+    axes = found.around(now, place[None], 1e3)
+    far = np.linalg.norm(axes.positions[:, 0, :2], axis=1)
+    np.testing.assert_allclose(np.sort(far), 2.0 + np.arange(len(looks)), atol=1e-9)
+    assert found.refused == 0
+
+
+def test_one_sensor_that_says_ever_new_sectors_is_bounded_and_said_to_be_refused():
+    found, place = Proximity(CONFIG), np.array([0.0, 0.0, HEIGHT])
+    for k in range(1000):
+        found.hear(START + k, START + k, scan({0: 2.0 + 0.01 * k}, offset=1e-3 * k), place, 0.0, NOBODY)
+    assert found.refused == 1000 - 8
+
+
 @QUICK
 @given(st.integers(0, 99))
 def test_however_much_is_told_little_is_kept_and_the_nearest_of_it(seed):
