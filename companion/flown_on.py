@@ -26,12 +26,12 @@ class Ball(NamedTuple):
     radius: Array
 
 
-def flown_on(states: Array, accelerations: Array, seconds: Array, known: float) -> Ball:
+def flown_on(states: Array, accelerations: Array, seconds: Array, known: Array) -> Ball:
     """Of vehicles with last ``states`` (M, 6), that meant to accelerate so (M, 3) then, ``seconds`` (M,) ago:
-    between where they were when they could still be ``known`` (s), and where they may have been flown on
+    between where they were when they could still be ``known`` (M,), s, and where they may have been flown on
     to."""
     place, velocity = states[:, 0:3], states[:, 3:6]
-    stopped = place + known * velocity
+    stopped = place + known[:, None] * velocity
     coasted = place + seconds[:, None] * velocity
     driven = coasted + further(seconds)[:, None] * accelerations
     centre = 0.5 * (stopped + driven)

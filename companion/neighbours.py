@@ -7,6 +7,7 @@ its n = 0 position for the whole horizon (Sec. IV-A), or carried on at constant 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import compress
 
@@ -14,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.config import CompanionConfig
-from companion.earshot import Earshot
+from companion.earshot import Ages, Earshot
 from companion.estimator import Measured
 from companion.familiars import Familiars
-from companion.flown_on import flown_on
+from companion.flown_on import Ball, flown_on
 from companion.forces import Obstacles, limit
 from companion.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.plan_clock import PlanClock
@@ -68,6 +69,9 @@ class Neighbours:
         self._fresh: set[int] = set()
         self._states: Array = np.zeros((0, 6))
         self._times = np.zeros(0, dtype=np.int64)
+        # When (µs) they came, whatever they are dated.
+        self._came: dict[int, int] = {}
+        self._arrivals = np.zeros(0, dtype=np.int64)
         self._clocks: dict[int, PlanClock] = {}
         self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
         margin = config.field.margin(2)
@@ -112,18 +116,21 @@ class Neighbours:
             track = Track(self._config.neighbour)
             track.brief = self._brief
         placed = _placed(self._fleet, message, self._config.neighbour.velocity_up)
-        refused = track.refused
+        refused, before = track.refused, track.time
         told = track.take(now, placed, message.time_boot) or track.refused > refused
         if told and not by_autopilot:
             # What is of no use, as of a receiver without a fix, keeps nobody's word out.
             self._spoken[system] = now
         if track.time is None:
             return
+        if track.time != before:
+            self._came[system] = now
         if system not in self._rows:
             self._rows[system] = len(self._ids)
             self._ids += (system,)
             self._states = np.vstack([self._states, np.zeros(6)])
             self._times = np.append(self._times, now)
+            self._arrivals = np.append(self._arrivals, now)
         self._tracks[system], self._by_autopilot[system] = track, by_autopilot
         self._fresh.add(system)
         self._familiars.note(now, self._rows[system], track)
@@ -184,13 +191,15 @@ class Neighbours:
 
         One that falls silent stays an obstacle where it was last, carried on for a bounded time: it may well
         be there. With ``guard.flown_on_us`` it may have stopped, or its autopilot flown on: it is an obstacle
-        that holds all of that way (``flown_on``).
+        that holds all of that way (``flown_on``). What is dated long ago and came only now has been delayed,
+        or it is a clock that is not understood yet, of one that began anew: both where it says that it is and
+        where that has been carried to are held, and a plan that passes one of them counts.
         """
-        config = self._config
+        config, stale = self._config, self._config.guard.plan_stale_us
         steps = config.horizon.steps + 1
         self._put_down()
         age = now - self._times
-        ids, states, times = self._ids, self._states, self._times
+        ids, states, times, since = self._ids, self._states, self._times, now - self._arrivals
         if places is not None and ids:
             near = self.earshot.near(places, states, age)
             for system in self._things:
@@ -198,26 +207,26 @@ class Neighbours:
                     near[self._rows[system]] = True
             if not near.all():
                 ids = tuple(compress(ids, near.tolist()))
-                age, states, times = age[near], states[near], times[near]
+                age, states, times, since = age[near], states[near], times[near], since[near]
         if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
         carried = np.minimum(np.maximum(age, 0), config.neighbour.extrapolate_us) * 1e-6
         here = states[:, 0:3] + carried[:, None] * states[:, 3:6]
         further = np.zeros(len(ids))
-        silent = age > config.guard.plan_stale_us
-        if config.guard.flown_on_us and silent.any():
-            # Somewhere between where it was when it could still be known, and where it may be by now.
-            most = 1e-6 * np.minimum(age[silent], config.guard.flown_on_us)
-            meant = limit(
-                self._table.accelerations(list(compress(ids, silent.tolist())), times[silent]),
-                config.limits.a_total,
-            )
-            here[silent], further[silent] = flown_on(
-                states[silent], meant, most, 1e-6 * config.guard.plan_stale_us
-            )
-        positions, trusted = self._table.positions(ids, now, now - config.guard.plan_stale_us)
-        off = positions[:, 0] - here
-        trusted &= np.vecdot(off, off) <= _STRAYED**2
+        positions, trusted = self._table.positions(ids, now, now - stale)
+        begins, silent = positions[:, 0], age > stale
+        if silent.any():
+            late = silent & (since <= stale)
+            beside = late & (_beside(begins, states[:, 0:3]) | _beside(begins, here))
+            held = silent if config.guard.flown_on_us else late
+            if held.any():
+                names = tuple(compress(ids, held.tolist()))
+                here[held], further[held] = self._held(
+                    names, states[held], times[held], age[held], late[held]
+                )
+            trusted &= beside | (~late & _beside(begins, here))
+        else:
+            trusted &= _beside(begins, here)
         if not trusted.all():
             lost = ~trusted
             positions[lost] = here[lost][:, None]
@@ -234,6 +243,18 @@ class Neighbours:
         return found._replace(
             d_min=found.d_min + further, d_safe=found.d_safe + further, radius=found.radius + further
         )
+
+    def _held(
+        self, ids: Sequence[int], states: Array, times: Ages, ages: Ages, late: NDArray[np.bool_]
+    ) -> Ball:
+        """Between where those with last ``states`` (M, 6) were when it could still be known, of ``late`` ones
+        where that was said, and where they may be by now; ``times``, ``ages`` (M,) µs."""
+        guard = self._config.guard
+        most = 1e-6 * np.minimum(ages, guard.flown_on_us or self._config.neighbour.extrapolate_us)
+        meant = np.zeros((len(ids), 3))
+        if guard.flown_on_us:
+            meant = limit(self._table.accelerations(ids, times), self._config.limits.a_total)
+        return flown_on(states, meant, most, np.where(late, 0.0, 1e-6 * guard.plan_stale_us))
 
     def last_heard(self) -> list[tuple[int, int, Array, Array]]:
         """System id, time (µs), position (3,) and velocity (3,) of everybody's last known state."""
@@ -256,4 +277,11 @@ class Neighbours:
         tracks = [self._tracks[system] for system in self._fresh]
         self._states[rows] = [track.last for track in tracks]
         self._times[rows] = [track.time or 0 for track in tracks]
+        self._arrivals[rows] = [self._came[system] for system in self._fresh]
         self._fresh.clear()
+
+
+def _beside(planned: Array, places: Array) -> NDArray[np.bool_]:
+    """Which (M,) of the ``planned`` places (M, 3) are near enough to those for the plan to count."""
+    off = planned - places
+    return np.asarray(np.vecdot(off, off) <= _STRAYED**2)

@@ -257,15 +257,15 @@ def test_who_says_nothing_of_use_keeps_no_autopilots_word_out(silent, v):
 
 
 def test_of_a_companion_that_loses_its_fix_the_autopilot_is_heard_after_a_second():
-    neighbours = Neighbours(CONFIG, OWN, FLEET)
+    neighbours, off = Neighbours(CONFIG, OWN, FLEET), np.array([0.0, 1.0, 0.0])
     for k in range(100):
         now, x = NOW + k * 100_000, X + 0.1 * k * V
         neighbours.hear_position(now + DELAY, position(x, V) if k < 50 else nowhere(195))
         # Its autopilot is a metre off, by another filter.
-        apart = position(x + (0.0, 1.0, 0.0), V)._replace(source=Source(OTHER, 1))
+        apart = position(x + off, V)._replace(source=Source(OTHER, 1))
         neighbours.hear_position(now + DELAY, apart)
         there = neighbours.obstacles(now).positions[0, 0]
-        np.testing.assert_allclose(there, x if k < 59 else x + (0.0, 1.0, 0.0), atol=0.1)
+        np.testing.assert_allclose(there, x if k < 59 else x + off, atol=0.1)
 
 
 @pytest.mark.parametrize("off", [-0.3, -0.1, 0.08, -5.0, 5.0])
@@ -366,3 +366,31 @@ def test_a_silent_neighbour_may_have_been_driven_on_as_it_meant_to_accelerate(
     # Who stops early has left the straight way between by an eighth of what it means to do, at most.
     spare = 2 * GRAIN + 0.05 * np.linalg.norm(v) + np.linalg.norm(a) / 8 + 0.05
     assert off + before.d_min[0] <= found.d_min[0] + spare
+
+
+@LAWS
+@given(
+    v=vectors(4.0),
+    delay=st.integers(550_000, 60_000_000),
+    later=st.integers(0, 400_000),
+    wary=st.booleans(),
+    share=numbers(0.0, 1.0),
+)
+def test_what_came_lately_is_held_where_it_says_however_old_it_is_dated(v, delay, later, wary, share):
+    """Its sender may have begun anew; and wherever it has been carried to since, as it may be a delay."""
+    config = WARY if wary else CONFIG
+    came = NOW + 100_000 + delay
+    neighbours = hearing(position(X, v)._replace(time_boot=10**7), config=config)
+    told = position(X + 0.1 * v, v)._replace(time_boot=10**7 + 100_000)
+    neighbours.hear_position(came + DELAY, told)
+    found = neighbours.obstacles(came + later)
+    assert neighbours.ages(came)[OTHER] == pytest.approx(delay, abs=20_000)
+    carried = 1e-6 * min(delay, FLOWN_ON if wary else config.neighbour.extrapolate_us)
+    for there in (X + 0.1 * v, X + (0.1 + share * carried) * v):
+        off = np.linalg.norm(found.positions[0, 0] - there)
+        assert off + config.field.d_min <= found.d_min[0] + 2 * GRAIN + 0.05 * np.linalg.norm(v)
+    # Which a fresh plan of the same place puts right.
+    neighbours.hear_plan(came + later, plan(X + 0.1 * v, v, epoch=came + 4 * (later // 4)))
+    found = neighbours.obstacles(came + later)
+    assert found.d_min == [config.field.d_min]
+    np.testing.assert_allclose(found.positions[0], X + 0.1 * v + AHEAD * v, atol=0.01)
