@@ -110,7 +110,11 @@ class FollowedClock:
             if self._known and abs(ahead) > stall:
                 self._strayed += 1
                 if self._strayed >= _WITNESSES:
-                    self.steps += abs(ahead) > _STEP * max(1.0, self.rate)
+                    if abs(ahead) > _STEP * max(1.0, self.rate):
+                        self.steps += 1
+                        self._evidence.clear()
+                    # What came before less than that stays evidence: a delay that swings looks like it, again
+                    # and again, and would have to be judged for ever.
                     self._lay(wall, stamp)
                 return
             self._strayed = 0
@@ -169,7 +173,6 @@ class FollowedClock:
         self._strayed = 0
         self._known = False
         self._pieces.clear()
-        self._evidence.clear()
         self._best, self._begun = _Seen(wall, stamp), wall
 
     def _gather(self, seen: _Seen) -> None:

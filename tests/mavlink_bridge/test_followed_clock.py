@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import random
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mavlink_bridge.clock import SimulatedClock
@@ -157,6 +158,49 @@ def test_a_queue_that_grows_before_anybody_decides_is_no_simulation(growth, end)
         wall.wait_until(wall.now() + 10_000)
     assert clock.known
     assert not clock.simulated
+
+
+@given(
+    shape=st.sampled_from(("sine", "steps", "rising", "falling")),
+    swing=st.floats(0.02, 0.45),
+    period=st.floats(0.3, 8.0),
+)
+@example(shape="sine", swing=0.2, period=3.0)
+@example(shape="steps", swing=0.3, period=5.0)
+@settings(max_examples=30, deadline=None)
+def test_a_real_clock_is_known_however_the_delay_of_its_stamps_swings(shape, swing, period):
+    """By less than half a second: a rate that was learnt from one swing does not make the next a stall."""
+    wall = SimulatedClock(20 * SECOND)
+    clock = FollowedClock(wall, simulated=None)
+    shapes = {
+        "sine": lambda turns: 0.5 + 0.5 * math.sin(2.0 * math.pi * turns),
+        "steps": lambda turns: float(turns % 2.0 >= 1.0),
+        "rising": lambda turns: turns % 1.0,
+        "falling": lambda turns: 1.0 - turns % 1.0,
+    }
+    sent = began = wall.now()
+    while wall.now() < began + 40 * SECOND and not clock.known:
+        # In order, as on a stream: each comes after the one before.
+        while sent + swing * SECOND * shapes[shape]((sent - began) / (period * SECOND)) <= wall.now():
+            clock.observe(wall.now(), sent)
+            sent += 20_000
+        wall.wait_until(wall.now() + 10_000)
+    assert clock.known
+    assert not clock.simulated
+
+
+def test_a_simulation_that_stands_at_times_is_known_as_one():
+    wall = SimulatedClock(20 * SECOND)
+    clock = FollowedClock(wall, simulated=None)
+    sender = Sender(5.0)
+    for _ in range(5):
+        sender.follow(wall, clock, 3.0)
+        # It never makes up for a tenth of a second in which it stood.
+        wall.wait_until(wall.now() + SECOND // 10)
+        sender.boot -= SECOND // 2
+    sender.follow(wall, clock, 3.0)
+    assert clock.known
+    assert clock.simulated
 
 
 def test_a_backlog_that_comes_at_once_is_no_simulation():
