@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import select
 import sys
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Final
@@ -15,6 +16,8 @@ if sys.platform != "win32":
 _CHUNK: Final = 1024
 _ERASE: Final = (b"\x7f", b"\x08")
 _LONGEST: Final = 200
+FEW: Final = 10
+"""Lines that are handed over at once."""
 
 
 class Typed:
@@ -23,6 +26,7 @@ class Typed:
     def __init__(self, fileno: int | None) -> None:
         self._fileno = fileno
         self._line = b""
+        self._complete: deque[str] = deque()
 
     @property
     def pending(self) -> str:
@@ -30,18 +34,21 @@ class Typed:
         return self._line.decode(errors="replace")
 
     def lines(self) -> list[str]:
-        """Those that are complete."""
-        found = []
-        for at in iter(self._read, b""):
-            for byte in (at[k : k + 1] for k in range(len(at))):
-                if byte in (b"\n", b"\r"):
-                    found.append(self.pending)
-                    self._line = b""
-                elif byte in _ERASE:
-                    self._line = self._line[:-1]
-                elif byte >= b" ":
-                    self._line = (self._line + byte)[:_LONGEST]
-        return found
+        """Those that are complete; a few at a time, the next when it is asked again: who never stops writing
+        takes nobody's time for anything else."""
+        if not self._complete:
+            self._take(self._read())
+        return [self._complete.popleft() for _ in range(min(len(self._complete), FEW))]
+
+    def _take(self, data: bytes) -> None:
+        for byte in (data[k : k + 1] for k in range(len(data))):
+            if byte in (b"\n", b"\r"):
+                self._complete.append(self.pending)
+                self._line = b""
+            elif byte in _ERASE:
+                self._line = self._line[:-1]
+            elif byte >= b" ":
+                self._line = (self._line + byte)[:_LONGEST]
 
     def _read(self) -> bytes:
         if self._fileno is None or not select.select([self._fileno], [], [], 0)[0]:

@@ -1,0 +1,48 @@
+"""Orders that come by standard input: each arrives once and in order, however fast they come."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import pytest
+
+from outrider.aboard.typed import FEW, Typed
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[int, int]]:
+    """Where to read, and where to write without waiting."""
+    near, far = os.pipe()
+    os.set_blocking(far, False)
+    yield near, far
+    os.close(near)
+    os.close(far)
+
+
+def test_who_never_stops_writing_takes_nobodys_time(pipe: tuple[int, int]) -> None:
+    near, far = pipe
+    typed, written, found = Typed(near), 0, 0
+    for _ in range(300):
+        try:
+            while True:
+                os.write(far, b"%d\n" % written)
+                written += 1
+        except BlockingIOError:
+            # There is more than can be taken in.
+            pass
+        lines = typed.lines()
+        assert len(lines) <= FEW
+        # None is lost, and none comes before another.
+        assert lines == [str(k) for k in range(found, found + len(lines))]
+        found += len(lines)
+    assert found > 1000
+
+
+def test_a_line_that_never_ends_takes_nobodys_time_either(pipe: tuple[int, int]) -> None:
+    near, far = pipe
+    typed = Typed(near)
+    os.write(far, b"x" * 20_000 + b"\nland\n")
+    looks = [typed.lines() for _ in range(30)]
+    assert looks[0] == []
+    assert [line[-4:] for lines in looks for line in lines] == ["xxxx", "land"]
