@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -46,3 +47,17 @@ def test_a_line_that_never_ends_takes_nobodys_time_either(pipe: tuple[int, int])
     looks = [typed.lines() for _ in range(30)]
     assert looks[0] == []
     assert [line[-4:] for lines in looks for line in lines] == ["xxxx", "land"]
+
+
+def test_a_named_pipe_hears_who_writes_after_another_has_gone(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "orders")
+    # Open before anybody writes, as no shell waits in a test.
+    near = os.open(tmp_path / "orders", os.O_RDONLY | os.O_NONBLOCK)
+    typed = Typed(near)
+    for text in ("go\n", "hold\nret", "land\n"):
+        (tmp_path / "orders").write_text(text)
+        assert typed.lines() == text.split("\n")[:-1]
+        # Nobody has it open now: a line that was not finished is no beginning of another's.
+        assert typed.lines() == []
+        assert typed.pending == ""
+    os.close(near)

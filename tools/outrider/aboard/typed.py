@@ -56,10 +56,12 @@ class Typed:
         try:
             data = os.read(self._fileno, _CHUNK)
         except OSError:
-            data = b""
-        if not data:
-            # The end of it: nobody types any more.
+            # No terminal of ours any more: nobody types.
             self._fileno = None
+            return b""
+        if not data:
+            # Who wrote has gone, with whatever was begun. Into a named pipe another may write.
+            self._line = b""
         return data
 
 
