@@ -92,12 +92,13 @@ class Flight:
             self._wiring.drain()
             try:
                 self.diary.note("process", f"the companion flies in process {crew.start()}")
-                orders.release()
                 self._wiring.lend()
                 self._left, self._pulse = False, Pulse(time.monotonic())
                 self._look_after(desk, crew)
             finally:
                 self._finish(desk, crew)
+                # Not before: an end that nobody has open takes with it, at the next beat, what waits at ours.
+                orders.release()
             if self._over():
                 self.fault = self.fault or self._failed
                 return
