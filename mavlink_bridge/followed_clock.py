@@ -126,6 +126,11 @@ class FollowedClock:
         return self._verdict is False or (self._verdict is True and self._known)
 
     @property
+    def verdict(self) -> bool | None:
+        """What has been decided, or was said at the beginning: whether it is a simulation's. None before."""
+        return self._verdict
+
+    @property
     def simulated(self) -> bool:
         """Whether it follows a simulation's clock; as it seems so far until that is decided."""
         return self._off if self._verdict is None else self._verdict

@@ -49,7 +49,7 @@ class Cockpit:
         self._twin, self._gate = twin, Gate(companion.system, signing)
         self._warned = False
         self._stamp = 0
-        self.settled = followed is None
+        self.settled = followed is None or followed.known
         """Whether the own clock's rate is known."""
 
     @property

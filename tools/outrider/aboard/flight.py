@@ -78,6 +78,7 @@ class Flight:
         self._pulse = Pulse(self._began)
         self._left = self._go_given = self._failed = False
         self._trouble = ""
+        self._simulated: bool | None = None
 
     def run(self) -> None:
         """From the first heartbeat to the end; ``ended`` then says why, ``fault`` whether it should not
@@ -105,6 +106,9 @@ class Flight:
             place = self._directory / f"restart-{len(self.restarts)}"
             if self._signing is not None:
                 self._signing.resume(self.state.stamp)
+            if self.state.simulated is not None:
+                # Found out once: the next need not be silent until it has found out again.
+                self._simulated = self.state.simulated
             self.state, self.waiting = State(), ""
             crew, desk, orders = self._crew(place)
 
@@ -112,7 +116,7 @@ class Flight:
         """A process that is ready to be forked, and both ends of what joins it; ``place`` gets its log."""
         desk, orders = intercom()
         wiring = self._wiring
-        worker = Worker(self.asked, wiring.ends, wiring.twin, orders, place)
+        worker = Worker(self.asked, wiring.ends, wiring.twin, orders, place, self._simulated)
         if self._signing is not None:
             worker.resume(self._signing.newest)
         return Crew(worker), desk, orders

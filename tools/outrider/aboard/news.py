@@ -35,7 +35,8 @@ _PLAIN = 0.005
 class State(NamedTuple):
     """How it is. ``at``: s of its clock since it began; ages in ms; ``plan_ms``: median and 99th percentile;
     ``beat``: the autopilot's last heartbeat: type, autopilot, base and custom mode, system status; ``stamp``
-    of the newest signature; ``would``: in a dry run, the last set-point that it would have sent."""
+    of the newest signature; ``would``: in a dry run, the last set-point that it would have sent;
+    ``simulated``: whether the autopilot's clock is a simulation's, None before that is known."""
 
     at: float = 0.0
     phase: str = Phase.CONNECT.value
@@ -59,6 +60,7 @@ class State(NamedTuple):
     would: str = ""
     concerns: tuple[str, ...] = ()
     stamp: int = 0
+    simulated: bool | None = None
 
     @property
     def ours(self) -> bool:
@@ -142,6 +144,7 @@ class News:
             self._would(),
             tuple(concern.text for concern in node.watch.concerns.values()),
             0 if self._signing is None else self._signing.newest,
+            None if self._followed is None else self._followed.verdict,
         )
 
     def _changes(self, at: float) -> None:

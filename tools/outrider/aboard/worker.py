@@ -13,7 +13,7 @@ from typing import Final
 
 from companion.dry_run import DryRun
 from companion.node import Companion
-from mavlink_bridge.clock import WallClock
+from mavlink_bridge.clock import Clock, WallClock
 from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.garbage import IdleCollector
 from mavlink_bridge.links.link import Link
@@ -43,15 +43,22 @@ _IGNORED: Final = (
 
 
 class Worker:
-    """``links`` by the companion's names, on which ``twin`` listens; ``directory`` gets the log."""
+    """``links`` by the companion's names, on which ``twin`` listens; ``directory`` gets the log.
+    ``simulated``: what a process before this one has found the autopilot's clock to be; None: it has not."""
 
     def __init__(
-        self, asked: Request, links: Mapping[str, Link], twin: Twin, orders: OrderLink, directory: Path
+        self,
+        asked: Request,
+        links: Mapping[str, Link],
+        twin: Twin,
+        orders: OrderLink,
+        directory: Path,
+        simulated: bool | None = None,
     ) -> None:
         self._asked, self._orders, self._directory = asked, orders, directory
         self._doors = [HarmlessLink(link) for link in links.values()] if asked.dry_run else []
         self._links = dict(zip(links, self._doors or links.values(), strict=True))
-        self._parent, self._twin = os.getpid(), twin
+        self._parent, self._twin, self._simulated = os.getpid(), twin, simulated
         self._signing = None if asked.key is None else Signing(asked.key)
         kind = DryRun if asked.dry_run else Companion
         config = asked.config
@@ -69,6 +76,13 @@ class Worker:
         ahead of the wall's."""
         if self._signing is not None:
             self._signing.resume(newest)
+
+    def followed(self, wall: Clock) -> FollowedClock | None:
+        """The clock that it lives by; None for ``wall``."""
+        asked = self._asked.config.clock
+        if asked == "wall":
+            return None
+        return FollowedClock(wall, wall.now(), simulated=True if asked == "autopilot" else self._simulated)
 
     def main(self) -> None:
         """The process, from fork to exit."""
@@ -100,12 +114,7 @@ class Worker:
     def _fly(self, log: Log) -> None:
         asked, node = self._asked, self.companion
         wall = WallClock()
-        known = {"auto": None, "autopilot": True}
-        followed = (
-            None
-            if asked.config.clock == "wall"
-            else FollowedClock(wall, wall.now(), simulated=known[asked.config.clock])
-        )
+        followed = self.followed(wall)
         cockpit = Cockpit(node, wall, followed, self._signing, self._twin)
         departures = Departures(node.config.limits)
         news = News(cockpit, departures, followed, self._signing, self._orders.tell)
