@@ -7,6 +7,9 @@ import pty
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Thread
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
@@ -14,9 +17,12 @@ from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog import read_tlog
+from outrider.aboard.crew import FAREWELL, KILLED, Crew
 from outrider.aboard.diary import Diary
-from outrider.aboard.log import Log
+from outrider.aboard.log import BATCH, MOST, Log
 from outrider.aboard.terminal import Terminal
+from outrider.aboard.worker import Worker
+from outrider.steps_file import read_steps
 
 BEAT = Datagram("autopilot", Codec().encode(Heartbeat(Source(1, 1), 2, 3, 0, 0, 3)))
 
@@ -24,10 +30,8 @@ BEAT = Datagram("autopilot", Codec().encode(Heartbeat(Source(1, 1), 2, 3, 0, 0, 
 def written(directory: Path, count: int = 5_000) -> list[str]:
     """What is said of a log of so many steps."""
     said: list[str] = []
-    with Log(directory, 1, said.append) as log:
-        for k in range(count):
-            log.begin(10_000 * k, "companion-1")
-            log(10_000 * k, "companion-1", "in", BEAT)
+    with Log(directory, 1, said.append, patience=60.0) as log:
+        recorded(log, count)
     return said
 
 
@@ -47,6 +51,88 @@ def test_a_full_disk_ends_the_log_and_says_so_once(tmp_path: Path, file: str, co
 def test_without_a_place_there_is_no_log(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert len(written(tmp_path / "file" / "below")) == 1
+
+
+def recorded(log: Log, count: int) -> None:
+    """So many steps, each with one message."""
+    for k in range(count):
+        log.begin(10_000 * k, "companion-1")
+        log(10_000 * k, "companion-1", "in", BEAT)
+
+
+def test_a_disk_that_stands_still_is_not_waited_for(tmp_path: Path, patience: None) -> None:
+    """A pipe that nobody reads: not even opening it comes to an end."""
+    os.mkfifo(tmp_path / "vehicle-1.tlog")
+    said: list[str] = []
+    log = Log(tmp_path, 1, said.append, patience=0.0)
+    with log:
+        recorded(log, 100)
+        assert said == []
+        recorded(log, BATCH * MOST)
+        assert said == ["no log from here on: the disk stands still"]
+        # Nothing more is kept for it.
+        assert log._waiting.qsize() <= MOST + 1
+    assert len(said) == 1
+    assert read_late(tmp_path / "vehicle-1.tlog")
+
+
+def test_a_disk_that_stood_still_for_a_while_has_all(tmp_path: Path, patience: None) -> None:
+    assert written(tmp_path / "whole") == []
+    os.mkfifo(tmp_path / "vehicle-1.tlog")
+    said: list[str] = []
+    found: list[bytes] = []
+    late = Thread(target=lambda: found.append(read_late(tmp_path / "vehicle-1.tlog")))
+    with Log(tmp_path, 1, said.append, patience=60.0) as log:
+        recorded(log, 5_000)
+        late.start()
+    late.join()
+    assert said == []
+    assert found == [(tmp_path / "whole" / "vehicle-1.tlog").read_bytes()]
+    steps = read_steps(tmp_path / "vehicle-1.steps.npz")
+    assert (steps == read_steps(tmp_path / "whole" / "vehicle-1.steps.npz")).all()
+
+
+def test_what_the_end_does_not_wait_for_is_said(tmp_path: Path, patience: None) -> None:
+    os.mkfifo(tmp_path / "vehicle-1.tlog")
+    said: list[str] = []
+    with Log(tmp_path, 1, said.append, patience=0.0) as log:
+        recorded(log, 100)
+    assert said == ["no log from here on: the disk stands still"]
+    assert read_late(tmp_path / "vehicle-1.tlog")
+
+
+def read_late(path: Path) -> bytes:
+    """A pipe that is read after all, until its writer has closed it."""
+    return path.read_bytes()
+
+
+def test_a_process_that_cannot_be_killed_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It waits for a disk in the kernel: the vehicle has to be told to hold all the same."""
+    done: list[object] = []
+
+    class Stuck:
+        def kill(self) -> None:
+            done.append("killed")
+
+        def join(self, seconds: float) -> None:
+            done.append(seconds)
+
+        def is_alive(self) -> bool:
+            return True
+
+    crew = Crew(cast(Worker, SimpleNamespace(main=None)))
+    monkeypatch.setattr(crew, "_process", Stuck())
+    crew.kill()
+    crew.join()
+    assert done == ["killed", KILLED]
+    # Nor where it had time to end by itself.
+    done.clear()
+    crew = Crew(cast(Worker, SimpleNamespace(main=None)))
+    monkeypatch.setattr(crew, "_process", Stuck())
+    crew.join()
+    assert done == [FAREWELL, "killed", KILLED]
 
 
 def test_who_does_not_listen_ends_nothing(tmp_path: Path) -> None:

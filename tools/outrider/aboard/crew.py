@@ -8,8 +8,11 @@ from typing import Final
 
 from outrider.aboard.worker import Worker
 
-_FAREWELL: Final = 10.0
+FAREWELL: Final = 10.0
 """s that it has to leave its files."""
+KILLED: Final = 1.0
+"""s until one that was killed is waited for no longer: it is in the kernel, which waits for a disk, and flies
+no more."""
 
 
 class Crew:
@@ -18,6 +21,7 @@ class Crew:
     def __init__(self, worker: Worker) -> None:
         fork = multiprocessing.get_context("fork")
         self._process: BaseProcess = fork.Process(target=worker.main, name="companion")
+        self._killed = False
 
     def start(self) -> int:
         """Its process id."""
@@ -36,11 +40,14 @@ class Crew:
 
     def kill(self) -> None:
         """At once."""
+        self._killed = True
         self._process.kill()
 
     def join(self) -> None:
         """Wait until it has ended, by force if it takes too long."""
-        self._process.join(_FAREWELL)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
+        if not self._killed:
+            self._process.join(FAREWELL)
+            if not self._process.is_alive():
+                return
+            self.kill()
+        self._process.join(KILLED)
