@@ -3,6 +3,7 @@ their headers, and what is sent at any end goes the same way."""
 
 from __future__ import annotations
 
+import select
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Final, Protocol
@@ -14,6 +15,8 @@ from mavlink_bridge.links.link import BURST, WAITING, Link, LinkCounters
 Wants = Callable[[Header], bool]
 ROOM: Final = 1 << 20
 """Bytes that wait at an end at most."""
+_ROUNDS: Final = 1000
+"""Reads after which no more is forgotten, of somebody who never stops: more than any system keeps."""
 
 
 class Ear(Protocol):
@@ -64,8 +67,13 @@ class Dealer:
         self.link.send(data)
 
     def forget(self) -> None:
-        """What has arrived at all ends until now."""
-        self.read()
+        """What has arrived until now, at all ends; ``ear`` does not hear it either, as nobody knows when it
+        was said."""
+        for _ in range(_ROUNDS):
+            # One that brings nothing may have answered a call, of somebody who has spoken already.
+            if not self.link.receive() and not _readable(self.link.fileno()):
+                break
+        self._framer = Framer()
         for end in self.ends.values():
             end.clear()
 
@@ -74,6 +82,11 @@ class Dealer:
         self._open -= 1
         if not self._open:
             self.link.close()
+
+
+def _readable(fileno: int | None) -> bool:
+    """Whether there is something to do for who waits for it."""
+    return fileno is not None and bool(select.select([fileno], [], [], 0)[0])
 
 
 class DealtLink:
