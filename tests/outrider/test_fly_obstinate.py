@@ -9,9 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from threading import Thread
 from types import SimpleNamespace
-from typing import cast
+from typing import IO, cast
 
 import pytest
+from rich.console import Console
 
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Heartbeat, Source
@@ -156,6 +157,22 @@ def patience() -> Iterator[None]:
     yield
     signal.alarm(0)
     signal.signal(signal.SIGALRM, before)
+
+
+def test_a_terminal_that_is_gone_is_drawn_on_no_more(patience: None) -> None:
+    """Whoever it was is not told by a signal; what was refused is not kept."""
+    far, near = pty.openpty()
+    terminal = Terminal(near)
+    console = Console(file=cast(IO[str], terminal))
+    console.print("begin")
+    assert os.read(far, 100).startswith(b"begin")
+    os.close(far)
+    for _ in range(100):
+        console.print("a picture")
+        assert not console._buffer
+    assert not terminal.takes
+    terminal.close()
+    os.close(near)
 
 
 def test_a_terminal_that_stands_still_is_not_waited_for(patience: None) -> None:

@@ -14,6 +14,7 @@ class Terminal(io.TextIOBase):
     used, and written to where there is room for something."""
 
     def __init__(self, fileno: int) -> None:
+        self._gone = False
         try:
             self._fileno = os.open(os.ttyname(fileno), os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError:
@@ -35,15 +36,20 @@ class Terminal(io.TextIOBase):
 
     @property
     def takes(self) -> bool:
-        """Whether there is room for something."""
-        return bool(select.select([], [self._fileno], [], 0)[1])
+        """Whether there is room for something; never again in one that is gone."""
+        return not self._gone and bool(select.select([], [self._fileno], [], 0)[1])
 
     def write(self, text: str) -> int:
-        """All of it, or what it takes; it never waits. OSError for a terminal that is gone."""
+        """All of it, or what it takes; it never waits. What a terminal that is gone refuses counts as
+        written: whoever draws would keep it, to try again."""
         data = text.encode("utf-8", "replace")
-        with suppress(BlockingIOError):
+        try:
             while data and self.takes:
                 data = data[os.write(self._fileno, data) :]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._gone = True
         return len(text)
 
     def close(self) -> None:
