@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from companion.config import CompanionConfig
+from companion.dry_run import DryRun
 from companion.node import COMPONENT, Companion
 from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase
 from mavlink_bridge.clock import SimulatedClock
@@ -17,11 +19,13 @@ from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.dealt import Dealer
 from mavlink_bridge.links.link import memory_pair
-from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Source
+from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Message, Source, StatusText
 from mavlink_bridge.node import Datagram
 from outrider.aboard.cockpit import CLOCK, TWIN, Cockpit
+from outrider.aboard.departures import Departures
 from outrider.aboard.fly_config import FleetOrigin, FlyConfig
 from outrider.aboard.gate import Gate
+from outrider.aboard.news import News
 from outrider.aboard.orders import Orders
 from outrider.aboard.twin import Twin
 
@@ -77,6 +81,28 @@ def test_what_was_said_before_this_process_and_comes_late_is_nobody() -> None:
     air.pass_by(1.0, OWN)
     air.pass_by(1.0)
     assert not air.twin.seen
+
+
+@pytest.mark.parametrize("kind", [Companion, DryRun])
+def test_a_dry_run_beside_the_companion_is_no_alarm(kind: type[Companion]) -> None:
+    """It has ids of its own."""
+    air = Air()
+    settings = CompanionConfig.model_validate({"voice": {"texts": True}})
+    node = kind(settings, 1, 100, FleetFrame(47.4, 8.5, 488.0), time.thread_time_ns)
+    cockpit = Cockpit(node, air.clock, None, None, air.twin)
+    told: list[dict[str, object]] = []
+    departures = Departures(settings.limits)
+    news = News(cockpit, departures, None, None, lambda **one: told.append(one))
+    said: list[Message] = []
+    for _ in range(50):
+        air.pass_by(0.2, OWN._replace())
+        said += [m for d in cockpit.step(air.clock.now(), []) for m in Codec().feed(d.data)]
+        news.look(air.clock.now(), air.clock.now())
+    assert air.twin.seen
+    alarm = kind is Companion
+    assert bool(cockpit.barred) == alarm
+    assert any(one.get("what") == "critical" for one in told) == alarm
+    assert any(isinstance(message, StatusText) for message in said) == alarm
 
 
 def order(command: int, system: int = 1, component: int = COMPONENT) -> CommandLong:

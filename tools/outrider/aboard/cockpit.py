@@ -33,7 +33,7 @@ _OTHERS = ("swarm", "target")
 class Cockpit:
     """A ``Node``. ``followed``: shown the autopilot's stamps, as far as the companion believes them; None for
     a companion that lives by the wall's time. ``signing``: the companion's. ``twin``: looked for on its
-    links."""
+    links; none is, of a dry run, which has other ids, as the companion may be there as well."""
 
     def __init__(
         self,
@@ -46,7 +46,8 @@ class Cockpit:
         self.companion = companion
         self.last: LastWord | None = None
         self._wall, self._followed, self._signing = wall, followed, signing
-        self._twin, self._gate = twin, Gate(companion.system, signing)
+        self._twin = None if isinstance(companion, DryRun) else twin
+        self._gate = Gate(companion.system, signing)
         self._warned = False
         self._stamp = 0
         self.settled = followed is None or followed.known
