@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 
 import pytest
+from companion_bench import FLEET, PROFILES, START, SYSTEM, TARGET, TICK, PerfectAutopilot
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,10 +14,12 @@ from companion.config import CompanionConfig
 from companion.dry_run import DryRun
 from companion.node import COMPONENT, Companion
 from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase
+from companion.readiness import OPERATORS_GO
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.header import Header
 from mavlink_bridge.links.dealt import Dealer
 from mavlink_bridge.links.link import memory_pair
 from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Message, Source, StatusText
@@ -103,6 +106,45 @@ def test_a_dry_run_beside_the_companion_is_no_alarm(kind: type[Companion]) -> No
     assert bool(cockpit.barred) == alarm
     assert any(one.get("what") == "critical" for one in told) == alarm
     assert any(isinstance(message, StatusText) for message in said) == alarm
+
+
+@pytest.mark.parametrize("beside", [False, True], ids=["alone", "beside a twin"])
+def test_a_go_that_waits_ends_where_a_twin_is_found(beside: bool) -> None:
+    """It was given before anybody knew."""
+    wall = SimulatedClock(START)
+    twin = Twin(SYSTEM, wall)
+    settings = CompanionConfig.model_validate({"task": "goto"})
+    node = Companion(settings, SYSTEM, TARGET, FLEET, time.thread_time_ns)
+    cockpit, autopilot = Cockpit(node, wall, None, None, twin), PerfectAutopilot(PROFILES["px4"], (0, 0, 0))
+    go = Datagram("ground", Orders(SYSTEM, 5.0).frame("go"))
+    own, header = Source(SYSTEM, COMPONENT), Header(SYSTEM, COMPONENT, 33)
+    back, answers, codec = b"", [], Codec()
+    autopilot.mute = True
+    for tick in range(900):
+        now = wall.now()
+        if beside and tick % 20 == 0:
+            said = GlobalPosition(own, tick, 47.4, 8.5, 500.0, 12.0, (0.0, 0.0, 0.0), None)
+            twin.heard(header, codec.encode(said))
+        # Not ready for want of a position until the twin is known, and ready then.
+        autopilot.mute = tick < 400
+        inbox = [Datagram("autopilot", autopilot.step(now, back)), *([go] if tick == 100 else [])]
+        told = cockpit.step(now, inbox)
+        back = b"".join(datagram.data for datagram in told if datagram.link == "autopilot")
+        said_back = [m for d in told if d.link == "ground" for m in Codec().feed(d.data)]
+        answers += [message.result for message in said_back if isinstance(message, CommandAck)]
+        wall.wait_until(now + TICK)
+    assert answers == [0]
+    assert autopilot.armed != beside
+    assert (node.pilot.phase is Phase.CONNECT) == beside
+    if beside:
+        # Nor is it obeyed when the other has fallen silent.
+        wall.wait_until(wall.now() + 20 * SECOND)
+        for _ in range(300):
+            told = cockpit.step(wall.now(), [Datagram("autopilot", autopilot.step(wall.now(), back))])
+            back = b"".join(datagram.data for datagram in told if datagram.link == "autopilot")
+            wall.wait_until(wall.now() + TICK)
+        assert not cockpit.barred
+        assert node.pilot.waiting_for == OPERATORS_GO
 
 
 def order(command: int, system: int = 1, component: int = COMPONENT) -> CommandLong:

@@ -2,7 +2,8 @@
 last word is what it says.
 
 Until it is known how fast that clock runs, nothing is heard or told of others, as what they say is dated by
-their clocks against the own one, and no go is taken; nor while another has the own ids.
+their clocks against the own one, and no go is taken; nor while another has the own ids, when one that waits
+is taken back.
 """
 
 from __future__ import annotations
@@ -82,6 +83,9 @@ class Cockpit:
         answers: list[Datagram] = []
         if (barred := self.barred) and not isinstance(self.companion, DryRun):
             inbox, answers = self._gate.closed(inbox)
+        if barred == TWIN:
+            # Who gave it did not know of the other.
+            self.companion.pilot.take_back()
         if (barred == TWIN) != self._warned:
             self._warned = barred == TWIN
             self.companion.voice.report(Severity.CRITICAL, "Own system id used twice", begins=self._warned)
