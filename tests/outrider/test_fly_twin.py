@@ -30,7 +30,7 @@ from outrider.aboard.fly_config import FleetOrigin, FlyConfig
 from outrider.aboard.gate import Gate
 from outrider.aboard.news import News
 from outrider.aboard.orders import Orders
-from outrider.aboard.twin import Twin
+from outrider.aboard.twin import REMEMBERED, Twin
 
 SECOND = 1_000_000
 OWN = Source(1, COMPONENT)
@@ -77,6 +77,24 @@ def test_who_speaks_with_the_own_ids_is_found(source: Source | None, found: bool
     assert air.twin.seen == found
     air.pass_by(20.0)
     assert not air.twin.seen
+
+
+def test_what_is_said_again_is_remembered_as_long_as_what_is_new() -> None:
+    air = Air()
+    codec = Codec()
+    again = codec.encode(air.position(OWN))
+    air.twin.said(again)
+    for k in range(2 * REMEMBERED):
+        air.twin.said(codec.encode(air.position(OWN)._replace(altitude=0.01 * k)))
+        if k % (3 * REMEMBERED // 4) == 0:
+            air.twin.said(again)
+            latest = k
+        if k == latest + REMEMBERED // 2:
+            # It comes back: for two seconds, as often as one likes.
+            for _ in range(30):
+                air.twin.heard(Header(*OWN, 33), again)
+                air.clock.wait_until(air.clock.now() + 100_000)
+            assert not air.twin.seen
 
 
 def test_what_was_said_before_this_process_and_comes_late_is_nobody() -> None:

@@ -3,7 +3,7 @@ two companions have one vehicle."""
 
 from __future__ import annotations
 
-from collections import deque
+from collections import OrderedDict
 from typing import Final
 
 from companion.node import COMPONENT
@@ -11,7 +11,7 @@ from mavlink_bridge.clock import Clock
 from mavlink_bridge.framing import leading_frames
 from mavlink_bridge.header import Header
 
-_REMEMBERED: Final = 4096
+REMEMBERED: Final = 4096
 """Frames; more than a link says until its echo is back."""
 _LASTS, _FORGOTTEN = 2_000_000, 10_000_000
 """µs over which it must be heard, longer than what a companion before this one said is on its way; and after
@@ -25,8 +25,8 @@ class Twin:
     def __init__(self, system: int, clock: Clock) -> None:
         self._own = (system, COMPONENT)
         self._clock = clock
-        self._said: set[int] = set()
-        self._order: deque[int] = deque()
+        self._said: OrderedDict[int, None] = OrderedDict()
+        """Marks, what was said last at the end."""
         self._first: int | None = None
         self._last: int | None = None
 
@@ -34,12 +34,11 @@ class Twin:
         """Frames that leave."""
         for frame in leading_frames(data)[0]:
             mark = hash(frame.data)
-            if mark in self._said:
-                continue
-            self._said.add(mark)
-            self._order.append(mark)
-            if len(self._order) > _REMEMBERED:
-                self._said.discard(self._order.popleft())
+            # What is said again byte by byte is remembered from then on.
+            self._said[mark] = None
+            self._said.move_to_end(mark)
+            if len(self._said) > REMEMBERED:
+                self._said.popitem(last=False)
 
     def heard(self, header: Header, frame: bytes) -> None:
         """A frame that arrives."""
