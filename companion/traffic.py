@@ -8,7 +8,7 @@ it does beyond flying straight on is seen with its next message. Its height is k
 
 from __future__ import annotations
 
-from math import cos, inf, sin
+from math import cos, hypot, inf, sin
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -30,6 +30,7 @@ _STRAYS = 300.0
 _HEAD_ON = 1.0
 """m; so near to its way it does not say to which side to go, and one goes to its right."""
 _NEAR = 1e-6
+_EAST = np.array([1.0, 0.0])
 
 _Micros = Annotated[int, Field(ge=0, le=60_000_000)]
 _Address = Annotated[int, Field(ge=0, lt=_ADDRESSES)]
@@ -92,14 +93,16 @@ class Traffic:
         return Axes(tuple(ids), places, np.full(len(ids), self._config.radius))
 
     def outside(self, now: int, goal: Array, here: Array, clearance: float) -> Array:
-        """The ``goal`` (3,), or a place beside the ways that it lies on, ``clearance`` (m) beyond their room
-        and on the side where the vehicle is: it flies there, and is not pushed."""
+        """The ``goal`` (3,), or a place as high beside the ways that it lies on, ``clearance`` (m) beyond
+        their room and on the side where the vehicle is: it flies there, and is not pushed."""
         room = self._config.radius + clearance
         for there, beside in self.around(now, np.stack([goal, here]), clearance).positions:
             off, own = goal - there, here - beside
             if off @ off < room**2:
-                way = own if own @ own < room**2 else off
-                goal = there + way * (room / max(float(np.sqrt(way @ way)), _NEAR))
+                # Never up or down: below it may be the ground.
+                ways = (own, off) if own @ own < room**2 else (off, own)
+                way = next((way[:2] for way in ways if hypot(way[0], way[1]) > _NEAR), _EAST)
+                goal = np.append(there[:2] + way * (room / hypot(way[0], way[1])), goal[2])
         return goal
 
     def _take(self, now: int, message: AdsbVehicle, place: Array, here: Array) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from companion_bench import FLEET, START, SYSTEM, Bench
 from companion_rig import LAWS, QUICK, numbers, vectors
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
@@ -199,6 +199,7 @@ def test_without_a_receiver_it_stays():
 
 
 @LAWS
+@example(goal=np.zeros(3), own=np.array([1.0, 0, 0]), place=np.array([1.0, 0, 51]), course=0.0, clear=1.0)
 @given(
     goal=vectors(60.0),
     own=vectors(60.0),
@@ -214,6 +215,7 @@ def test_a_goal_is_moved_just_off_its_way_or_not_at_all(goal, own, place, course
         return np.linalg.norm((point - around(traffic, point[None]).positions[0, 0])[:2])
 
     assert off(moved) >= min(room, off(goal)) - 1e-6
+    assert moved[2] == goal[2]
     if np.linalg.norm(goal - around(traffic, goal[None]).positions[0, 0]) >= room:
         np.testing.assert_array_equal(moved, goal)
 
