@@ -4,7 +4,8 @@ Plans are filed by the epoch they begin at. A vehicle replans in an epoch only i
 very epoch of everybody it counts with (``missing`` is empty): an older one will not do, for its sender may
 have made another since. Who was once heard with a plan counts from then on, and so does whoever one of those
 counts with; who has said farewell flies its last plan to the end and stays there. That is believed only with
-the very plan that the farewell goes with: an older one may end elsewhere.
+the very plan that the farewell goes with, for an older one may end elsewhere; and only for as long as plans
+are, for its sender may have joined again since.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from mavlink_bridge.plan_wire import WirePlan, unpack
 from mavlink_bridge.roster_wire import Roster
 
 _KEPT = 4
-"""Epochs of a sender that are kept."""
+"""Epochs of a sender that are kept; nothing that is older or further ahead is believed."""
 
 
 class Filed(NamedTuple):
@@ -98,7 +99,8 @@ class Ledger:
 
     def hear_roster(self, now: int, system: int, roster: Roster) -> None:
         """Whom a member counts with. A farewell says that its plan of that epoch is its last; whoever has
-        not got that plan yet, or is not in that epoch yet, hears it again."""
+        not got that plan yet, or is not in that epoch yet, hears it again. One that comes late says nothing:
+        who joined again since makes plans."""
         if system == self._own:
             return
         last = self._rosters.get(system)
@@ -109,7 +111,7 @@ class Ledger:
             return
         if roster.farewell:
             filed = self._plans.get(system, {}).get(roster.epoch)
-            if filed is not None and roster.epoch <= now:
+            if filed is not None and 0 <= now - roster.epoch <= _KEPT * self._epoch:
                 self._left[system] = filed
                 self._members = None
             return

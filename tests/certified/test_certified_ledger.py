@@ -164,6 +164,15 @@ class TestFarewell:
         hear(book, OTHER, plan(1), OWN, bye=True, now=NOW + LENGTH)
         assert not book.missing(EPOCH + LENGTH)
 
+    def test_it_is_not_believed_when_it_comes_late(self) -> None:
+        """Its sender may have joined again, and everything it said since may be lost."""
+        for late, believed in ((4 * LENGTH, True), (4 * LENGTH + 1, False), (60_000_000, False)):
+            book = ledger(frozenset({OTHER}))
+            hear(book, OTHER, plan(), OWN)
+            book.hear_roster(EPOCH + late, OTHER, Roster(EPOCH, frozenset({OWN}), farewell=True))
+            assert bool(book.left) == believed
+            assert bool(book.members) != believed
+
     def test_what_was_said_before_it_and_comes_after_it_changes_nothing(self) -> None:
         book = ledger()
         hear(book, OTHER, plan(), OWN)
