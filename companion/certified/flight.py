@@ -154,6 +154,8 @@ class CertifiedFlight:
         if told.epoch == self.keeper.told_until and now < self._next_told:
             return sync
         self.keeper.told_until, self._next_told = told.epoch, now + self._config.certified.repeat_us
+        if farewell:
+            self.ledger.leave(told.epoch)
         roster = Roster(told.epoch, self.ledger.members, farewell)
         return [
             *sync,

@@ -52,6 +52,9 @@ class Ledger:
         self._steps, self._dt, self._epoch, self._origin = steps, dt, epoch, origin
         self._plans: dict[int, dict[int, Filed]] = {}
         self._rosters: dict[int, Roster] = {}
+        # From which epoch (µs) on each counts with us, and which rosters (µs) tell of it at the earliest.
+        self._counted: dict[int, int] = {}
+        self._telling = 0
         self._left: dict[int, Filed] = {}
         self._last: dict[int, bytes] = {}
         self._members: frozenset[int] | None = None
@@ -113,19 +116,32 @@ class Ledger:
             filed = self._plans.get(system, {}).get(roster.epoch)
             if filed is not None and 0 <= now - roster.epoch <= _KEPT * self._epoch:
                 self._left[system] = filed
+                self._counted.pop(system, None)
                 self._members = None
             return
         self._left.pop(system, None)
+        if self._own not in roster.members:
+            self._counted.pop(system, None)
+        elif roster.epoch >= self._telling:
+            self._counted.setdefault(system, roster.epoch)
         if last is None or left is not None or roster.members != last.members:
             self._members = None
         self._rosters[system] = roster
 
+    def leave(self, epoch: int) -> None:
+        """Farewell is said with the own plan of ``epoch`` (µs): who believes it counts with us no more. So
+        nobody is taken to, until it tells so when it can no longer come to believe it. A roster goes with a
+        plan that begins at most two epochs later."""
+        self._counted.clear()
+        self._telling = epoch + (_KEPT + 3) * self._epoch
+
     def missing(self, epoch: int) -> set[int]:
-        """Members whose plan of ``epoch`` (µs) is not held, or who do not count with us yet."""
+        """Members whose plan of ``epoch`` (µs) is not held, or who may replan in it without counting with us:
+        who told so with a later plan only may have made that one before."""
         found = set()
         for system in self.members:
-            roster = self._rosters.get(system)
-            if epoch not in self._plans.get(system, {}) or roster is None or self._own not in roster.members:
+            counted = self._counted.get(system)
+            if epoch not in self._plans.get(system, {}) or counted is None or counted > epoch:
                 found.add(system)
         return found
 

@@ -31,8 +31,8 @@ def roughs(systems: int) -> st.SearchStrategy[Rough]:
 def habits(*, leave: bool) -> st.SearchStrategy[Habits]:
     on = st.integers(0, 400_000)
     return st.builds(
-        lambda on, later, leaves, frozen, released, ahead, wanders: Habits(
-            on, on + later, leaves, tuple(frozen), tuple(released), ahead, wanders
+        lambda on, later, leaves, frozen, released, ahead, wanders, away: Habits(
+            on, on + later, leaves, tuple(frozen), tuple(released), ahead, wanders, leaves + away
         ),
         on,
         on,
@@ -41,6 +41,7 @@ def habits(*, leave: bool) -> st.SearchStrategy[Habits]:
         st.lists(spans, max_size=1),
         st.integers(-5_000, 5_000),
         st.sampled_from([0.0, 0.08]),
+        st.sampled_from([NEVER, 40_000, 300_000, 1_200_000]) if leave else st.just(NEVER),
     )
 
 

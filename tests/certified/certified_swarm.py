@@ -24,6 +24,7 @@ from companion.world import View, World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel
 from mavlink_bridge.plan_wire import WirePlan, pack
+from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 TICK = 20_000
@@ -37,19 +38,22 @@ def within(since: int, spans: tuple[tuple[int, int], ...]) -> bool:
 
 class Rough(NamedTuple):
     """How a channel treats messages: share lost, longest delay (µs), share sent twice; who is cut off from
-    all others from when till when (µs of the run); who hears nothing."""
+    all others from when till when (µs of the run); who hears nothing; from when till when nobody hears whom,
+    or only its plans."""
 
     loss: float = 0.0
     delay: int = 0
     twice: float = 0.0
     cuts: tuple[tuple[int, int, frozenset[int]], ...] = ()
     deaf: frozenset[int] = frozenset()
+    mute: tuple[tuple[int, int, int], ...] = ()
+    alone: tuple[tuple[int, int, int], ...] = ()
 
 
 class Habits(NamedTuple):
     """Of one vehicle, µs of the run: when it is switched on, when it steers from, when it leaves; when it is
     not called, and when it may not steer (from, till); how far its clock is ahead. Until it steers it wanders
-    about its place by ``wanders`` m."""
+    about its place by ``wanders`` m. When it ``returns`` it joins again where it is."""
 
     on: int = 0
     steers: int = 0
@@ -58,6 +62,7 @@ class Habits(NamedTuple):
     released: tuple[tuple[int, int], ...] = ()
     ahead: int = 0
     wanders: float = 0.0
+    returns: int = NEVER
 
 
 class Made(NamedTuple):
@@ -94,7 +99,7 @@ class Vehicle:
             flight.hear(now, heappop(self.inbox)[2])
         for system, filed in ledger.plans(keeper.epoch(now)).items():
             self.believed[system, keeper.epoch(now)] = filed.plan
-        leaving = since >= self.habits.leaves
+        leaving = self.habits.leaves <= since < self.habits.returns
         if leaving or within(since, self.habits.released):
             self._flying = False
         else:
@@ -173,6 +178,8 @@ class Swarm:
 
     def _carry(self, since: int, sender: Vehicle, message: Tunnel) -> None:
         rough, rng = self._rough, self._rng
+        unheard = rough.mute + (rough.alone if message.payload_type == ROSTER else ())
+        mute = any(begin <= since < end and sender.system == whom for begin, end, whom in unheard)
         for receiver in self.vehicles:
             if receiver is sender or receiver.system in rough.deaf:
                 continue
@@ -180,7 +187,7 @@ class Swarm:
             cut = any(begin <= since < end and len(ends & whom) == 1 for begin, end, whom in rough.cuts)
             for _ in range(1 + bool(rng.random() < rough.twice)):
                 arrives = since + 1 + int(rng.random() * rough.delay)
-                if rng.random() >= rough.loss and not cut:
+                if rng.random() >= rough.loss and not (cut or mute):
                     heappush(receiver.inbox, (arrives, next(self._serial), message))
 
     def epochs(self) -> range:

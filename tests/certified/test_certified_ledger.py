@@ -121,6 +121,20 @@ def test_of_two_rosters_the_later_epoch_counts_whichever_comes_last() -> None:
     assert not book.missing(EPOCH + LENGTH)
 
 
+@given(st.permutations(range(4)))
+def test_who_counts_with_us_does_so_from_the_epoch_on_that_it_first_said_so_with(order: list[int]) -> None:
+    """Its plan of that epoch may be made without us, those that follow are not; later words change nothing,
+    nor does their order."""
+    book = ledger(frozenset({OTHER}))
+    for epoch in range(4):
+        book.hear_plan(NOW, OTHER, pack(plan(epoch)))
+    for epoch in order:
+        members = frozenset({OWN}) if epoch >= 2 else frozenset[int]()
+        book.hear_roster(NOW, OTHER, Roster(EPOCH + epoch * LENGTH, members))
+        assert book.missing(EPOCH) == book.missing(EPOCH + LENGTH) == {OTHER}
+    assert not book.missing(EPOCH + 3 * LENGTH)
+
+
 def test_its_own_words_are_not_news() -> None:
     book = ledger()
     hear(book, OWN, plan(), OTHER)
@@ -189,3 +203,28 @@ class TestFarewell:
         assert book.missing(EPOCH + 3 * LENGTH) == {OTHER}
         hear(book, OTHER, plan(4, x=1.0), OWN, now=NOW + 4 * LENGTH)
         assert not book.missing(EPOCH + 4 * LENGTH)
+
+    @pytest.mark.parametrize("told", range(-1, 9))
+    def test_after_the_own_one_only_those_count_with_us_who_cannot_believe_it_any_more(
+        self, told: int
+    ) -> None:
+        """A roster is told from two epochs before its own on; a farewell is believed for four."""
+        book = ledger(frozenset({OTHER}))
+        hear(book, OTHER, plan(-1), OWN)
+        book.leave(EPOCH)
+        now = EPOCH + told * LENGTH
+        hear(book, OTHER, plan(told), OWN, now=now)
+        believed = ledger()
+        hear(believed, OTHER, plan(), now=EPOCH)
+        believed.hear_roster(now - 2 * LENGTH, OTHER, Roster(EPOCH, frozenset(), farewell=True))
+        assert bool(book.missing(now)) == (told <= 6)
+        assert bool(book.missing(now)) >= bool(believed.left)
+
+    def test_who_said_it_counts_with_us_only_when_it_says_so_again(self) -> None:
+        """It may have begun anew since, and know nothing of us."""
+        book = ledger()
+        hear(book, OTHER, plan(), OWN)
+        hear(book, OTHER, plan(), OWN, bye=True)
+        hear(book, OTHER, plan(3, x=1.0), now=NOW + 3 * LENGTH)
+        hear(book, OTHER, plan(4, x=1.0), now=NOW + 4 * LENGTH)
+        assert book.missing(EPOCH + 4 * LENGTH) == {OTHER}

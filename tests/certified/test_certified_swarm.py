@@ -175,3 +175,20 @@ def test_who_left_is_not_waited_for() -> None:
     for vehicle in swarm.vehicles[1:]:
         assert set(vehicle.flight.ledger.left) == {1}
         assert any(made.since > 4_000_000 for made in vehicle.made)
+
+
+def test_who_comes_back_makes_no_plan_before_all_others_count_with_it_again() -> None:
+    """What they told before its farewell says nothing: here no roster of 2 gets through from then on, and
+    nothing of 1 since it is back, but the plans of 2 do."""
+    left, back, through = 600_000, 2_600_000, 5_000_000
+    rough = Rough(mute=((back, through, 1),), alone=((left, through, 2),))
+    swarm = Swarm(circle(2, 6.0), rough, [Habits(leaves=left, returns=back), Habits()], 2)
+    swarm.run(8_000_000, lambda since, system: np.array([0.0, 0.0, 5.0]))
+    made = {system: [one.since for one in swarm.made() if one.system == system] for system in (1, 2)}
+    assert any(back <= since < through for since in made[2])
+    assert not any(back <= since < through for since in made[1])
+    assert any(since > through for since in made[1])
+    for one in swarm.made():
+        for system, plan in one.beside.items():
+            assert plan == swarm.vehicles[system - 1].plan(one.epoch)
+    assert swarm.least() >= swarm.d - EXACT
