@@ -32,6 +32,12 @@ def between(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -
     return field.d_min + strays + sqrt(2.0) * config.sigmas * field.position_sigma
 
 
+def beside(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
+    """How far (m) beside its plan one may say that it is, long after it stopped there, that has not moved
+    since: its estimate then and its estimate now are both off."""
+    return _strays(config, limits) + sqrt(2.0) * config.sigmas * field.position_sigma
+
+
 def _strays(config: CertifiedConfig, limits: LimitsConfig) -> float:
     """By how much (m) where a vehicle believes that it is may differ from its plan: tube and clock."""
     return config.tube + 1e-6 * config.clock_us * fastest(limits)

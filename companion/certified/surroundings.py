@@ -3,11 +3,14 @@ and strangers."""
 
 from __future__ import annotations
 
+from math import hypot
+
 import numpy as np
 
+from companion.certified.committed import horizon_of
 from companion.certified.corridor import Others
 from companion.certified.ledger import Ledger
-from companion.certified.reach import between, fastest, margin
+from companion.certified.reach import beside, between, fastest, margin
 from companion.certified.strangers import Strangers
 from companion.config import CompanionConfig
 from companion.horizon import Array
@@ -27,6 +30,7 @@ class Surroundings:
         self.between = between(own, config.field, config.limits)
         """Least distance (m) between two plans."""
         self._margin = margin(own, config.field, config.limits)
+        self._beside = beside(own, config.field, config.limits)
         self._posts = FixedObstacles(tuple(o for o in config.obstacles if isinstance(o, Post)))
         self._balls = FixedObstacles(tuple(o for o in config.obstacles if not isinstance(o, Post)))
         self._strangers = Strangers(config, steps)
@@ -38,11 +42,16 @@ class Surroundings:
         """All that counts for the plan that begins one epoch after ``epoch`` (µs), and the field f (n, 3),
         m/s², that it would rather yield to; ``own`` (n, 3, 3): the committed control points from there on."""
         plans = [filed.controls for filed in ledger.plans(epoch).values()]
-        members = ledger.members.union(ledger.left)
+        aside = self._aside(ledger, world)
+        # On the way down it drifts; who is further off is flown by somebody, at any height.
+        taken = {system for system, (off, _) in aside.items() if off > self.between}
+        members = ledger.members.union(ledger.left.keys() - taken)
         seen = self._strangers.seen(epoch + self._config.certified.epoch_us, members, world)
         strangers = [*self._strangers.balls(seen, own), *self._strangers.target(view)]
         sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
-        alone = [*self._standing(own), *self._gone(own, ledger), *strangers, *self._seen(sensed)]
+        ends = [filed.controls[-1, 2] for filed in ledger.left.values()]
+        down = [*ends, *(place for system, (_, place) in aside.items() if system not in taken)]
+        alone = [*self._standing(own), *self._down(own, down), *strangers, *self._seen(sensed)]
         count, n = len(plans), self._steps
         controls = np.empty((count + len(alone), n, 3, 3))
         if plans:
@@ -80,12 +89,29 @@ class Surroundings:
             for place, radius in zip(places, sensed.radius, strict=True)
         ]
 
-    def _gone(self, own: Array, ledger: Ledger) -> list[tuple[Array, Array]]:
-        """Those who said farewell are on the way down, or stand below: nobody flies over them."""
+    def _aside(self, ledger: Ledger, world: World) -> dict[int, tuple[float, Array]]:
+        """Of those who said farewell and were heard since beside their last plan: how far (m) beside it, and
+        where (3,). Heights do not count, and two estimates of one place differ, too."""
+        found: dict[int, tuple[float, Array]] = {}
+        left = ledger.left
+        if not left:
+            return found
+        for system, time, position, _ in world.neighbours.last_heard():
+            if system not in left or time < left[system].plan.epoch:
+                continue
+            apart = position - horizon_of(left[system].plan).at(time).position
+            off = hypot(apart[0], apart[1])
+            if off > self._beside:
+                found[system] = off, position
+        return found
+
+    def _down(self, own: Array, places: list[Array]) -> list[tuple[Array, Array]]:
+        """At ``places`` (3,) are those who said farewell, on the way down or on the ground: nobody flies over
+        them."""
         found = []
-        for filed in ledger.left.values():
+        for place in places:
             centres = own.copy()
-            centres[..., :2] = filed.controls[-1, 2, :2]
+            centres[..., :2] = place[:2]
             found.append((centres, np.full(self._steps, self.between)))
         return found
 
