@@ -124,7 +124,7 @@ class CertifiedFlight:
         keeper = self.keeper
         start = keeper.start()
         own = keeper.own()
-        others, field = self._surroundings.around(keeper.epoch(now), own, self.ledger, world, view)
+        others, field = self._surroundings.around(now, keeper.epoch(now), own, self.ledger, world, view)
         goal = self._stall.turned(start.position_m, aim.destination)
         places = goal + self._before_end[:, None] * aim.velocity
         wish = Wish(places, np.broadcast_to(aim.velocity, places.shape), field)

@@ -78,12 +78,13 @@ class Strangers:
             found.append((centres, radii))
         return found
 
-    def target(self, view: View) -> list[tuple[Array, Array]]:
-        """The same for the target, where it is an obstacle: that it flies on as it does is taken for granted,
-        for it is followed and not guarded against. One that falls silent stays where it was last."""
+    def target(self, now: int, begins: int, view: View) -> list[tuple[Array, Array]]:
+        """The same for the target, where it is an obstacle, as seen at ``now`` for the epoch that begins at
+        ``begins`` (µs): that it flies on as it does is taken for granted, for it is followed and not guarded
+        against. One that falls silent stays where it was last."""
         if view.target_last is None or self._target is None:
             return []
-        ends = view.target_last.ahead(self._seconds + 1e-6 * self._config.certified.epoch_us).positions
+        ends = view.target_last.ahead(self._seconds + 1e-6 * (begins - now)).positions
         middle = 0.5 * (ends[:-1] + ends[1:])
         return [(np.stack([ends[:-1], middle, ends[1:]], axis=1), np.full(self._steps, self._target))]
 

@@ -37,17 +37,19 @@ class Surroundings:
         self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + self.between + _STEPS_OF_SIGHT
 
     def around(
-        self, epoch: int, own: Array, ledger: Ledger, world: World, view: View
+        self, now: int, epoch: int, own: Array, ledger: Ledger, world: World, view: View
     ) -> tuple[Others, Array]:
-        """All that counts for the plan that begins one epoch after ``epoch`` (µs), and the field f (n, 3),
-        m/s², that it would rather yield to; ``own`` (n, 3, 3): the committed control points from there on."""
+        """All that counts for the plan that begins one epoch after ``epoch``, as known at ``now`` (µs), and
+        the field f (n, 3), m/s², that it would rather yield to; ``own`` (n, 3, 3): the committed control
+        points from there on."""
         plans = [filed.controls for filed in ledger.plans(epoch).values()]
         aside = self._aside(ledger, world)
         # On the way down it drifts; who is further off is flown by somebody, at any height.
         taken = {system for system, (off, _) in aside.items() if off > self.between}
         members = ledger.members.union(ledger.left.keys() - taken)
-        seen = self._strangers.seen(epoch + self._config.certified.epoch_us, members, world)
-        strangers = [*self._strangers.balls(seen, own), *self._strangers.target(view)]
+        begins = epoch + self._config.certified.epoch_us
+        seen = self._strangers.seen(begins, members, world)
+        strangers = [*self._strangers.balls(seen, own), *self._strangers.target(now, begins, view)]
         sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
         ends = [filed.controls[-1, 2] for filed in ledger.left.values()]
         down = [*ends, *(place for system, (_, place) in aside.items() if system not in taken)]

@@ -14,7 +14,8 @@ from companion.certified.strangers import Strangers
 from companion.config import CompanionConfig
 from companion.horizon import Array
 from companion.planner import standing
-from companion.world import World
+from companion.tracks import State
+from companion.world import View, World
 from mavlink_bridge.messages import GlobalPosition, Source
 
 OWN, OTHER = 11, 190
@@ -111,3 +112,18 @@ def test_a_member_is_no_stranger() -> None:
     assert strangers.seen(NOW, frozenset({OTHER}), world) == []
     own = controls(resting(NOW, 200_000, STEPS, HERE, FLEET.fingerprint))
     assert (strangers.field([], own) == 0.0).all()
+
+
+@given(st.integers(0, 999_999), st.floats(0.0, 8.0))
+def test_the_target_is_where_it_will_be_whenever_in_an_epoch_it_is_asked_for(late: int, speed: float) -> None:
+    """It is seen where it is then, and what is kept clear of begins with the next epoch."""
+    of = CompanionConfig.model_validate(
+        {"task": "goto", "avoidance": "certified", "target_d_min": 1.0, "target_d_safe": 3.0}
+    )
+    velocity = np.array([speed, 0.0, 0.0])
+    seen = State(HERE + 1e-6 * late * velocity, velocity, 0)
+    view = View(None, None, seen, None)
+    (centres, _), *others = Strangers(of, STEPS).target(NOW + late, NOW + 1_000_000, view)
+    knots = 1.0 + 1e-6 * of.certified.dt_us * np.arange(STEPS)
+    np.testing.assert_allclose(centres[:, 0], HERE + knots[:, None] * velocity, atol=1e-9)
+    assert not others
