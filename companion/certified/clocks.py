@@ -45,10 +45,13 @@ class ClockWatch:
         return [Timesync(self._own, 0, now * _NS + self._own.system)]
 
     def hear(self, now: int, message: Timesync) -> list[Timesync]:
-        """A request, and the reply to it; or a reply, which is noted if it is to one of ours."""
+        """A request, and the reply to it; or a reply, which is noted if it is to one of ours and from a
+        companion: an autopilot may answer as well, by the time since it was switched on."""
         if message.tc1 == 0:
             return [Timesync(self._own, now * _NS, message.ts1)]
         asked, system = divmod(message.ts1, _NS)
+        if message.source.component != self._own.component:
+            return []
         if system != self._own.system or not 0 <= now - asked <= 10 * _PERIOD:
             return []
         shown = message.tc1 // _NS
