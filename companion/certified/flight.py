@@ -56,6 +56,7 @@ class CertifiedFlight:
         self.left_tube = 0
         """How often it got out of the tube."""
         self._outside = self._steers = False
+        self._asked: int | None = None
         self._next_told = 0
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
         """From now to the end of the plan that is made next, s, at most."""
@@ -78,6 +79,7 @@ class CertifiedFlight:
         """Not steering, not yet or just again: the plan is to stand at ``position`` (3,), and nobody is told
         before it steers. But a plan in whose tube the vehicle still is goes on, and so does one that was told
         for this epoch: others count on it."""
+        self._asked = now
         keeper, horizon = self.keeper, self.keeper.horizon()
         if horizon is not None:
             off = horizon.at(now).position - position
@@ -91,7 +93,7 @@ class CertifiedFlight:
     def due(self, now: int) -> bool:
         """Whether the next epoch's plan is to be made now, one way or the other. Carries on by itself what
         cannot wait any longer."""
-        self._steers = True
+        self._asked, self._steers = now, True
         if not self.keeper.turn(now):
             return False
         wrong = not self.clocks.wrong.isdisjoint(self.ledger.members)
@@ -142,12 +144,16 @@ class CertifiedFlight:
 
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
         """What is to be told on the swarm link now: the newest plan, at once and then from time to time, and
-        whom it was made with. ``farewell``: it makes no other; that is said once it flies the last."""
+        whom it was made with. ``farewell``: it makes no other; that is said once it flies the last. Without
+        that a plan that is not flown is not told: it steers no more that was not asked at ``now`` either
+        whether a plan is ``due``, or to ``stand``."""
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()
         if farewell:
             self.keeper.turn(now)
             farewell = self.keeper.following is None
+        elif self._asked != now:
+            self._steers = False
         told = self.keeper.told()
         if told is None or not (self._steers or farewell):
             return sync

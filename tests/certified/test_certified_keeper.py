@@ -23,6 +23,7 @@ from companion.certified.stall import StallTurn
 from companion.config import CompanionConfig, HorizonConfig, LimitsConfig
 from companion.horizon import Array, Motion, roll_out
 from mavlink_bridge.messages import Message, Source, Tunnel
+from mavlink_bridge.roster_wire import unpack
 
 LENGTH = 400_000
 SHIFT = LENGTH // DT
@@ -210,6 +211,26 @@ class TestStanding:
         origin = FLEET.fingerprint
         assert flight.keeper.current == resting(now, DT, STEPS, away, origin)
         assert not tunnels(flight, now)
+
+    def test_who_steers_no_more_tells_nothing_but_a_farewell(self) -> None:
+        """It may be flown by hand: nobody is to take its last plan for what it flies."""
+        for leaving in (False, True):
+            flight = self.flight()
+            flight.stand(EPOCH, HERE)
+            flight.due(EPOCH)
+            assert len(tunnels(flight, EPOCH)) == 2
+            for now in range(EPOCH + 60_000, EPOCH + 3 * LENGTH, 60_000):
+                said = [one for one in flight.messages(now, farewell=leaving) if isinstance(one, Tunnel)]
+                assert bool(said) == leaving
+                if said and now >= EPOCH + LENGTH:
+                    assert unpack(said[1].payload).farewell
+            # Landed, and handed over: the farewell was the last that was heard of it.
+            assert not tunnels(flight, EPOCH + 4 * LENGTH)
+            now = EPOCH + 5 * LENGTH
+            flight.stand(now, HERE)
+            assert not tunnels(flight, now)
+            flight.due(now + 20_000)
+            assert len(tunnels(flight, now + 20_000)) == 2
 
 
 def test_an_epoch_is_no_longer_than_a_plan() -> None:
