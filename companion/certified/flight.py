@@ -55,7 +55,7 @@ class CertifiedFlight:
         """Distance (m) of the vehicle from its plan, now and at most."""
         self.left_tube = 0
         """How often it got out of the tube."""
-        self._outside = self._steers = False
+        self._outside = self._steers = self._told = False
         self._asked: int | None = None
         self._next_told = 0
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
@@ -78,7 +78,7 @@ class CertifiedFlight:
     def stand(self, now: int, position: Array) -> None:
         """Not steering, not yet or just again: the plan is to stand at ``position`` (3,), and nobody is told
         before it steers. But a plan in whose tube the vehicle still is goes on, and so does one that was told
-        for this epoch: others count on it."""
+        for this epoch: others count on it. To leave one that was told before is to plan anew."""
         self._asked = now
         keeper, horizon = self.keeper, self.keeper.horizon()
         if horizon is not None:
@@ -88,7 +88,8 @@ class CertifiedFlight:
                 keeper.turn(now)
                 return
         keeper.begin(now, position)
-        self._steers = False
+        keeper.anchored_anew += self._told
+        self._steers = self._told = False
 
     def due(self, now: int) -> bool:
         """Whether the next epoch's plan is to be made now, one way or the other. Carries on by itself what
@@ -160,6 +161,7 @@ class CertifiedFlight:
         if told.epoch == self.keeper.told_until and now < self._next_told:
             return sync
         self.keeper.told_until, self._next_told = told.epoch, now + self._config.certified.repeat_us
+        self._told = True
         if farewell:
             self.ledger.leave(told.epoch)
         roster = Roster(told.epoch, self.ledger.members, farewell)

@@ -212,6 +212,21 @@ class TestStanding:
         assert flight.keeper.current == resting(now, DT, STEPS, away, origin)
         assert not tunnels(flight, now)
 
+    def test_to_leave_a_plan_that_was_told_is_to_plan_anew_and_counted_once(self) -> None:
+        """Of plans that nobody was told, as on the way up, nothing follows."""
+        flight = self.flight()
+        for step in range(10):
+            flight.stand(EPOCH + step * LENGTH, HERE + vector(step, 0.0, 0.0))
+        assert flight.keeper.anchored_anew == 0
+        now = EPOCH + 10 * LENGTH
+        flight.due(now)
+        flight.messages(now)
+        flight.stand(now + LENGTH, HERE + vector(9.0, 0.0, 0.0))
+        assert flight.keeper.anchored_anew == 0
+        for step in range(3, 6):
+            flight.stand(now + step * LENGTH, HERE + vector(0.0, step, 0.0))
+        assert flight.keeper.anchored_anew == 1
+
     def test_who_steers_no_more_tells_nothing_but_a_farewell(self) -> None:
         """It may be flown by hand: nobody is to take its last plan for what it flies."""
         for leaving in (False, True):
