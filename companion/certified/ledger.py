@@ -1,11 +1,11 @@
 """What each knows of the others' committed plans, and whom it counts with.
 
 Plans are filed by the epoch they begin at. A vehicle replans in an epoch only if it holds the plan of that
-very epoch of everybody it counts with (``missing`` is empty): an older one will not do, for its sender may
-have made another since. Who was once heard with a plan counts from then on, and so does whoever one of those
-counts with; who has said farewell flies its last plan to the end and stays there. That is believed only with
-the very plan that the farewell goes with, for an older one may end elsewhere; and only for as long as plans
-are, for its sender may have joined again since.
+very epoch of everybody it counts with, and each of them counts with it in that epoch (``missing`` is empty):
+an older plan will not do, for its sender may have made another since. Who was once heard with a plan or a
+roster counts from then on, and so does whoever one of those counts with; who has said farewell flies its last
+plan to the end and stays there. That is believed only with the very plan that the farewell goes with, for an
+older one may end elsewhere; and only for as long as plans are, for its sender may have joined again since.
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ class Ledger:
     def members(self) -> frozenset[int]:
         """Everybody that is counted with."""
         if self._members is None:
-            known = self._expected.union(self._plans, *(roster.members for roster in self._rosters.values()))
+            named = (roster.members for roster in self._rosters.values())
+            known = self._expected.union(self._plans, self._rosters, *named)
             self._members = known - {self._own} - set(self._left)
         return self._members
 

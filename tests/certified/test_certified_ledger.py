@@ -114,6 +114,16 @@ def test_whoever_one_counts_with_counts_and_is_never_forgotten() -> None:
         assert book.missing(EPOCH + epoch * LENGTH) == {THIRD}
 
 
+def test_who_is_heard_by_its_roster_alone_counts() -> None:
+    """Its plan is lost, but it flies one."""
+    book = ledger()
+    book.hear_roster(NOW, OTHER, Roster(EPOCH, frozenset({OWN})))
+    assert book.members == {OTHER}
+    assert book.missing(EPOCH) == {OTHER}
+    book.hear_plan(NOW, OTHER, pack(plan()))
+    assert not book.missing(EPOCH)
+
+
 def test_of_two_rosters_the_later_epoch_counts_whichever_comes_last() -> None:
     book = ledger()
     hear(book, OTHER, plan(1), OWN)
