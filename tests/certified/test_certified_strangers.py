@@ -98,7 +98,9 @@ def test_a_target_that_falls_silent_is_kept_clear_of_where_it_was_last() -> None
     world, place = World(of, OWN, OTHER, FLEET), HERE + np.array([3.0, 0.0, 0.0])
     told(world, place, np.zeros(3), "target")
     strangers, silence = Strangers(of, STEPS), 10 * of.guard.target_stale_us
-    (heard,), (silent,) = (strangers.target(world.at(NOW + later)) for later in (0, silence))
+    (heard,), (silent,) = (
+        strangers.target(now, now + 200_000, world.at(now)) for now in (NOW, NOW + silence)
+    )
     assert world.at(NOW + silence).target is None
     for before, after in zip(heard, silent, strict=True):
         np.testing.assert_allclose(after, before, atol=1e-6)
@@ -122,7 +124,7 @@ def test_the_target_is_where_it_will_be_whenever_in_an_epoch_it_is_asked_for(lat
     )
     velocity = np.array([speed, 0.0, 0.0])
     seen = State(HERE + 1e-6 * late * velocity, velocity, 0)
-    view = View(None, None, seen, None)
+    view = View(None, None, seen, None, seen)
     (centres, _), *others = Strangers(of, STEPS).target(NOW + late, NOW + 1_000_000, view)
     knots = 1.0 + 1e-6 * of.certified.dt_us * np.arange(STEPS)
     np.testing.assert_allclose(centres[:, 0], HERE + knots[:, None] * velocity, atol=1e-9)
