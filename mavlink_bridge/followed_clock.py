@@ -182,17 +182,17 @@ class FollowedClock:
 
     def _gather(self, seen: _Seen) -> None:
         best = self._best
-        if best is None:
-            self._best, self._begun = seen, seen.wall
-            return
-        if seen.stamp - best.stamp > self.rate * (seen.wall - best.wall):
-            self._best = best = seen
-        if seen.wall - self._begun >= _PIECE:
+        if best is not None and seen.wall - self._begun >= _PIECE:
+            # It ends before what comes now: much may come at once, and no two pieces have one time.
             self._pieces.append(best)
-            self._best = None
             self._fit(seen.wall)
             self._evidence.append(best)
             self._decide(seen.wall)
+            best = None
+        if best is None:
+            self._best, self._begun = seen, seen.wall
+        elif seen.stamp - best.stamp > self.rate * (seen.wall - best.wall):
+            self._best = seen
 
     def _fit(self, wall: int) -> None:
         """The line anew, from ``wall`` on."""

@@ -167,6 +167,7 @@ def test_a_queue_that_grows_before_anybody_decides_is_no_simulation(growth, end)
 )
 @example(shape="sine", swing=0.2, period=3.0)
 @example(shape="steps", swing=0.3, period=5.0)
+@example(shape="steps", swing=0.375, period=0.3125)
 @settings(max_examples=30, deadline=None)
 def test_a_real_clock_is_known_however_the_delay_of_its_stamps_swings(shape, swing, period):
     """By less than half a second: a rate that was learnt from one swing does not make the next a stall."""
