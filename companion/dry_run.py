@@ -6,6 +6,7 @@ well. It answers no order.
 
 from __future__ import annotations
 
+from companion.config import CompanionConfig
 from companion.node import Companion
 from companion.readiness import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
 from companion.understudy import Onlooker, Understudy
@@ -23,6 +24,10 @@ class _Asking(Onlooker):
     """``lacking``: what a flight would wait for before it takes off."""
 
     lacking = ""
+
+    def __init__(self, config: CompanionConfig, own: Source, origin_altitude: float) -> None:
+        # Whom the answers are to: the companion may ask as well.
+        super().__init__(config, own._replace(component=ONLOOKER), origin_altitude)
 
     def step(self, now: int, view: View) -> list[Message]:
         """Requests for messages alone."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from itertools import count
 
-from companion_bench import AUTOPILOT, FLEET, SYSTEM, TARGET, Bench, seen_at
+from companion_bench import AUTOPILOT, FLEET, SYSTEM, TARGET, Bench, only, seen_at
 
+from companion.dry_run import ONLOOKER, REQUESTS, DryRun
 from companion.pilot import Phase
+from companion.readiness import OPERATORS_GO
 from companion.understudy import Understudy
-from mavlink_bridge.messages import GpsGlobalOrigin
+from mavlink_bridge.messages import CommandLong, GpsGlobalOrigin, Source
 
 
 def test_an_empty_battery_of_the_vehicle_it_looks_on_at_leaves_no_gap() -> None:
@@ -26,3 +28,15 @@ def test_an_empty_battery_of_the_vehicle_it_looks_on_at_leaves_no_gap() -> None:
     assert any("battery" in name for name in bench.companion.watch.concerns)
     assert len(bench.companion.would) - before == 50
     assert not bench.sent
+
+
+def test_a_dry_run_hears_the_answers_to_what_it_asks_and_not_the_companions() -> None:
+    bench, stopwatch = Bench(task="escort"), count()
+    bench.companion = DryRun(bench.config, SYSTEM, TARGET, FLEET, lambda: next(stopwatch))
+    bench.target = seen_at(TARGET, (15.0, 0.0, 0.0))
+    bench.fly(3.0)
+    pilot = bench.companion.pilot
+    assert pilot.lacking == OPERATORS_GO
+    asked = only(CommandLong, [(link, message) for _, link, message in bench.sent])
+    assert {message.source for message in asked} == {Source(SYSTEM, ONLOOKER)}
+    assert {message.command for message in asked} == set(REQUESTS)
