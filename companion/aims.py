@@ -116,7 +116,7 @@ class Aims:
         above: Array = np.clip(np.array([start[0], start[1], height]), self._low, self._high)
         off = above - measured.position
         far = hypot(off[0], off[1])
-        if far < self._nearest - _BACK:
+        if far >= _BESIDE or far < self._nearest - _BACK:
             self._nearest, self._nearer_at = far, now
         there = far < _BACK and float(measured.velocity @ measured.velocity) < _STILL**2
         # Who finds the place taken may go round it for ever.

@@ -293,7 +293,7 @@ class Pilot:
 
     def _prepare(self, now: int, view: View) -> list[Message]:
         profile, height, takeoff = self.profile, self._height, self._takeoff
-        if profile is None or height is None or view.own is None:
+        if profile is None or height is None:
             return []
         if takeoff.disarmed(profile):
             self._start_anew()
@@ -304,16 +304,16 @@ class Pilot:
             # Who has it nobody knows: the next heartbeat says, before anything is asked of it.
             return []
         ways = profile.takeoff_modes | {profile.guided_custom_mode}
-        if takeoff.risen(view.own, height):
+        if view.own is not None and takeoff.risen(view.own, height):
             ways |= {profile.hold_mode}
         if self._passage.strays(self.vehicle.mode, ways):
             self._yield()
             if not self.vehicle.armed:
                 self._start_anew()
-        elif self.vehicle.flies and view.own.age > self._config.guard.own_lost_us:
+        elif self.vehicle.flies and view.own_age > self._config.guard.own_lost_us:
             # It would never be seen to have arrived.
             self._alight()
-        if self.phase is not Phase.PREPARE:
+        if self.phase is not Phase.PREPARE or view.own is None:
             return []
         step = takeoff.step(profile)
         sent = takeoff.advance(now, profile, view.own, height)

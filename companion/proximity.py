@@ -103,7 +103,8 @@ def returns(scan: ObstacleDistance, reach: float) -> Returns | None:
 
 
 class Proximity:
-    """Of one vehicle. ``refused``: messages that made no sense, or came from one sensor too many."""
+    """Of one vehicle. ``refused``: messages that made no sense, came from one sensor too many, or were more
+    than eight within 20 ms."""
 
     def __init__(self, config: ProximityConfig) -> None:
         self._config = config

@@ -86,6 +86,7 @@ class Takeoff:
         drifts by more than one may ask: the autopilot measures its height from its own origin."""
         still = float(abs(own.velocity).max()) < _STILL
         if self._vehicle.landed_state == ON_GROUND:
+            self._calm_since = None
             return False
         if not still or self._vehicle.landed_state != IN_AIR or climbed < 0.5 * height:
             self._calm_since = None

@@ -115,10 +115,10 @@ class Watch:
         return [concern for concern in found if concern is not None]
 
     def _own(self, s: Situation) -> Concern | None:
-        guard, own = self._config.guard, s.view.own
-        if s.phase in _ON_THE_GROUND or own is None or own.age <= guard.own_stale_us:
+        guard, age = self._config.guard, s.view.own_age
+        if s.phase in _ON_THE_GROUND or age <= guard.own_stale_us:
             return None
-        lost = own.age > guard.own_lost_us
+        lost = age > guard.own_lost_us
         text = "Own position is lost: landing" if lost else "Own position is old: braking"
         return Concern(f"own state {lost}", text, Reaction.LAND if lost else Reaction.TELL)
 

@@ -52,6 +52,13 @@ class View(NamedTuple):
     target: State | None
     local: LocalFrame | None
     target_last: State | None = None
+    adrift: int = 0
+    """µs since the own place was told last, where it is none since, for the frame is another; else 0."""
+
+    @property
+    def own_age(self) -> int:
+        """µs since the own place was told last, in whatever frame; 0 before it first was."""
+        return self.adrift if self.own is None else self.own.age
 
 
 def reach(config: CompanionConfig) -> float:
@@ -84,6 +91,7 @@ class World:
         self._yaw_time = 0
         self._yaw_rate = 0.0
         self._left: State | None = None
+        self._placed = 0
         # Of the tracks in the frames before.
         self._clock_steps = 0
         self.moves = 0
@@ -112,8 +120,9 @@ class World:
     def at(self, now: int) -> View:
         """The view at ``now`` (µs)."""
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
-        last = self.target.last(now)
-        return View(self._own.at(now), yaw, self.target.fresh(last), self._local, last)
+        own, last = self._own.at(now), self.target.last(now)
+        adrift = now - self._placed if own is None and self._left is not None else 0
+        return View(own, yaw, self.target.fresh(last), self._local, last, adrift)
 
     def say(self, now: int, voice: Voice) -> None:
         """Let ``voice`` tell who has fallen silent, and who is back."""
@@ -219,7 +228,8 @@ class World:
             origin = (message.latitude, message.longitude, message.altitude)
             if self._origins.counts(now, message) and origin != self._origin:
                 # Of two origins before a position the first one's leave counts.
-                self._left = self._own.at(now) if self._left is None else self._left
+                if self._left is None and (left := self._own.at(now)) is not None:
+                    self._left, self._placed = left, now - left.age
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
                 self._clock_steps += self._own.clock_steps

@@ -107,6 +107,10 @@ class Ledger:
         who joined again since makes plans."""
         if system == self._own:
             return
+        if roster.epoch - now > _KEPT * self._epoch:
+            # By a clock that will be set right: what is said then would come too early.
+            self.refused += 1
+            return
         last = self._rosters.get(system)
         if last is not None and roster.epoch < last.epoch:
             return
@@ -138,7 +142,7 @@ class Ledger:
 
     def missing(self, epoch: int) -> set[int]:
         """Members whose plan of ``epoch`` (µs) is not held, or who may replan in it without counting with us:
-        who told so with a later plan only may have made that one before."""
+        whoever says so only with a later plan may have made that plan before it counted with us."""
         found = set()
         for system in self.members:
             counted = self._counted.get(system)

@@ -31,6 +31,7 @@ class Surroundings:
         """Least distance (m) between two plans."""
         self._margin = margin(own, config.field, config.limits)
         self._beside = beside(own, config.field, config.limits)
+        self._lost = config.guard.neighbour_lost_us
         self._posts = FixedObstacles(tuple(o for o in config.obstacles if isinstance(o, Post)))
         self._balls = FixedObstacles(tuple(o for o in config.obstacles if not isinstance(o, Post)))
         self._strangers = Strangers(config, steps)
@@ -43,16 +44,17 @@ class Surroundings:
         the field f (n, 3), m/s², that it would rather yield to; ``own`` (n, 3, 3): the committed control
         points from there on."""
         plans = [filed.controls for filed in ledger.plans(epoch).values()]
-        aside = self._aside(ledger, world)
-        # On the way down it drifts; who is further off is flown by somebody, at any height.
-        taken = {system for system, (off, _) in aside.items() if off > self.between}
+        aside = self._aside(now, ledger, world)
+        # On the way down it drifts; who is further off may be flown by somebody, at any height. Once silent
+        # it counts as down where it was: what stands switched off on the ground is no danger that grows.
+        taken = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
         members = ledger.members.union(ledger.left.keys() - taken)
         begins = epoch + self._config.certified.epoch_us
         seen = self._strangers.seen(begins, members, world)
         strangers = [*self._strangers.balls(seen, own), *self._strangers.target(now, begins, view)]
         sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
         ends = [filed.controls[-1, 2] for filed in ledger.left.values()]
-        down = [*ends, *(place for system, (_, place) in aside.items() if system not in taken)]
+        down = [*ends, *(place for system, (_, place, _) in aside.items() if system not in taken)]
         alone = [*self._standing(own), *self._down(own, down), *strangers, *self._seen(sensed)]
         count, n = len(plans), self._steps
         controls = np.empty((count + len(alone), n, 3, 3))
@@ -91,10 +93,11 @@ class Surroundings:
             for place, radius in zip(places, sensed.radius, strict=True)
         ]
 
-    def _aside(self, ledger: Ledger, world: World) -> dict[int, tuple[float, Array]]:
-        """Of those who said farewell and were heard since beside their last plan: how far (m) beside it, and
-        where (3,). Heights do not count, and two estimates of one place differ, too."""
-        found: dict[int, tuple[float, Array]] = {}
+    def _aside(self, now: int, ledger: Ledger, world: World) -> dict[int, tuple[float, Array, bool]]:
+        """Of those who said farewell and were heard since beside their last plan: how far (m) beside it,
+        where (3,), and whether they are heard still. Heights do not count, and two estimates of one place
+        differ, too."""
+        found: dict[int, tuple[float, Array, bool]] = {}
         left = ledger.left
         if not left:
             return found
@@ -104,7 +107,7 @@ class Surroundings:
             apart = position - horizon_of(left[system].plan).at(time).position
             off = hypot(apart[0], apart[1])
             if off > self._beside:
-                found[system] = off, position
+                found[system] = off, position, now - time <= self._lost
         return found
 
     def _down(self, own: Array, places: list[Array]) -> list[tuple[Array, Array]]:

@@ -99,3 +99,26 @@ def test_where_it_was_before_its_last_plan_says_nothing() -> None:
     """It was heard on its way there, and not since."""
     before = END - (6.0, 3.0, 0.0)
     np.testing.assert_array_equal(way(lambda since: before if since < 0 else None), way(nowhere))
+
+
+@pytest.mark.parametrize("off", [0.0, 1.1, 3.0])
+def test_who_was_carried_aside_after_landing_and_switched_off_keeps_nobody_away_from_elsewhere(
+    off: float,
+) -> None:
+    """A minute later: what stands on the ground is no danger that grows."""
+    end, goal = np.array([0.0, 12.0, 5.0]), np.array([6.0, 0.0, 5.0])
+    place = end + np.array([0.0, off * LEAST, -5.0])
+    flight, world = CertifiedFlight(CONFIG, Source(OWN, 195), FLEET), World(CONFIG, OWN, 0, FLEET)
+    flight.ledger.hear_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
+    flight.ledger.hear_roster(EPOCH, LEFT, Roster(EPOCH, frozenset({OWN}), farewell=True))
+    for since in range(0, 1_000_000, 20_000):
+        said = position_message(Source(LEFT, 195), 1_000_000 + since, FLEET, place, np.zeros(3), None)
+        world.hear(EPOCH + since, "swarm", said)
+    begin = EPOCH + 60_000_000
+    flight.stand(begin, np.array([-6.0, 0.0, 5.0]))
+    for now in range(begin, begin + 8_000_000, 20_000):
+        if flight.due(now):
+            assert flight.plan(now, standing(goal), world, _NOTHING)
+    horizon = flight.horizon()
+    assert horizon is not None
+    assert np.linalg.norm(horizon.at(begin + 8_000_000).position - goal) < 0.1

@@ -124,6 +124,15 @@ def test_who_is_heard_by_its_roster_alone_counts() -> None:
     assert not book.missing(EPOCH)
 
 
+def test_a_roster_by_a_clock_that_is_far_ahead_is_refused_and_stands_in_no_ones_way() -> None:
+    book = ledger()
+    book.hear_roster(NOW, OTHER, Roster(EPOCH + 25 * LENGTH, frozenset({OWN})))
+    assert book.refused == 1
+    hear(book, OTHER, plan(), OWN)
+    assert book.members == {OTHER}
+    assert not book.missing(EPOCH)
+
+
 def test_of_two_rosters_the_later_epoch_counts_whichever_comes_last() -> None:
     book = ledger()
     hear(book, OTHER, plan(1), OWN)

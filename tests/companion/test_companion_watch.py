@@ -6,7 +6,19 @@ import math
 
 import numpy as np
 import pytest
-from companion_bench import AUTOPILOT, FLEET, LAND, MODE, PREARM_OK, PROFILES, TAKEOFF, Bench, only, seen_at
+from companion_bench import (
+    AUTOPILOT,
+    FLEET,
+    LAND,
+    MODE,
+    NAN,
+    PREARM_OK,
+    PROFILES,
+    TAKEOFF,
+    Bench,
+    only,
+    seen_at,
+)
 
 from companion.config import CompanionConfig
 from companion.guard import Holding
@@ -15,7 +27,14 @@ from companion.tracks import State
 from companion.vehicle import Vehicle
 from companion.watch import Reaction, Situation, Watch
 from companion.world import View
-from mavlink_bridge.messages import CommandLong, Heartbeat, SetpointLocal, StatusText, SysStatus
+from mavlink_bridge.messages import (
+    CommandLong,
+    GpsGlobalOrigin,
+    Heartbeat,
+    SetpointLocal,
+    StatusText,
+    SysStatus,
+)
 
 SECOND = 1_000_000
 LOCAL = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
@@ -259,3 +278,23 @@ def test_who_misses_a_neighbour_flies_about_slowly():
         bench.fly(0.1)
         fastest = max(fastest, float(np.linalg.norm(bench.autopilot.position - before)) / 0.1)
     assert 0.4 < fastest < 2.0
+
+
+@pytest.mark.parametrize("moved", [False, True])
+@pytest.mark.parametrize("climbing", [False, True])
+def test_whose_place_is_lost_lands_though_its_origin_has_moved_as_well(climbing, moved):
+    """An estimator that begins anew and finds no place."""
+    bench = Bench()
+    if climbing:
+        bench.order(TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 20.0)
+        while bench.autopilot.position[2] < 3.0:
+            bench.step()
+    else:
+        bench.take_off()
+    bench.autopilot.mute = True
+    if moved:
+        origin = GpsGlobalOrigin(AUTOPILOT, FLEET.latitude + 1e-4, FLEET.longitude, FLEET.altitude, 0)
+        bench.step(bench.datagram("autopilot", origin))
+    lost = bench.now
+    bench.until(Phase.LAND)
+    assert 4_500_000 < bench.now - lost < 6_000_000

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
 import signal
@@ -147,6 +148,31 @@ def test_who_does_not_listen_ends_nothing(tmp_path: Path) -> None:
     diary.note("phase", "escort")
     diary.close()
     assert "escort" in (tmp_path / "events.jsonl").read_text(encoding="utf-8")
+
+
+def test_a_disk_that_stands_still_keeps_nobody_from_noting_what_happens(
+    tmp_path: Path, patience: None
+) -> None:
+    """A pipe that nobody reads for a while."""
+    place = tmp_path / "events.jsonl"
+    os.mkfifo(place)
+    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)
+    diary = Diary(tmp_path, lambda: 1.0)
+    for number in range(3000):
+        diary.note("autopilot", f"{number:0100}")
+    os.set_blocking(reader, True)
+    found: list[bytes] = []
+
+    def read() -> None:
+        found.extend(iter(lambda: os.read(reader, 65536), b""))
+
+    listening = Thread(target=read)
+    listening.start()
+    diary.close()
+    listening.join()
+    os.close(reader)
+    lines = [json.loads(line)["text"] for line in b"".join(found).splitlines()]
+    assert lines == [f"{number:0100}" for number in range(3000)]
 
 
 @pytest.fixture

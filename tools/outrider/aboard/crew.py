@@ -38,6 +38,11 @@ class Crew:
         """Its exit status, negative for a signal; None while it runs."""
         return self._process.exitcode
 
+    @property
+    def killed(self) -> bool:
+        """Whether it has been, and has nothing more to say."""
+        return self._killed
+
     def kill(self) -> None:
         """At once."""
         self._killed = True

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Final
+from queue import SimpleQueue
+from threading import Thread
+from typing import Final
 
 NAME: Final = "events.jsonl"
 _SENTENCES: Final = {
@@ -20,10 +23,16 @@ _SENTENCES: Final = {
 }
 
 
+_MOST: Final = 10_000
+"""Lines that wait for the disk."""
+_PATIENCE: Final = 5.0
+"""s for which the end waits until all are written."""
+
+
 class Diary:
-    """Writes ``events.jsonl`` in ``directory``; ``tell`` gets the lines for people. ``phases``: each with
-    when it began, s; ``concerns``: how often each began. A full disk, and people who do not listen any more,
-    hold up nobody."""
+    """Has ``events.jsonl`` in ``directory`` written by a thread; ``tell`` gets the lines for people.
+    ``phases``: each with when it began, s; ``concerns``: how often each began. A disk that is full or stands
+    still, and people who do not listen any more, hold up nobody."""
 
     def __init__(self, directory: Path, clock: Callable[[], float]) -> None:
         """``clock``: s since the beginning."""
@@ -31,7 +40,11 @@ class Diary:
         self.concerns: Counter[str] = Counter()
         self.tell: Callable[[str], None] = lambda _line: None
         self._clock = clock
-        self._file: IO[str] = (directory / NAME).open("w", encoding="utf-8")
+        # Without a buffer, whose lock a process that is forked meanwhile would inherit.
+        self._file = os.open(directory / NAME, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+        self._lines: SimpleQueue[bytes | None] = SimpleQueue()
+        self._writer = Thread(target=self._write, name="diary", daemon=True)
+        self._writer.start()
 
     def note(self, what: str, text: str, at: float | None = None) -> None:
         """An event; ``at``: s of the companion's clock since it began, if it is that who tells."""
@@ -41,13 +54,22 @@ class Diary:
         elif what in ("concern", "critical"):
             self.concerns[text] += 1
         event = {"wall_s": now, "clock_s": at, "what": what, "text": text}
-        with suppress(OSError, ValueError):
-            self._file.write(json.dumps(event, ensure_ascii=False) + "\n")
-            self._file.flush()
+        if self._lines.qsize() < _MOST:
+            line = json.dumps(event, ensure_ascii=False) + "\n"
+            self._lines.put(line.encode("utf-8", "replace"))
         with suppress(OSError, ValueError):
             self.tell(f"{now:8.1f} s  {_SENTENCES.get(what, '{}').format(text)}")
 
     def close(self) -> None:
-        """Finish the file."""
+        """Finish the file, if the disk lets it; nothing is noted afterwards."""
+        self._lines.put(None)
+        self._writer.join(_PATIENCE)
+
+    def _write(self) -> None:
+        """The thread."""
+        while (line := self._lines.get()) is not None:
+            with suppress(OSError):
+                while line:
+                    line = line[os.write(self._file, line) :]
         with suppress(OSError):
-            self._file.close()
+            os.close(self._file)

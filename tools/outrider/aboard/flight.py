@@ -252,6 +252,9 @@ class Flight:
 
     def _dismiss(self, desk: Desk, crew: Crew) -> None:
         desk.stop()
+        if crew.killed:
+            crew.join()
+            return
         until = time.monotonic() + _LEAVING
         while not (self._left or crew.status is not None):
             if self._at_once() or time.monotonic() > until:

@@ -51,12 +51,18 @@ class Log:
         self._thread = Thread(target=self._write, name="log", daemon=True)
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        try:
+            self._thread.start()
+        except RuntimeError as error:
+            # As many threads as the system allows.
+            self._end(error)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._thread.ident is None:
+            return
         self._waiting.put(self._batch)
         self._waiting.put(None)
         self._thread.join(self._patience)
