@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
-from companion.world import World
+from companion.world import View, World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Attitude, GlobalPosition, GpsGlobalOrigin, LocalPosition, Source
 
@@ -46,7 +46,7 @@ def world(*heard, config=CONFIG):
 
 def test_at_first_nothing_is_known():
     view = world().at(NOW)
-    assert view == (None,) * 5
+    assert view == View(None, None, None, None)
 
 
 def test_without_an_origin_a_local_position_means_nothing():
@@ -88,7 +88,7 @@ def test_the_own_origin_makes_no_difference(place, ned):
 @pytest.mark.parametrize("link", ["swarm", "target", "ground"])
 def test_the_own_state_comes_from_the_autopilots_link_alone(link):
     heard = [(link, AT_FLEET_ZERO), (link, local((1, 2, -3))), (link, attitude(0.5))]
-    assert world(*heard).at(NOW) == (None,) * 5
+    assert world(*heard).at(NOW) == View(None, None, None, None)
 
 
 def test_another_systems_state_is_not_the_own():

@@ -92,7 +92,7 @@ def test_what_one_process_found_out_all_after_it_know(
     class Lost:
         """A process that ends as soon as it has begun; the second tells what it has found out."""
 
-        sentinel, status = near, -9
+        sentinel, status, killed = near, -9, False
 
         def __init__(self, worker: Worker) -> None:
             self._worker = worker
