@@ -44,6 +44,20 @@ KEY = Key(b"k" * 32)
 SECONDS = 8
 
 
+def weighed(bench: Bench, link: str) -> list[int]:
+    """Bytes of each datagram that leaves the bench's companion by ``link`` from now on."""
+    step, sizes = bench.companion.step, []
+
+    def weighing(now, inbox):
+        leaving = step(now, inbox)
+        sizes.extend(len(datagram.data) for datagram in leaving if datagram.link == link)
+        assert all(datagram.data[0] == 0xFD for datagram in leaving)
+        return leaving
+
+    bench.companion.step = weighing
+    return sizes
+
+
 def counted(config: FlyConfig, key: Key | None) -> int:
     """Bytes on the swarm link in ``SECONDS``, of a companion beside a target that flies a circle."""
     rates = config.settings.rates.model_dump() | {"replan_us": 100_000}
@@ -51,15 +65,7 @@ def counted(config: FlyConfig, key: Key | None) -> int:
     bench.target = seen_at(TARGET, (9.0, 0.0, 2.0))
     bench.fly(1.0)
     bench.take_off()
-    step, sizes = bench.companion.step, []
-
-    def weighed(now, inbox):
-        leaving = step(now, inbox)
-        sizes.extend(len(datagram.data) for datagram in leaving if datagram.link == "swarm")
-        assert all(datagram.data[0] == 0xFD for datagram in leaving)
-        return leaving
-
-    bench.companion.step = weighed
+    sizes = weighed(bench, "swarm")
     for tick in range(100 * SECONDS):
         turn = 0.004 * tick
         place = (9.0 * math.cos(turn), 9.0 * math.sin(turn), 3.0 + math.sin(turn))
@@ -169,14 +175,7 @@ def test_what_goes_to_an_autopilot_is_what_is_stated(key: Key | None) -> None:
     bench = Bench("px4", key=key, others=key)
     bench.fly(1.0)
     bench.take_off()
-    step, sizes = bench.companion.step, []
-
-    def weighed(now, inbox):
-        leaving = step(now, inbox)
-        sizes.extend(len(datagram.data) for datagram in leaving if datagram.link == "autopilot")
-        return leaving
-
-    bench.companion.step = weighed
+    sizes = weighed(bench, "autopilot")
     bench.fly(float(SECONDS))
     assert sum(sizes) == SECONDS * steered(bench.config, key is not None)
 
