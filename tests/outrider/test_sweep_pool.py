@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import sweep_runs
 
 from outrider.errors import OutriderError
+from outrider.sweeps import pool, process
 from outrider.sweeps.pool import MOST_STARTS, Pool
 from outrider.sweeps.tasks import Entry, Task
 
@@ -106,11 +109,29 @@ def test_a_worker_that_ends_by_itself_is_lost_too() -> None:
     assert {entry.what for entry in lost} == {"its worker ended with status 7"}
 
 
-def test_a_run_that_hangs_is_ended_by_the_wall_limit() -> None:
-    entries = work("hangs", 5, limit=1.5)
-    assert {entry.seed for entry in entries if entry.status == "lost"} == {3}
-    assert {e.what for e in entries if e.status == "lost"} == {"took longer than 1.5 s of wall time"}
-    assert {entry.seed for entry in entries if entry.status == "done"} == {0, 1, 2, 4}
+@pytest.mark.parametrize(("jobs", "others"), [(1, {0, 1, 2}), (2, {0, 1, 2, 4})])
+def test_a_run_that_hangs_is_ended_by_the_wall_limit(
+    jobs: int, others: set[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The limit is over when seed 3 has begun and nobody else is at anything; with one worker seed 4 still
+    waits then."""
+    over, entries = 0, list[Entry]()
+    clock = SimpleNamespace(monotonic=lambda: time.monotonic() + over * LONG)
+    monkeypatch.setattr(process, "time", clock)
+    monkeypatch.setattr(pool, "time", clock)
+
+    def pass_time() -> None:
+        nonlocal over
+        begun = tmp_path / "cell-3"
+        starts = begun.read_text().count("\n") if begun.exists() else 0
+        if starts > over and others <= {entry.seed for entry in entries if entry.status == "done"}:
+            over += 1
+
+    with Pool("sweep_runs:hangs", jobs, LONG) as workers:
+        workers.work(tasks(5), entries.append, pass_time)
+    lost = [(entry.seed, entry.what) for entry in entries if entry.status == "lost"]
+    assert lost == [(3, "took longer than 600 s of wall time")] * 2
+    assert sorted(entry.seed for entry in entries if entry.status == "done") == [0, 1, 2, 4]
 
 
 def test_a_worker_killed_from_outside_is_replaced(tmp_path: Path) -> None:

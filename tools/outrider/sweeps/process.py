@@ -96,7 +96,8 @@ class Process:
         return Entry(*task.run, "lost", what, None, round(time.monotonic() - self.since, 3))
 
     def end(self) -> int:
-        """Kill it if it still lives; its exit status."""
+        """Kill it if it still lives; its exit status. It is dead from then on, and gets no task any more."""
+        self.dead = True
         self.process.kill()
         self.output.close()
         with suppress(BrokenPipeError):
