@@ -21,6 +21,7 @@ from mavlink_bridge.plan_wire import PAYLOAD_TYPE
 from mavlink_bridge.tlog import Record, TlogWriter, read_tlog
 from outrider import swarm
 from outrider.__main__ import main
+from outrider.certify.command import show
 from outrider.certify.reading import read
 from outrider.certify.verdict import judge
 from outrider.errors import InputError
@@ -139,6 +140,15 @@ def test_for_people_it_is_a_table(flown: Path, replay: Replay) -> None:
     for words in ("certified", "pairs of plans checked", "least distance", "carried on", "farewells"):
         assert words in ended.out
     assert "{" not in ended.out
+
+
+def test_the_line_of_the_verdict_is_whole_for_a_name_of_any_length(
+    flown: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    verdict = judge(read(flown, lambda _what, _share: None))
+    for length in range(1, 200):
+        show("a" * length, verdict)
+        assert capsys.readouterr().out.startswith("a" * length + " · certified\n")
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ from said import Run
 from mavlink_bridge.links.endpoints import Replay
 from outrider.doctor.command import of_log
 from outrider.doctor.finding import Severity, Verdict
+from outrider.doctor.page import show
 
 CUT = ROOT / "tests" / "data" / "doctor"
 WHOLE = ROOT.parent / "shared" / "tlogs"
@@ -206,4 +207,14 @@ def test_json_of_a_log(run: Run) -> None:
         assert finding["do"] or finding["severity"] in ("ok", "note")
     status, out, _ = run("doctor", f"tlog:{CUT / 'copter-full.tlog.gz'}")
     assert status == 0
-    assert ": ready for an escort" in out.replace("\n", " ")
+    assert ": ready for an escort (" in out
+
+
+def test_the_line_of_the_verdict_is_whole_for_a_name_of_any_length(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    verdict = verdict_of(CUT / "quadrotor.tlog.gz")
+    for length in range(200):
+        name = "tlog:" + "a" * length
+        show(name, verdict)
+        assert capsys.readouterr().out.startswith(f"{name}: NOT ready for an escort (3 blocking, ")

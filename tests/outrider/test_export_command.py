@@ -17,6 +17,7 @@ from mcap.reader import make_reader
 
 from outrider.errors import InputError
 from outrider.exports import mcap_export
+from outrider.exports.command import Result, show
 from outrider.exports.command import export as exporting
 from outrider.exports.place import FORMATS
 
@@ -66,6 +67,16 @@ def test_a_log_becomes_a_file_beside_it(tmp_path: Path, export: Export) -> None:
     assert topics == {"/mavlink/1/1/GLOBAL_POSITION_INT", "/fix/1"}
     assert export(log, "--format", "csv").status == 0
     assert [path.name for path in (tmp_path / "target-csv").rglob("*.csv")] == ["GLOBAL_POSITION_INT.csv"]
+
+
+def test_for_people_it_is_a_table_below_the_path_however_long_that_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for length in range(1, 200):
+        show(Result("csv", "a" * length, 7, 1_500_000, 5, 12345, 0, 0, 0, ()))
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0] == "a" * length
+        assert any("messages or rows" in line and "12345" in line for line in lines)
 
 
 def test_bad_words_are_refused_in_one_line(tmp_path: Path, spoilt: Path, export: Export) -> None:  # noqa: F811

@@ -257,6 +257,13 @@ def test_any_name_will_do(name: str, listed: List, tmp_path: Path) -> None:
     assert name in ended.out
 
 
+def test_a_name_is_whole_however_long_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = census(written(tmp_path / "a.tlog", beats([NOW])))
+    for length in range(1, 200):
+        show("a" * length, found)
+        assert capsys.readouterr().out.startswith("a" * length + "\n")
+
+
 def test_a_crowd_fits_into_the_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sent = [beat for system in range(256) for beat in beats([NOW, NOW + 1_000_000], system)]
     show("crowd", census(written(tmp_path / "a.tlog", sent)))

@@ -40,7 +40,7 @@ def show(name: str, verdict: Verdict) -> None:
     word = "certified" if verdict.certified else "not certified"
     if verdict.certified and pairs.resting:
         word = f"certified but for {pairs.resting} pairs after an anchor"
-    table = Table(title=Text(f"{name} · {word}"), show_header=False)
+    table = Table(show_header=False)
     rows = {
         "vehicles": len(verdict.histories),
         "epochs": len(pairs.epochs),
@@ -62,6 +62,8 @@ def show(name: str, verdict: Verdict) -> None:
     for words, value in rows.items():
         table.add_row(words, str(value))
     console = Console()
+    # Above the table, where a long name breaks no words.
+    console.print(Text(f"{name} · {word}"), soft_wrap=True)
     console.print(table)
     lines = [verdict.line(finding) for finding in verdict.findings]
     told = [f"anchor: {system}, {verdict.seconds(epoch):g} s" for system, epoch in anchors]

@@ -25,7 +25,8 @@ def show(name: str, verdict: Verdict) -> None:
     told = [(severity, len(verdict.of(severity))) for severity in reversed(Severity)]
     counts = ", ".join(f"{count} {severity.value}" for severity, count in told if count)
     ready = "ready for an escort" if verdict.ready else "NOT ready for an escort"
-    console.print(Text(f"{name}: {ready} ({counts})", style="bold"))
+    # Not wrapped: how long the name is must not decide where a line breaks that scripts look for.
+    console.print(Text(f"{name}: {ready} ({counts})", style="bold"), soft_wrap=True)
     table = Table.grid(padding=(0, 2))
     for what, severity, why, do in verdict.findings:
         lines = [what]

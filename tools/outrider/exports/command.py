@@ -81,7 +81,7 @@ def _write(run: Run, place: Path, form: str, watch: Watch) -> Written:
 
 def show(result: Result) -> None:
     """The result as a table."""
-    table = Table(title=Text(result.out), show_header=False)
+    table = Table(show_header=False)
     rows = {
         "files": result.files,
         "size, MB": f"{result.bytes / 1e6:.2f}",
@@ -94,6 +94,8 @@ def show(result: Result) -> None:
     for words, value in rows.items():
         table.add_row(words, str(value))
     console = Console()
+    # Above the table, where a long path is not broken.
+    console.print(Text(result.out), soft_wrap=True)
     console.print(table)
     for line in result.unread_logs:
         console.print(Text(f"left out: {line}"), soft_wrap=True)

@@ -19,7 +19,9 @@ MOST_SHOWN, MOST_BESIDE = 30, 12
 def show(name: str, census: Census) -> None:
     """The log as tables: what it is as a whole, who is in it, and how often each says what."""
     console = Console()
-    for table in (_whole(name, census), _people(census)):
+    # Above the table, where a long name is not broken.
+    console.print(Text(name), soft_wrap=True)
+    for table in (_whole(census), _people(census)):
         console.print(table)
     loudest = sorted(census.vehicles, key=lambda vehicle: -vehicle.messages)[:MOST_BESIDE]
     shown = sorted(loudest, key=lambda vehicle: vehicle.system)
@@ -31,10 +33,10 @@ def show(name: str, census: Census) -> None:
             console.print(Text(f"and {number} rarer {what}; --json has all"))
 
 
-def _whole(name: str, census: Census) -> Table:
+def _whole(census: Census) -> Table:
     report = census.report
     records = report.good + report.bad + report.unknown
-    table = Table(title=Text(name), show_header=False)
+    table = Table(show_header=False)
     rows = {
         "begins": _date(census.start),
         "length, s": f"{(census.end - census.start) / MILLION:.1f}",

@@ -104,17 +104,20 @@ _ROWS = {
 def _show(title: str, document: dict[str, object], directory: Path) -> None:
     sent, apart_m, reasons = document["sent"], document["apart_m"], document["reasons"]
     said = isinstance(sent, dict) and sent["setpoints"]
-    table = Table("", "would have been sent", *(["was sent"] if said else []), title=Text(title))
+    table = Table("", "would have been sent", *(["was sent"] if said else []))
     for key, words in _ROWS.items():
         before = [_text(sent[key])] if said and isinstance(sent, dict) else []
         table.add_row(words, _text(document[key]), *before)
     if said and isinstance(apart_m, dict):
         table.add_row("apart, m: p50, p95", f"{_text(apart_m['p50'])}, {_text(apart_m['p95'])}", "")
     console = Console()
+    # Above the table, where a long name is not broken.
+    console.print(Text(title), soft_wrap=True)
     console.print(table)
     if isinstance(reasons, dict):
         for words, steps in sorted(reasons.items(), key=lambda pair: -pair[1]):
-            console.print(Text(f"{steps * 0.01:8.2f} s without a set-point for want of {words}"))
+            line = Text(f"{steps * 0.01:8.2f} s without a set-point for want of {words}")
+            console.print(line, soft_wrap=True)
     files = ", ".join(sorted(path.name for path in directory.iterdir()))
     console.print(Text(f"{directory}: {files}"), soft_wrap=True)
 
