@@ -2,13 +2,34 @@
 
 from __future__ import annotations
 
+import math
+import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from said import Ended, Run
 
+from outrider import progress_lines
 from outrider.__main__ import main
+
+
+@pytest.fixture(autouse=True)
+def _any_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a command writes depends neither on how fast the machine is nor on the terminal that the tests
+    were started in: no line of progress, however long something takes, and the width of a pipe."""
+    monkeypatch.setattr(progress_lines, "LINE_S", math.inf)
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """SIGINT interrupts, as in a terminal. A shell ignores it in what a script starts in the background, and
+    the tests may be that."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture

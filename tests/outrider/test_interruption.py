@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from outrider.interruption import Came, insisted, interruptible, noted
 from outrider.swarm import Prepared, fly
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM])
 def test_a_stopped_flight_says_what_is_left_and_leaves_whole_logs(
     which: signal.Signals, tmp_path: Path
@@ -52,6 +54,28 @@ def test_what_is_not_stopped_is_left_alone() -> None:
     assert signal.getsignal(signal.SIGTERM) is before
     with pytest.raises(ZeroDivisionError), interruptible("nothing"):
         raise ZeroDivisionError
+
+
+@pytest.fixture
+def background() -> Iterator[None]:
+    """As a shell starts what a script puts into the background: SIGINT is ignored."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("background")
+def test_in_the_background_sigterm_stops_and_ctrl_c_does_not() -> None:
+    with interruptible("nothing"):
+        os.kill(os.getpid(), signal.SIGINT)
+    with pytest.raises(OutriderError, match="stopped; all is kept"), interruptible("all is kept"):
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+@pytest.mark.usefixtures("background", "ctrl_c")
+def test_tests_of_ctrl_c_hear_it_in_the_background_too() -> None:
+    with pytest.raises(OutriderError, match="stopped; all is kept"), interruptible("all is kept"):
+        os.kill(os.getpid(), signal.SIGINT)
 
 
 def test_what_comes_twice_in_a_moment_came_once() -> None:

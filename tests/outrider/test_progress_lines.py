@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from io import StringIO
+from itertools import count
 
 import pytest
 
@@ -16,8 +17,9 @@ from outrider.share_progress import share_progress
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """What it shows, s."""
+    """What it shows, s; and lines are said when it is time."""
     shown = [1000.0]
+    monkeypatch.setattr(progress_lines, "LINE_S", LINE_S)
     monkeypatch.setattr(progress_lines.time, "monotonic", lambda: shown[0])
     return shown
 
@@ -82,3 +84,14 @@ def test_names_are_said_as_they_are(clock: list[float], capsys: pytest.CaptureFi
         clock[0] += LINE_S
         watch("a[b].tlog", 0.5)
     assert capsys.readouterr().err == "a[b].tlog: 50 %\n"
+
+
+def test_no_other_test_sees_a_line_however_slow_the_machine_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An hour goes by between any two looks at the clock."""
+    monkeypatch.setattr(progress_lines.time, "monotonic", count(0.0, 3600.0).__next__)
+    with share_progress() as watch:
+        for step in range(10):
+            watch("reading", step / 10)
+    assert capsys.readouterr().err == ""

@@ -147,6 +147,7 @@ def test_a_killed_worker_costs_the_one_run_that_is_named_and_the_table_is_the_lo
     assert [line["seed"] for line in lines if line["status"] == "lost"] == [5]
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("who", ["sweep", "scheduler"])
 def test_what_was_flown_is_kept_and_gone_on_with_here(
     who: str, here: Path, mortal: Machines, capsys: pytest.CaptureFixture[str]

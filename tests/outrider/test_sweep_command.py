@@ -160,6 +160,7 @@ def test_a_run_that_succeeds_the_second_time_is_no_loss_but_is_named(
     assert sum(run["status"] == "lost" for run in journal()) == 2
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_was_flown_and_says_how_to_go_on(
     fly: Fly, capsys: pytest.CaptureFixture[str]
 ) -> None:
