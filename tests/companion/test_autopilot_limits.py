@@ -1,0 +1,106 @@
+"""What an autopilot can follow, from its parameters."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError, fields
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.autopilots.known import KNOWN
+from companion.autopilots.limits import STOCK, limits_of, stock_parameters
+
+ARDUPILOT, PX4 = 3, 12
+BOTH = (ARDUPILOT, PX4)
+ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
+
+
+def test_stock_limits_in_si() -> None:
+    ardupilot, px4 = STOCK[ARDUPILOT], STOCK[PX4]
+    assert (ardupilot.jerk, ardupilot.acceleration, ardupilot.speed) == (5.0, 2.5, 10.0)
+    assert math.degrees(ardupilot.tilt) == pytest.approx(30.0)
+    assert (ardupilot.position_gain, ardupilot.velocity_gain, ardupilot.shaped) == (1.0, 2.0, True)
+    assert (px4.jerk, px4.acceleration, px4.speed) == (8.0, 3.0, 12.0)
+    assert math.degrees(px4.tilt) == pytest.approx(45.0)
+    assert (px4.position_gain, px4.velocity_gain, px4.shaped) == (0.95, 1.8, False)
+    assert ardupilot.tilt_acceleration == pytest.approx(5.66, abs=0.01)
+    assert px4.tilt_acceleration == pytest.approx(9.81, abs=0.01)
+
+
+@pytest.mark.parametrize("autopilot", BOTH)
+def test_each_known_autopilot_has_limits_and_missing_parameters_are_stock(autopilot: int) -> None:
+    assert set(STOCK) == set(KNOWN)
+    stock = stock_parameters(autopilot)
+    assert limits_of(autopilot, {}) == limits_of(autopilot, stock) == STOCK[autopilot]
+    for name in stock:
+        rest = {other: value for other, value in stock.items() if other != name}
+        assert limits_of(autopilot, {**rest, name: math.nan, "OTHER": 3.0}) == STOCK[autopilot]
+
+
+def test_an_autopilot_that_is_not_known() -> None:
+    assert not stock_parameters(8)
+    with pytest.raises(KeyError):
+        limits_of(8, {})
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "name", "value", "field", "limit"),
+    [
+        (ARDUPILOT, "PSC_JERK_XY", 1.0, "jerk", 1.0),
+        (ARDUPILOT, "WPNAV_SPEED", 300.0, "speed", 3.0),
+        (ARDUPILOT, "ANGLE_MAX", 2000.0, "tilt", math.radians(20.0)),
+        (ARDUPILOT, "PSC_ANGLE_MAX", 25.0, "tilt", math.radians(25.0)),
+        (ARDUPILOT, "PSC_POSXY_P", 0.7, "position_gain", 0.7),
+        (ARDUPILOT, "PSC_VELXY_P", 1.4, "velocity_gain", 1.4),
+        (PX4, "MPC_JERK_MAX", 4.0, "jerk", 4.0),
+        (PX4, "MPC_ACC_HOR", 2.0, "acceleration", 2.0),
+        (PX4, "MPC_XY_VEL_MAX", 6.0, "speed", 6.0),
+        (PX4, "MPC_TILTMAX_AIR", 20.0, "tilt", math.radians(20.0)),
+        (PX4, "MPC_XY_P", 0.5, "position_gain", 0.5),
+        (PX4, "MPC_XY_VEL_P_ACC", 3.0, "velocity_gain", 3.0),
+    ],
+)
+def test_a_parameter_changes_its_own_limit_only(
+    autopilot: int, name: str, value: float, field: str, limit: float
+) -> None:
+    changed = limits_of(autopilot, {name: value})
+    for one in fields(changed):
+        expected = limit if one.name == field else getattr(STOCK[autopilot], one.name)
+        assert getattr(changed, one.name) == pytest.approx(expected), one.name
+
+
+def test_arducopter_does_not_give_more_jerk_than_its_angular_acceleration_allows() -> None:
+    # Half the square root of 2.5 m/s² times 19.2 rad/s² of 1 g; 6 m/s² leave more.
+    assert limits_of(ARDUPILOT, {"PSC_JERK_XY": 20.0}).jerk == pytest.approx(10.8, abs=0.05)
+    more = limits_of(ARDUPILOT, {"PSC_JERK_XY": 20.0, "WPNAV_ACCEL": 600.0})
+    assert more.jerk == pytest.approx(16.8, abs=0.05)
+    assert more.acceleration == 6.0
+    slow = limits_of(ARDUPILOT, {"ATC_ACCEL_P_MAX": 5000.0})
+    assert slow.jerk == pytest.approx(0.5 * math.sqrt(2.5 * math.radians(50.0) * 9.80665))
+    # 0 turns that limit off.
+    assert limits_of(ARDUPILOT, {"PSC_JERK_XY": 20.0, "ATC_ACCEL_R_MAX": 0.0}).jerk == 20.0
+
+
+def test_what_the_tilt_does_not_allow_is_not_usable() -> None:
+    assert STOCK[ARDUPILOT].usable_acceleration == 2.5
+    steep = limits_of(ARDUPILOT, {"WPNAV_ACCEL": 900.0})
+    assert steep.usable_acceleration == steep.tilt_acceleration == pytest.approx(5.66, abs=0.01)
+    assert limits_of(ARDUPILOT, {"WPNAV_ACCEL": 0.0}).acceleration == 2.5
+
+
+@pytest.mark.parametrize("autopilot", BOTH)
+@given(data=st.data())
+def test_whatever_a_vehicle_says_limits_are_finite_and_not_negative(
+    autopilot: int, data: st.DataObject
+) -> None:
+    names = sorted(stock_parameters(autopilot))
+    limits = limits_of(autopilot, data.draw(st.dictionaries(st.sampled_from(names), ANYTHING)))
+    values = [getattr(limits, field.name) for field in fields(limits)]
+    for value in (*values, limits.usable_acceleration):
+        assert math.isfinite(value)
+        assert value >= 0.0
+    assert limits.usable_acceleration <= limits.acceleration
+    with pytest.raises(FrozenInstanceError):
+        limits.jerk = 1.0  # type: ignore[misc]
