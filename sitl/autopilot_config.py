@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from sitl.autonomy_config import BatteryFailsafeConfig, FenceConfig, FollowConfig
 from sitl.backends.physics import PhysicsName
@@ -97,7 +97,9 @@ class AutopilotConfig(BaseModel):
     max_yaw_rate: Positive = math.radians(180.0)
     max_yaw_acceleration: Positive = Field(2.4, description="the firefly's yaw torque gives 2.5 rad/s²")
 
-    waypoint_speed: Positive = Field(5.0, description="in missions and on the way home, norm")
+    waypoint_speed: Positive = Field(
+        5.0, description="in missions and on the way home, norm; ArduPilot's, if it is not said, is 10"
+    )
     waypoint_climb: Positive = 2.5
     waypoint_sink: Positive = 1.5
     acceptance_radius: Positive = Field(2.0, description="a waypoint is reached this near")
@@ -126,3 +128,11 @@ class AutopilotConfig(BaseModel):
         1.0,
         description="a set-point's acceleration is extrapolated this long, its velocity until the time-out",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_the_firmware(cls, data: Any) -> Any:
+        """WPNAV_SPEED and MPC_XY_CRUISE differ by the firmware, and so does the speed that is not given."""
+        if isinstance(data, dict) and data.get("flavour", "ardupilot") == "ardupilot":
+            return {"waypoint_speed": 10.0, **data}
+        return data

@@ -194,6 +194,7 @@ _ROWS: Final[tuple[_Row, ...]] = (
     ("PSC_POSXY_P", _F32, 1, 0.5, 2),
     ("PSC_VELXY_P", _F32, 2, 0.1, 6),
     ("PSC_VELXY_I", _F32, 1, 0.02, 1),
+    ("PSC_VELXY_D", _F32, 0.25, 0, 1),
     ("PSC_ANGLE_MAX", _F32, 0, 0, 45, "deg"),
     ("PSC_JERK_XY", _F32, 5, 1, 20, "m/s/s/s"),
     ("PSC_JERK_Z", _F32, 5, 5, 50, "m/s/s/s"),

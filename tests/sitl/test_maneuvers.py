@@ -96,15 +96,15 @@ def test_nothing_on_the_ground_moves_by_reposition(flavour):
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_another_speed_holds_for_the_way_that_is_flown(flavour):
     rig = Rig(flavour).hover(5.0)
-    assert reposition(rig, 100.0, 0.0, 5.0, flags=1) == [ACCEPTED]
-    rig.run(8.0)
+    assert reposition(rig, 250.0, 0.0, 5.0, flags=1) == [ACCEPTED]
+    rig.run(11.0)
     assert rig.speed == pytest.approx(rig.config.waypoint_speed, abs=0.05)
     assert rig.order(SPEED, 1, 2.0) == [ACCEPTED]
-    rig.run(4.0)
+    rig.run(8.0)
     assert rig.speed == pytest.approx(2.0, abs=0.05)
     assert rig.order(SPEED, 1, -1.0) == [ACCEPTED]
     assert rig.order(SPEED, 1, -2.0) == [ACCEPTED]
-    rig.run(6.0)
+    rig.run(9.0)
     assert rig.speed == pytest.approx(rig.config.waypoint_speed, abs=0.05)
     for bad in ((1, 0.0), (1, NAN), (1, -3.0), (7, 2.0), (NAN, 2.0)):
         assert rig.order(SPEED, *bad) == [DENIED]

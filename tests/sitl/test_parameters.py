@@ -177,6 +177,43 @@ def test_what_is_out_of_range_changes_nothing_and_is_explained(flavour, value):
     assert client.rig.autopilot.saved.parameters == {}
 
 
+STOCK = {
+    "ardupilot": {
+        "PSC_JERK_XY": 5.0,
+        "PSC_POSXY_P": 1.0,
+        "PSC_VELXY_P": 2.0,
+        "PSC_VELXY_I": 1.0,
+        "PSC_VELXY_D": 0.25,
+        "PSC_ANGLE_MAX": 0.0,
+        "WPNAV_ACCEL": 250.0,
+        "WPNAV_SPEED": 1000.0,
+        "ANGLE_MAX": 3000.0,
+        "ATC_ACCEL_R_MAX": 110000.0,
+        "ATC_ACCEL_P_MAX": 110000.0,
+        "GUID_TIMEOUT": 3.0,
+    },
+    "px4": {
+        "MPC_ACC_HOR": 3.0,
+        "MPC_ACC_HOR_MAX": 5.0,
+        "MPC_JERK_MAX": 8.0,
+        "MPC_JERK_AUTO": 4.0,
+        "MPC_XY_VEL_MAX": 12.0,
+        "MPC_XY_CRUISE": 5.0,
+        "MPC_XY_P": 0.95,
+        "MPC_XY_VEL_P_ACC": 1.8,
+        "MPC_TILTMAX_AIR": 45.0,
+    },
+}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_what_decides_how_it_follows_is_as_in_the_stock_firmware(flavour):
+    client = Client(Rig(flavour))
+    for name, stock in STOCK[flavour].items():
+        value = only(client.send(read(name)), "PARAM_VALUE").param_value
+        assert value == pytest.approx(stock, abs=1e-6), name
+
+
 def test_px4_refuses_a_wrong_type_and_ardupilot_casts():
     px, ap = Client(Rig("px4")), Client(Rig("ardupilot"))
     found = px.send(dialect.MAVLink_param_set_message(11, 1, b"COM_RC_IN_MODE", 3.0, 9))
