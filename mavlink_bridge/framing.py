@@ -184,7 +184,9 @@ class Framer:
     ``frames`` + ``unknown`` count frames, ``bad`` false starts; ``skipped_bytes`` are those of no frame.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, unknown: bool = False) -> None:
+        """``unknown``: frames of unknown messages are returned too, with their checksum unverified."""
+        self._returns_unknown = unknown
         self.frames = 0
         self.bad = 0
         self.unknown = 0
@@ -224,6 +226,8 @@ class Framer:
                     break
                 if after == size or data[after] in (START_V1, START_V2):
                     self.unknown += 1
+                    if self._returns_unknown:
+                        found.append(frame)
                     at = after
                     continue
             if data[at] in (START_V1, START_V2):
@@ -233,5 +237,5 @@ class Framer:
             self.skipped_bytes += resume - at
             at = resume
         self._rest = data[at:]
-        self.frames += len(found)
+        self.frames += sum(frame.known for frame in found)
         return found

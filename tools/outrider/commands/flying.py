@@ -144,7 +144,12 @@ def doctor(
         int | None,
         typer.Option(min=1, max=255, help="System id of the vehicle; if not said, the lowest."),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Wait so long at most.")] = 15.0,
+    seconds: Annotated[
+        float,
+        typer.Option(
+            min=1.0, max=600.0, help="Wait so long at most; longer only for why the pre-arm check fails."
+        ),
+    ] = 15.0,
     key: Annotated[Path | None, typer.Option(help="Key file of a link that is signed.")] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -80,17 +80,17 @@ def _of_link(place: Endpoint, system: int | None, seconds: float, key: Path | No
     consultation = Consultation(round(seconds * 1e6), system, signing)
     consultation.examination.baud = place.baud if isinstance(place, Serial) else None
     with closing(open_link(place, clock)) as link:
-        return consult(link, clock, consultation, seconds)
+        return consult(link, clock, consultation)
 
 
-def consult(link: Link, clock: Clock, consultation: Consultation, seconds: float) -> Verdict:
-    """Over ``link``, by ``clock``, until it is over: after ``seconds`` at most."""
-    start = now = clock.now()
+def consult(link: Link, clock: Clock, consultation: Consultation) -> Verdict:
+    """Over ``link``, by ``clock``, until it is over."""
+    now = clock.now()
     with share_progress() as watch:
         while not consultation.over(now):
             for data in consultation.step(now, link.receive()):
                 link.send(data)
-            watch(consultation.doing(), (now - start) * 1e-6 / seconds)
+            watch(consultation.doing(now), consultation.share(now))
             clock.wait_until(now + _STEP)
             now = clock.now()
     return consultation.examination.verdict()

@@ -9,6 +9,7 @@ from mavlink_bridge.codec import Codec
 from mavlink_bridge.framing import Framer
 from mavlink_bridge.signing import Signing
 from outrider.doctor.examination import Examination
+from outrider.doctor.px4_events import genuine
 from outrider.doctor.questions import Questions
 
 _LONG_ENOUGH: Final = 5_000_000
@@ -16,14 +17,15 @@ _LONG_ENOUGH: Final = 5_000_000
 
 
 class Consultation:
-    """Of the autopilot ``system`` (None: the lowest), for ``limit`` µs at most. With ``signing``
-    it asks signed, counts only what is, and has to be told Unix time."""
+    """Of the autopilot ``system`` (None: the lowest), for ``limit`` µs at most, and longer only where a
+    pre-arm check fails whose reasons are not said yet. With ``signing`` it asks signed, counts only what is,
+    and has to be told Unix time."""
 
     def __init__(self, limit: int, system: int | None = None, signing: Signing | None = None) -> None:
         self.examination = Examination(system)
         self._questions = Questions(self.examination)
         self._signing = signing or Signing()
-        self._framer, self._codec = Framer(), Codec(signing=self._signing)
+        self._framer, self._codec = Framer(unknown=True), Codec(signing=self._signing)
         self._limit = limit
         self._start: int | None = None
 
@@ -35,6 +37,8 @@ class Consultation:
         self._signing.present(now)
         for data in arrived:
             for frame in self._framer.feed(data):
+                if not (frame.known or genuine(frame)):
+                    continue
                 refusal = self._signing.check(frame)
                 if refusal is None:
                     hearing.hear(now, frame)
@@ -46,13 +50,24 @@ class Consultation:
 
     def over(self, now: int) -> bool:
         """Whether there is nothing more to wait for."""
-        if self._start is None:
+        if self._start is None or self._questions.listening(now):
             return False
         passed = now - self._start
         return passed >= self._limit or (passed >= _LONG_ENOUGH and self._questions.done(now))
 
-    def doing(self) -> str:
+    def share(self, now: int) -> float:
+        """Of the longest that it may take, how much has passed, 0…1."""
+        if self._start is None:
+            return 0.0
+        passed = now - self._start
+        return passed / max(self._limit, passed + self._questions.listening(now), 1)
+
+    def doing(self, now: int) -> str:
         """What it waits for, in a few words."""
         if not self.examination.hearing.frames and not self.examination.hearing.refused:
             return "waiting for MAVLink"
-        return "waiting for an autopilot" if self.examination.vehicle is None else "listening and asking"
+        if self.examination.vehicle is None:
+            return "waiting for an autopilot"
+        if listening := self._questions.listening(now):
+            return f"asking why the pre-arm check fails, {listening * 1e-6:.0f} s more at most"
+        return "listening and asking"

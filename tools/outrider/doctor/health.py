@@ -8,7 +8,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as dialect
 
 from companion.vehicle import PREARM_OK
-from mavlink_bridge.messages import BatteryStatus, StatusText, SysStatus
+from mavlink_bridge.messages import BatteryStatus, SysStatus
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 
@@ -40,15 +40,7 @@ def checks(case: Case) -> Iterator[Finding]:
             "Update the firmware (ArduCopter 4.0 and later tell it).",
         )
     else:
-        said = _complaints(case)
-        yield Finding(
-            "the pre-arm check fails (SYS_STATUS, health 0x10000000)",
-            Severity.BLOCKING,
-            "The autopilot will refuse to arm." + (f" It said: {'; '.join(said)}." if said else ""),
-            "Mend what it said."
-            if said
-            else "Its STATUSTEXTs say why (PreArm: … every 30 s; PX4: commander check).",
-        )
+        yield _failing(case)
     wrong = status.present & status.enabled & ~status.health & ~PREARM_OK
     names = [name for bit, name in _SENSORS.items() if wrong & bit]
     if names:
@@ -62,15 +54,23 @@ def checks(case: Case) -> Iterator[Finding]:
         )
 
 
-def _complaints(case: Case) -> list[str]:
-    """What it lately said against arming, each once."""
-    texts: list[StatusText] = [text for _, text in case.vehicle.texts]
-    against = [
-        text.text
-        for text in texts
-        if text.text.lower().startswith(("prearm", "preflight", "arming denied", "arm:"))
-    ]
-    return list(dict.fromkeys(against))[-4:]
+def _failing(case: Case) -> Finding:
+    """The pre-arm check fails: why, as far as it was said."""
+    what, why = "the pre-arm check fails (SYS_STATUS, health 0x10000000)", "The autopilot will refuse to arm."
+    said = case.vehicle.objections
+    if said:
+        return Finding(what, Severity.BLOCKING, f"{why} It said: {'; '.join(said)}.", "Mend what it said.")
+    if case.log:
+        do = "Its STATUSTEXTs say why (PreArm: … every 30 s); this log has none."
+    elif case.vehicle.vehicle.armed:
+        do = "Land and disarm it, then ask again."
+    elif case.px4:
+        why += " It was asked for the reasons and named none that is known here."
+        do = "See the arming checks in QGroundControl: PX4 sends texts only where it hears a ground station."
+    else:
+        why += " It was asked for the reasons, and named none."
+        do = "See its messages in a ground station; ARMING_OPTIONS with bit 0 hides them."
+    return Finding(what, Severity.BLOCKING, why, do)
 
 
 def battery(case: Case) -> Iterator[Finding]:

@@ -136,7 +136,14 @@ def state(case: Case) -> Iterator[Finding]:
     where = _where(case)
     steered = case.vehicle.vehicle.in_guided_mode
     what = f"mode {mode}, {armed}{where}"
-    if not case.vehicle.vehicle.armed or case.log:
+    if case.px4 and steered and not case.vehicle.vehicle.armed and not case.log:
+        yield Finding(
+            what,
+            Severity.WARNING if case.vehicle.vehicle.healthy else Severity.BLOCKING,
+            "In OFFBOARD the pre-arm check of PX4 fails while no set-points come, and no text says so.",
+            "Switch it to HOLD in a ground station (DO_SET_MODE 1, 4, 3), then ask again.",
+        )
+    elif not case.vehicle.vehicle.armed or case.log:
         why = (
             "So it ends in this log."
             if case.log

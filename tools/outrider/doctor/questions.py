@@ -1,8 +1,8 @@
 """What a doctor asks on a live link, and how: little, slowly, and nothing that changes anything.
 
-It sends HEARTBEAT, REQUEST_MESSAGE and PARAM_REQUEST_READ. No rate is set: REQUEST_MESSAGE shows as well
-whether there is such a message, and whoever watches the vehicle at that moment keeps the rates that they
-have asked for.
+It sends HEARTBEAT, REQUEST_MESSAGE and PARAM_REQUEST_READ, and asks a disarmed vehicle whose pre-arm check
+fails for the reasons. No rate is set: REQUEST_MESSAGE shows as well whether there is such a message, and
+whoever watches the vehicle at that moment keeps the rates that they have asked for.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 from mavlink_bridge.messages import CommandLong, Heartbeat, Message, ParamRequestRead, Source
 from outrider.doctor.case import PX4_NUMBER
 from outrider.doctor.examination import Examination
+from outrider.doctor.objections import Objections
 from outrider.doctor.settings import names
 from outrider.doctor.speaker import Speaker
 
@@ -47,6 +48,7 @@ class Questions:
     def __init__(self, examination: Examination) -> None:
         self._examination = examination
         self._asked: dict[int | str, _Asked] = {}
+        self._objections = Objections()
         self._met: int | None = None
         self._whom: Source | None = None
         self._beat: int | None = None
@@ -61,6 +63,7 @@ class Questions:
                 self._whom, self._met = vehicle.source, now
                 self._asked.clear()
                 self._examination.asked.clear()
+                self._objections = Objections()
             self.me = self._examination.me = Source(vehicle.source.system, COMPONENT)
         said: list[Message] = []
         if self._beat is None or now - self._beat >= _HEARTBEAT_EVERY:
@@ -69,6 +72,7 @@ class Questions:
         if vehicle is not None:
             open_ones = [key for key in self._wanted(vehicle, now) if self._is_open(key, vehicle, now)]
             said += [self._ask(key, vehicle, now) for key in open_ones[:_AT_ONCE]]
+            said += self._objections.due(vehicle, self.me, now)
         return said
 
     def done(self, now: int) -> bool:
@@ -81,6 +85,11 @@ class Questions:
             for key in self._wanted(vehicle, now)
             if not _answered(key, vehicle)
         )
+
+    def listening(self, now: int) -> int:
+        """For how long (µs) it waits at most for the reasons of a failed pre-arm check."""
+        vehicle = self._examination.vehicle
+        return 0 if vehicle is None else self._objections.left(vehicle, now)
 
     def _wanted(self, vehicle: Speaker, now: int) -> tuple[int | str, ...]:
         px4 = _is_px4(vehicle)

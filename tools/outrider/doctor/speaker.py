@@ -28,6 +28,7 @@ from mavlink_bridge.messages import (
 )
 from outrider.doctor.boot_clock import BootClock
 from outrider.doctor.condition import Condition
+from outrider.doctor.px4_events import reason
 from outrider.doctor.slope import Slope
 
 M = TypeVar("M", bound=Message)
@@ -39,6 +40,10 @@ CRITICAL: Final = 5
 """MAV_STATE; 6 is emergency."""
 FIX_3D: Final = 3
 _KEPT_FRAMES, _KEPT_TEXTS, _KEPT_PARAMETERS, _KEPT_PLACES = 32, 40, 4096, 8
+_KEPT_OBJECTIONS: Final = 16
+_OBJECTING: Final = ("prearm", "preflight", "arming denied", "arm:")
+_REPEATED: Final = 35_000_000
+"""µs: ArduPilot repeats its objections every 30 s; one that it does not repeat is answered."""
 _TOGETHER: Final = 60_000
 """µs between two positions that are compared."""
 
@@ -84,6 +89,7 @@ class Speaker:
         self.clock = BootClock()
         self.parameters: dict[str, ParamValue] = {}
         self.texts: deque[tuple[int, StatusText]] = deque(maxlen=_KEPT_TEXTS)
+        self._objections: dict[str, int] = {}
         self.frames = self.repeated = self.signed = self.guided_losses = 0
         self.last = 0
         """When it last spoke, µs."""
@@ -111,6 +117,8 @@ class Speaker:
         self.streams.setdefault(frame.message_id, Stream(now)).tell(now)
         if message is not None:
             self._note(now, message)
+        elif objection := reason(frame, self.vehicle.mode):
+            self._object(now, objection)
 
     def latest(self, kind: type[M]) -> M | None:
         """The last message of ``kind``."""
@@ -120,6 +128,16 @@ class Speaker:
         """Messages per second of *its* clock: a simulation may run faster than the wall's."""
         stream = self.streams.get(message_id)
         return 0.0 if stream is None else stream.rate / (self.clock.rate or 1.0)
+
+    @property
+    def objections(self) -> list[str]:
+        """What it last had against arming, in its own words, or by its events."""
+        return [text for text, then in self._objections.items() if self.objected_at - then <= _REPEATED]
+
+    @property
+    def objected_at(self) -> int:
+        """When (µs) it last said so."""
+        return max(self._objections.values(), default=0)
 
     @property
     def heartbeat(self) -> Heartbeat | None:
@@ -151,6 +169,8 @@ class Speaker:
                 self.guided_losses += guided and self.vehicle.armed and failed
             case StatusText():
                 self.texts.append((now, message))
+                if message.text.lower().startswith(_OBJECTING):
+                    self._object(now, message.text.strip())
             case ParamValue() if len(self.parameters) < _KEPT_PARAMETERS:
                 self.parameters[message.name] = message
             case AutopilotVersion() if len(self.identities) < _KEPT_PLACES:
@@ -177,6 +197,10 @@ class Speaker:
             case _:
                 pass
         self._latest[type(message)] = message
+
+    def _object(self, now: int, objection: str) -> None:
+        if objection in self._objections or len(self._objections) < _KEPT_OBJECTIONS:
+            self._objections[objection] = now
 
     def _move(self, origin: GpsGlobalOrigin) -> None:
         place = origin[1:4]

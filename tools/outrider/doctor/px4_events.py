@@ -1,0 +1,146 @@
+"""What PX4 has against arming, as EVENT messages (410) say it.
+
+PX4 1.16 sends STATUSTEXT only over links on which it hears a ground station, but EVENT over every link; and
+that its mode is the reason it says by EVENT alone. pymavlink's dialects have no EVENT, so it is read here. An
+id is the low 24 bits of the FNV-1a hash of the event's name.
+"""
+
+from __future__ import annotations
+
+from struct import Struct
+from typing import Final
+
+from fastcrc.crc16 import mcrf4xx
+
+from mavlink_bridge.framing import SIGNATURE_LENGTH, Frame
+
+EVENT: Final = 410
+CRC_EXTRA: Final = b"\xa0"
+LAYOUT: Final = Struct("<IIHBBBI")
+"""Id, boot time (ms), sequence, destination, log levels; the first argument of a check: the modes that it
+concerns, a bit for each navigation state."""
+_WARNING: Final = 4
+_OFFSET, _PRIME = 0x811C9DC5, 0x01000193
+
+_CHECKS: Final = {
+    "check_modes_angular_velocity": "no angular velocity",
+    "check_modes_attitude": "no attitude estimate",
+    "check_modes_local_pos": "no local position estimate",
+    "check_modes_global_pos": "no global position estimate",
+    "check_modes_local_alt": "no altitude estimate",
+    "check_modes_mission": "no valid mission",
+    "check_modes_offboard_signal": "no offboard signal",
+    "check_modes_home_position": "home is not set",
+    "check_modes_manual_control": "no manual control",
+    "check_modes_cannot_takeoff": "this mode cannot be armed in",
+    "check_external_modes_unavailable": "its external mode is not registered",
+    "check_accel_missing": "an accelerometer is missing",
+    "check_accel_no_data": "an accelerometer gives no data",
+    "check_accel_not_calibrated": "an accelerometer is not calibrated",
+    "check_gyro_missing": "a gyro is missing",
+    "check_gyro_no_data": "a gyro gives no data",
+    "check_gyro_not_calibrated": "a gyro is not calibrated",
+    "check_imu_accel_inconsistent": "the accelerometers disagree",
+    "check_imu_gyro_inconsistent": "the gyros disagree",
+    "check_mag_missing": "a compass is missing",
+    "check_mag_no_data": "a compass gives no data",
+    "check_mag_not_calibrated": "a compass is not calibrated",
+    "check_mag_consistency": "the compasses disagree",
+    "check_mag_fault": "a compass has a fault",
+    "check_mag_sys_has_mag_missing": "fewer compasses than SYS_HAS_MAG asks for",
+    "check_baro_missing": "a barometer is missing",
+    "check_baro_no_data": "a barometer gives no data",
+    "check_battery_missing": "a battery is missing",
+    "check_battery_disconnected": "a battery is disconnected",
+    "check_battery_unhealthy": "the battery is unhealthy",
+    "check_battery_fault": "the battery has a fault",
+    "check_battery_low": "the battery is low",
+    "check_battery_critical": "the battery is critical",
+    "check_battery_emergency": "the battery is all but empty",
+    "check_avionics_power_missing": "the power module is not connected",
+    "check_avionics_power_low": "the avionics' voltage is low",
+    "check_missing_system_power": "the system's power is not known",
+    "check_cpuload_too_high": "the CPU load is too high",
+    "check_ram_usage_too_high": "the memory is all but full",
+    "check_missing_cpuload": "CPU and memory load are not known",
+    "check_missing_fmu_sdcard": "there is no SD card",
+    "check_hardfault_present": "crash dumps are on the SD card",
+    "check_estimator_missing_data": "the estimator is starting",
+    "check_estimator_heading_not_stable": "the heading estimate is not stable",
+    "check_estimator_hgt_not_stable": "the height estimate is not stable",
+    "check_estimator_hor_pos_not_stable": "the horizontal position is not stable",
+    "check_estimator_hor_vel_not_stable": "the horizontal velocity is not stable",
+    "check_estimator_vert_vel_not_stable": "the vertical velocity is not stable",
+    "check_estimator_high_accel_bias": "the accelerometers' bias is high",
+    "check_estimator_high_gyro_bias": "the gyros' bias is high",
+    "check_estimator_mag_interference": "strong magnetic interference",
+    "check_estimator_low_position_accuracy": "the position estimate is not accurate",
+    "check_estimator_gps_fix_too_low": "the GPS fix is too poor",
+    "check_estimator_gps_not_fusing": "the estimator does not use GPS",
+    "check_estimator_gps_num_sats_too_low": "too few GPS satellites",
+    "check_estimator_gps_generic": "GPS is too poor",
+    "check_system_no_global_pos": "a global position is required",
+    "check_system_no_home_pos": "home is required",
+    "check_system_safety_button": "the safety button was not pressed",
+    "check_system_usb_connected": "USB is connected",
+    "check_system_flight_term_active": "flight termination is active",
+    "check_system_arm_auth_failed": "arming was not authorized",
+    "check_rc_dl_no_dllink": "no ground station",
+    "check_man_control_kill_engaged": "the kill switch is engaged",
+    "check_man_control_rtl_engaged": "the return switch is engaged",
+    "check_failure_detector_roll": "it leans too far (roll)",
+    "check_failure_detector_pitch": "it leans too far (pitch)",
+    "check_failure_detector_arm_esc": "a motor controller has failed",
+    "check_failure_detector_motor": "a motor has failed",
+    "check_escs_offline": "a motor controller is offline",
+    "check_escs_telem_missing": "the motor controllers send no telemetry",
+    "check_gf_no_home": "its fence needs home",
+    "check_gf_violation_custom_gf": "it is outside its fence",
+    "check_gf_violation_max_hor_dist": "it is outside its fence",
+    "check_gf_violation_max_alt": "it is above its fence",
+}
+# Navigation states by custom_mode's main and sub mode.
+_STATES: Final = {
+    (1, 0): 0,
+    (2, 0): 1,
+    (3, 0): 2,
+    (4, 2): 17,
+    (4, 3): 4,
+    (4, 4): 3,
+    (4, 5): 5,
+    (4, 6): 18,
+    (4, 8): 19,
+    (4, 9): 20,
+    (6, 0): 14,
+    (7, 0): 15,
+}
+
+
+def event_id(name: str) -> int:
+    """The id of an event of the autopilot (component 1), without that component."""
+    value = _OFFSET
+    for byte in name.encode():
+        value = ((value ^ byte) * _PRIME) & 0xFFFFFFFF
+    return value & 0xFFFFFF
+
+
+_WORDS: Final = {event_id(name): words for name, words in _CHECKS.items()}
+
+
+def genuine(frame: Frame) -> bool:
+    """Whether it is an EVENT whose checksum holds."""
+    if frame.message_id != EVENT or frame.version != 2:
+        return False
+    end = len(frame.data) - 2 - (SIGNATURE_LENGTH if frame.signed else 0)
+    return mcrf4xx(frame.data[1:end] + CRC_EXTRA) == int.from_bytes(frame.data[end : end + 2], "little")
+
+
+def reason(frame: Frame, custom_mode: int) -> str | None:
+    """What an EVENT has against arming in the mode ``custom_mode``; None for all other frames."""
+    if not genuine(frame):
+        return None
+    payload = frame.payload.ljust(LAYOUT.size, b"\0")
+    number, _, _, _, _, levels, modes = LAYOUT.unpack_from(payload)
+    state = _STATES.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF))
+    concerned = state is None or modes >> state & 1
+    return _WORDS.get(number & 0xFFFFFF) if concerned and levels & 0xF <= _WARNING else None
