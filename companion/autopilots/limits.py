@@ -48,6 +48,19 @@ class Limits:
         """The lower of acceleration and what the tilt allows (m/s²)."""
         return min(self.acceleration, self.tilt_acceleration)
 
+    def stopping_distance(self, speed: float) -> float:
+        """The way (m) from ``speed`` (m/s) to rest within acceleration and jerk, both zero at either end;
+        infinite if one of the limits is 0."""
+        acceleration, jerk = self.usable_acceleration, self.jerk
+        if speed <= 0.0:
+            return 0.0
+        if min(acceleration, jerk) <= 0.0:
+            return math.inf
+        full = acceleration / jerk
+        # The speed is symmetric about the middle of the time that it takes.
+        time = speed / acceleration + full if speed >= acceleration * full else 2.0 * math.sqrt(speed / jerk)
+        return 0.5 * speed * time
+
 
 _STOCK: Final[Mapping[int, Mapping[str, float]]] = MappingProxyType(
     {

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.autopilots.known import KNOWN
-from companion.autopilots.limits import STOCK, limits_of, stock_parameters
+from companion.autopilots.limits import STOCK, Limits, limits_of, stock_parameters
 
 ARDUPILOT, PX4 = 3, 12
 BOTH = (ARDUPILOT, PX4)
@@ -88,6 +88,36 @@ def test_what_the_tilt_does_not_allow_is_not_usable() -> None:
     steep = limits_of(ARDUPILOT, {"WPNAV_ACCEL": 900.0})
     assert steep.usable_acceleration == steep.tilt_acceleration == pytest.approx(5.66, abs=0.01)
     assert limits_of(ARDUPILOT, {"WPNAV_ACCEL": 0.0}).acceleration == 2.5
+
+
+def integrated(limits: Limits, speed: float) -> float:
+    """The way of a stop in steps of 0.1 ms: jerk down, hold, jerk up."""
+    step, way, braking = 1e-4, 0.0, 0.0
+    while speed > 0.0:
+        # The speed that is lost while the deceleration goes back to zero.
+        ending = speed <= braking * braking / (2.0 * limits.jerk)
+        change = -limits.jerk * step if ending else limits.jerk * step
+        braking = min(max(braking + change, limits.jerk * step), limits.usable_acceleration)
+        way += speed * step
+        speed -= braking * step
+    return way
+
+
+@pytest.mark.parametrize("autopilot", BOTH)
+@pytest.mark.parametrize("speed", [0.5, 1.0, 5.0])
+@pytest.mark.parametrize("changed", [{}, {"PSC_JERK_XY": 1.0, "MPC_JERK_MAX": 1.0}, {"WPNAV_ACCEL": 50.0}])
+def test_the_way_to_stop_is_that_of_a_stop_in_small_steps(
+    autopilot: int, speed: float, changed: dict[str, float]
+) -> None:
+    limits = limits_of(autopilot, changed)
+    assert limits.stopping_distance(speed) == pytest.approx(integrated(limits, speed), rel=0.01)
+
+
+def test_stopping_of_the_stock_firmware() -> None:
+    assert STOCK[ARDUPILOT].stopping_distance(5.0) == pytest.approx(6.25)
+    assert STOCK[PX4].stopping_distance(5.0) == pytest.approx(25.0 / 6.0 + 5.0 * 3.0 / 16.0)
+    assert STOCK[PX4].stopping_distance(0.0) == 0.0
+    assert limits_of(PX4, {"MPC_ACC_HOR": 0.0}).stopping_distance(1.0) == math.inf
 
 
 @pytest.mark.parametrize("autopilot", BOTH)
