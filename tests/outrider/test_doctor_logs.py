@@ -112,6 +112,8 @@ TRUTHS = {
             ("its clock went back: it was started again", NOTE, ""),
             ("mode STABILIZE, disarmed", OK, ""),
             ("ARMING_CHECK = 127", OK, ""),
+            ("it follows up to 1 m/s², 5 m/s³, 10 m/s and 45° of tilt", WARNING, ""),
+            ("WPNAV_ACCEL = 100, stock is 250", WARNING, "stops in 13.0 m"),
             ("a ground station: 255/0", NOTE, ""),
         ),
         (("2% of the frames are damaged (1314)", WARNING),),

@@ -7,7 +7,7 @@ from itertools import chain
 from typing import Final
 
 from mavlink_bridge.messages import Source
-from outrider.doctor import clocks, health, identity, place, positioning, presence, settings, wire
+from outrider.doctor import agility, clocks, health, identity, place, positioning, presence, settings, wire
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity, Verdict
 from outrider.doctor.hearing import Hearing
@@ -27,6 +27,7 @@ _CHECKS: Final[tuple[Callable[[Case], Iterator[Finding]], ...]] = (
     place.agreement,
     clocks.clock,
     settings.settings,
+    agility.agility,
     presence.company,
     wire.wire,
 )

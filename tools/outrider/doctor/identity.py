@@ -13,7 +13,7 @@ from outrider.doctor.speaker import CRITICAL
 from outrider.hangar.modes import mode_name
 from outrider.logs.words import enumerated
 
-_ROTORCRAFT: Final = {2, 3, 4, 13, 14, 15, 29, 35, 43}
+ROTORCRAFT: Final = {2, 3, 4, 13, 14, 15, 29, 35, 43}
 """MAV_TYPE of what can hover: quadrotor, coaxial, helicopter, hexa-, octo-, tri-, dodeca-, decarotor, generic
 multirotor."""
 _TRIED: Final = {ARDUPILOT_NUMBER: (4, 6), PX4_NUMBER: (1, 16)}
@@ -39,7 +39,7 @@ def firmware(case: Case) -> Iterator[Finding]:
             "Use ArduCopter or PX4.",
         )
         return
-    if beat.type not in _ROTORCRAFT:
+    if beat.type not in ROTORCRAFT:
         yield Finding(
             f"{case.profile.name}, {kind}: no multicopter",
             Severity.BLOCKING,
@@ -186,7 +186,7 @@ def state(case: Case) -> Iterator[Finding]:
 
 
 def _mode(case: Case, beat: Heartbeat) -> str:
-    if not case.px4 and beat.type not in _ROTORCRAFT:
+    if not case.px4 and beat.type not in ROTORCRAFT:
         return str(beat.custom_mode)  # other ArduPilots have other numbers
     return mode_name("px4" if case.px4 else "ardupilot", beat.custom_mode)
 

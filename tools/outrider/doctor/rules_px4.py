@@ -73,6 +73,17 @@ def _ground_lost(value: float, _case: Case) -> Said:
     )
 
 
+def _own_jerk(value: float, _case: Case) -> Said:
+    if value < 4.0:
+        return Said(
+            WARNING,
+            f"Its own modes, such as HOLD when set-points stop, change acceleration by {value:g} m/s³ at "
+            "most, stock by 4: it drifts further.",
+            "Set MPC_JERK_AUTO to 4.",
+        )
+    return Said(OK, "How fast its own modes change acceleration, m/s³: not lower than stock.")
+
+
 PX4_RULES: Final = (
     Rule("COM_OBL_RC_ACT", _loss_action, "Its default, 0, sinks at 0.6 m/s when set-points stop; 5 holds."),
     Rule("COM_OF_LOSS_T", _loss_time, "How long it follows after the last set-point: 1 s by default."),
@@ -81,6 +92,7 @@ PX4_RULES: Final = (
     Rule("COM_LOW_BAT_ACT", low_battery, "What it does when the battery is low."),
     Rule("GF_ACTION", fence, "What it does at its fence."),
     Rule("SYS_FAILURE_EN", _failures, "Whether failures can be injected."),
+    Rule("MPC_JERK_AUTO", _own_jerk, "How fast its own modes change acceleration: 4 m/s³ by default."),
     Rule("MAV_SYS_ID", number, "Its id after the next start."),
 )
 """In the order in which they are told."""

@@ -1,0 +1,139 @@
+"""What the autopilot can follow, from its parameters: against the stock firmware and the shipped files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+from companion.autopilots.limits import STOCK, Limits, limits_of, stock_parameters
+from outrider.aboard.fly_config import FlyConfig
+from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
+from outrider.doctor.finding import Finding, Severity
+from outrider.doctor.identity import ROTORCRAFT
+from outrider.resources import find
+from outrider.yaml_file import load
+
+_FILES: Final = {ARDUPILOT_NUMBER: "ardupilot", PX4_NUMBER: "px4"}
+_SPEED: Final = 5.0
+"""m/s at which the way to stop is told: v_max of the shipped companions when they were first flown."""
+_LOWER: Final = 0.99
+"""Share of the stock value from which on a limit counts as lower: float32 is a little off."""
+
+
+class Demand(NamedTuple):
+    """What a companion asks of its autopilot horizontally: ``acceleration`` (m/s²) and ``speed`` (m/s) on one
+    axis, and ``total`` acceleration (m/s²) with what its field adds."""
+
+    acceleration: float
+    speed: float
+    total: float
+
+
+@lru_cache
+def shipped(autopilot: int) -> Demand:
+    """The limits of the companion file that is shipped for a MAV_AUTOPILOT."""
+    limits = load(find("companions", _FILES[autopilot]), FlyConfig).companion.limits
+    return Demand(max(limits.u_max[:2]), max(limits.v_max[:2]), limits.a_total)
+
+
+def agility(case: Case) -> Iterator[Finding]:
+    """What it can follow, and each parameter that makes that less than stock."""
+    beat = case.vehicle.vehicle.heartbeat
+    if case.profile is None or beat is None or beat.type not in ROTORCRAFT:
+        return
+    told = {
+        name: value for name in stock_parameters(case.autopilot) if (value := _number(case, name)) is not None
+    }
+    if not told:
+        names = ", ".join(stock_parameters(case.autopilot))
+        yield Finding(
+            f"what it can follow is not {'in the log' if case.log else 'told'}",
+            Severity.NOTE,
+            f"Separation depends on it: {names}. Stock values are assumed.",
+            "Have the ground station load all parameters while it records."
+            if case.log
+            else "Read them in a ground station.",
+        )
+        return
+    yield summary(limits_of(case.autopilot, told), shipped(case.autopilot), _FILES[case.autopilot])
+    for name, value in told.items():
+        yield from lowered(case.autopilot, name, value)
+
+
+def summary(limits: Limits, demand: Demand, file: str) -> Finding:
+    """All limits in one finding, against what the companion ``file`` asks."""
+    what = (
+        f"it follows up to {limits.acceleration:.3g} m/s², {limits.jerk:.3g} m/s³, {limits.speed:.3g} m/s "
+        f"and {math.degrees(limits.tilt):.0f}° of tilt"
+    )
+    stop = f"From {_SPEED:g} m/s it stops in {limits.stopping_distance(_SPEED):.1f} m."
+    how = (
+        "Set-points that ask for more are followed late."
+        if limits.shaped
+        else "In OFFBOARD only speed and tilt are enforced; the rest is how its own modes fly."
+    )
+    more = []
+    if limits.usable_acceleration < _LOWER * demand.acceleration:
+        more.append(f"{demand.acceleration:g} m/s² an axis, {demand.total:g} with its field")
+    if limits.speed < _LOWER * demand.speed:
+        more.append(f"{demand.speed:g} m/s")
+    if not more:
+        return Finding(what, Severity.OK, f"{how} {stop}")
+    return Finding(
+        what,
+        Severity.WARNING,
+        f"The shipped file {file} asks for {' and '.join(more)}. {how} {stop} The vehicle is then not where "
+        "its plan is, and may come too near to others.",
+        "Raise the autopilot's limits where the vehicle allows it, or lower u_max, v_max and a_total in the "
+        "companion's file.",
+    )
+
+
+def lowered(autopilot: int, name: str, value: float) -> Iterator[Finding]:
+    """A warning if the parameter ``name`` alone makes a limit lower than that of the stock firmware."""
+    stock, limits = STOCK[autopilot], limits_of(autopilot, {name: value})
+    costs = list(_costs(limits, stock))
+    if not costs:
+        return
+    usual = stock_parameters(autopilot)[name]
+    if not limits.shaped and name in ("MPC_ACC_HOR", "MPC_JERK_MAX"):
+        costs.append("PX4 enforces it in its own modes, such as HOLD when set-points stop, not in OFFBOARD.")
+    yield Finding(
+        f"{name} = {value:g}, stock is {usual:g}",
+        Severity.WARNING,
+        " ".join(costs),
+        f"Set {name} to {usual:g}, unless the vehicle needs it so; then lower the companion's limits too.",
+    )
+
+
+def _costs(limits: Limits, stock: Limits) -> Iterator[str]:
+    ways = limits.stopping_distance(_SPEED), stock.stopping_distance(_SPEED)
+    if limits.usable_acceleration < _LOWER * stock.usable_acceleration or limits.jerk < _LOWER * stock.jerk:
+        yield (
+            f"It allows {limits.usable_acceleration:.3g} m/s² and {limits.jerk:.3g} m/s³: from {_SPEED:g} "
+            f"m/s it stops in {ways[0]:.1f} m, stock in {ways[1]:.1f} m."
+        )
+    elif limits.tilt < _LOWER * stock.tilt:
+        yield (
+            f"{math.degrees(limits.tilt):.0f}° of tilt give {limits.tilt_acceleration:.1f} m/s² for wind and "
+            f"motion together, stock {stock.tilt_acceleration:.1f} m/s²."
+        )
+    if limits.speed < _LOWER * stock.speed:
+        yield f"It corrects its way with {limits.speed:.3g} m/s at most, stock {stock.speed:.3g} m/s."
+    if limits.position_gain < _LOWER * stock.position_gain:
+        yield _slower("A distance from the set-point", limits.position_gain, stock.position_gain)
+    if limits.velocity_gain < _LOWER * stock.velocity_gain:
+        yield _slower("A difference in velocity", limits.velocity_gain, stock.velocity_gain)
+
+
+def _slower(what: str, gain: float, usual: float) -> str:
+    if gain <= 0.0:
+        return f"{what} is not corrected."
+    return f"{what} halves in {math.log(2.0) / gain:.1f} s, stock in {math.log(2.0) / usual:.1f} s."
+
+
+def _number(case: Case, name: str) -> float | None:
+    value = case.parameter(name)
+    return value if value is not None and math.isfinite(value) else None
