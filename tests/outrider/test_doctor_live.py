@@ -184,6 +184,28 @@ def test_settings_that_can_hurt(flavour: str, settings: dict[str, Any], name: st
     assert found(verdict, name).do.startswith("Set ")
 
 
+@pytest.mark.parametrize(
+    ("seconds", "severity", "words"),
+    [
+        (0.2, Severity.WARNING, "A short break"),
+        (0.3, Severity.OK, "for 0.3 s"),
+        (1.0, Severity.OK, "for 1 s"),
+        (1.5, Severity.NOTE, "saves 0.5 s of that, 1 m at 2 m/s"),
+        (3.0, Severity.NOTE, "saves 2 s of that, 4 m at 2 m/s"),
+        (4.0, Severity.WARNING, "saves 3 s of that, 6 m at 2 m/s"),
+    ],
+)
+def test_how_long_arducopter_flies_on_and_what_a_second_buys(
+    seconds: float, severity: Severity, words: str
+) -> None:
+    bench = Bench(autopilot(guided_timeout=seconds))
+    bench.run(3.0)
+    finding = found(bench.consult(), f"GUID_TIMEOUT = {seconds:g}")
+    assert finding.severity is severity
+    assert words in finding.why
+    assert severity is Severity.OK or "Set GUID_TIMEOUT to 1 s" in finding.do
+
+
 def test_two_vehicles_on_one_link() -> None:
     bench = Bench(autopilot("px4", 11), autopilot("ardupilot", 12))
     bench.run(3.0)
