@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from outrider.aboard.berth import berth
 from outrider.aboard.request import Options, checked
 from outrider.errors import InputError
 from outrider.resources import find
@@ -32,19 +31,3 @@ def test_a_neighbour_is_never_anyones_target(tmp_path: Path) -> None:
         checked(Options(AUTOPILOT, str(own), SWARM, system=7))
     asked = checked(Options(AUTOPILOT, str(own), SWARM, "udpin:127.0.0.1:14600", system=7))
     assert asked.endpoints["target"] != asked.endpoints["swarm"]
-
-
-def test_one_vehicle_has_one_companion_and_its_end_leaves_room(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with berth(1, AUTOPILOT):
-        with pytest.raises(InputError, match="another outrider fly has vehicle 1"), berth(1, AUTOPILOT):
-            pass
-        with berth(2, AUTOPILOT), berth(1, "tcp:127.0.0.1:5760"):
-            pass
-    with berth(1, AUTOPILOT):
-        pass
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
-    with berth(1, AUTOPILOT):
-        pass

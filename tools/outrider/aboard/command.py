@@ -15,10 +15,10 @@ import yaml
 from rich.console import Console
 
 from mavlink_bridge.clock import WallClock
-from outrider.aboard.berth import berth
 from outrider.aboard.diary import Diary
 from outrider.aboard.figures import summary
 from outrider.aboard.flight import Flight
+from outrider.aboard.instance_lock import instance_lock
 from outrider.aboard.request import Request
 from outrider.aboard.screen import Screen
 from outrider.aboard.terminal import Terminal
@@ -43,7 +43,7 @@ def run(asked: Request) -> int:
         from outrider.aboard.log_run import rehearsed
 
         return rehearsed(asked, asked.log)
-    with nullcontext() if asked.dry_run else berth(asked.system, str(asked.endpoints["autopilot"])):
+    with nullcontext() if asked.dry_run else instance_lock(asked.system, asked.endpoints["autopilot"]):
         return _live(asked)
 
 
