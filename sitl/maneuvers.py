@@ -80,7 +80,8 @@ class Maneuvers:
         return None
 
     def _check(self, order: Order) -> Denial | None:
-        if self._commander.armed:
+        # PX4 runs its checks in flight as well.
+        if self._commander.armed and self._flavour.stops:
             return Denial(TEMPORARILY_REJECTED, "Checks refused: armed")
         self._say_doubts()
         return None

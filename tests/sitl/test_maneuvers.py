@@ -282,6 +282,12 @@ def test_checks_say_what_speaks_against_arming(flavour):
     assert rig.texts == []
 
 
+@pytest.mark.parametrize(("flavour", "result"), [("ardupilot", TEMPORARILY_REJECTED), ("px4", ACCEPTED)])
+def test_only_px4_runs_its_checks_while_armed(flavour, result):
+    rig = Rig(flavour).hover(5.0)
+    assert rig.order(CHECK) == [result]
+
+
 # What a look at all of it together had found
 
 
