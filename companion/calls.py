@@ -7,6 +7,7 @@ from collections import deque
 from mavlink_bridge.messages import CommandAck, CommandLong, Message, Source
 
 ACCEPTED, IN_PROGRESS = 0, 5
+DO_SET_MODE = 176
 _RETRY = 500_000
 _EXPIRY = 15_000_000
 """µs after which an acknowledged command without effect is sent again; longer than a take-off."""

@@ -12,10 +12,9 @@ from collections.abc import Sequence
 
 from companion.autopilots import Profile
 from companion.autopilots.px4 import PX4
-from companion.calls import ACCEPTED
+from companion.calls import ACCEPTED, DO_SET_MODE
 from companion.node import COMPONENT
 from companion.reception import AUTOPILOT
-from companion.takeoff import DO_SET_MODE
 from companion.vehicle import Vehicle
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, Source
@@ -88,8 +87,8 @@ class LastWord:
         if self.over or not self._steered or now < self._next:
             return []
         self._next, self._asked = now + _AGAIN, True
-        params = (*self._profile.hold_params, 0.0, 0.0, 0.0, 0.0)
-        order = CommandLong(self._own, self._own.system, AUTOPILOT, DO_SET_MODE, 0, params)
+        hold = self._profile.hold_call
+        order = CommandLong(self._own, self._own.system, AUTOPILOT, DO_SET_MODE, 0, hold)
         return [Datagram("autopilot", self._codec.encode(order))]
 
     def _verdict(self, *, late: bool) -> str:

@@ -11,12 +11,12 @@ from __future__ import annotations
 from enum import Enum
 
 from companion.autopilots import Profile, Step
-from companion.calls import Calls
+from companion.calls import DO_SET_MODE, Calls
 from companion.config import CompanionConfig
 from companion.custody import Custody, Owner, Passage
 from companion.horizon import Array
 from companion.readiness import Readiness
-from companion.takeoff import DO_SET_MODE, NAV_TAKEOFF, Takeoff
+from companion.takeoff import NAV_TAKEOFF, Takeoff
 from companion.vehicle import Vehicle
 from companion.world import View
 from mavlink_bridge.messages import CommandAck, Message, Source
@@ -27,6 +27,8 @@ NAV_LAND = 21
 _NAN = float("nan")
 _ARMS = 2_000_000
 """µs after the last asking to arm in which a heartbeat may still say that it is not."""
+_LEAVES = 5_000_000
+"""µs after landing for which another mode is asked for."""
 
 
 class Phase(Enum):
@@ -59,6 +61,7 @@ class Pilot:
         self.vehicle = Vehicle()
         self.waiting_for = "a heartbeat of the autopilot"
         self._settling_since: int | None = None
+        self._landed_at: int | None = None
         self._height: float | None = None
         self._go_at: int | None = None
         self._passage = Passage(0)
@@ -195,7 +198,7 @@ class Pilot:
             self._alight()
 
     def _alight(self) -> None:
-        self.phase = Phase.LAND
+        self.phase, self._landed_at = Phase.LAND, None
         self._arming = self._takeoff.asked_to_arm
         self._calls.forget()
         self._passage = Passage(self.vehicle.mode)
@@ -226,9 +229,7 @@ class Pilot:
         unheard: a pilot may have it."""
         vehicle, profile = self.vehicle, self.profile
         if vehicle.heartbeat is not None and not vehicle.armed:
-            if vehicle.beat_at - self._arming > _ARMS:
-                self.phase = Phase.DONE
-            return []
+            return self._leave(now) if vehicle.beat_at - self._arming > _ARMS else []
         if not vehicle.alive:
             return []
         if profile is not None and vehicle.flies:
@@ -240,6 +241,21 @@ class Pilot:
         if self._passage.entered:
             return []
         return self._calls.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
+
+    def _leave(self, now: int) -> list[Message]:
+        """Disarmed. PX4 is then in the mode in which it was steered, where its checks before the next flight
+        fail: it is asked for another one, unless somebody has chosen one already."""
+        vehicle, profile = self.vehicle, self.profile
+        if self._landed_at is None:
+            self._landed_at = now
+            self._calls.forget()
+        if profile is not None and profile.streams_first and now - self._landed_at <= _LEAVES:
+            if not vehicle.alive:
+                return []
+            if vehicle.mode in profile.land_modes | {profile.guided_custom_mode}:
+                return self._calls.call(now, DO_SET_MODE, profile.hold_call)
+        self.phase = Phase.DONE
+        return []
 
     def _yield(self) -> None:
         """Somebody has it."""
@@ -258,7 +274,7 @@ class Pilot:
         """For the mode that nobody but the time-out has ended."""
         if self.profile is None:
             return []
-        return self._calls.call(now, DO_SET_MODE, (*self.profile.mode_params, 0.0, 0.0, 0.0, 0.0))
+        return self._calls.call(now, DO_SET_MODE, self.profile.mode_call)
 
     def _start_anew(self) -> None:
         """As at the beginning: a new go is needed."""

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from companion.calls import Calls
+from companion.calls import DO_SET_MODE, Calls
 from companion.config import CompanionConfig
 from companion.vehicle import UNDEFINED, Vehicle
 from companion.world import View
@@ -65,10 +65,17 @@ class Readiness:
             # A vehicle that may be flying must not be told to take off.
             return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
         if not vehicle.healthy:
-            return "the autopilot's pre-arm checks"
+            return f"the autopilot's pre-arm checks{self._starving()}"
         if not all(self._calls.answered(*call) for call in _NEEDED):
             return "the autopilot's answers to SET_MESSAGE_INTERVAL"
         return "" if go else OPERATORS_GO
+
+    def _starving(self) -> str:
+        """Why they fail, where its mode is the reason."""
+        profile = self._vehicle.profile
+        if profile is None or not self._vehicle.starved:
+            return ""
+        return f", which fail in {profile.guided_name} without set-points: {profile.hold_name} first"
 
     def _astray(self, view: View) -> str:
         """Whether it stands where nobody can mean it to start: then the fleet origin is wrong, or the
@@ -87,8 +94,13 @@ class Readiness:
         return "" if left is None or left >= low else f"a battery above {100 * low:.0f} %"
 
     def requests(self, now: int) -> list[Message]:
-        """For the messages that are needed; they change nothing of what the vehicle does."""
+        """For the messages that are needed, which change nothing of what the vehicle does; and for the mode
+        in which a disarmed vehicle passes its checks."""
         calls: list[Message] = []
+        profile, vehicle = self._vehicle.profile, self._vehicle
+        if profile is not None and vehicle.alive and vehicle.starved and not vehicle.healthy:
+            # With set-points that somebody else sends the checks pass, and the mode is theirs.
+            calls += self._calls.call(now, DO_SET_MODE, profile.hold_call)
         if self._vehicle.heartbeat is not None:
             for command, params in sorted(_NEEDED, key=lambda call: self._calls.sent_at(*call)):
                 calls += self._calls.call(now, command, params)

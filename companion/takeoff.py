@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from companion.autopilots import Profile, Step
-from companion.calls import Calls
+from companion.calls import DO_SET_MODE, Calls
 from companion.horizon import Array
 from companion.tracks import State
 from companion.vehicle import IN_AIR, ON_GROUND, UNDEFINED, Vehicle
 from mavlink_bridge.messages import Message
 
-DO_SET_MODE, ARM_DISARM, NAV_TAKEOFF = 176, 400, 22
+ARM_DISARM, NAV_TAKEOFF = 400, 22
 _STILL, _CALM = 0.3, 2_000_000
 """m/s and µs: slower than this for so long in the air, a take-off is over."""
 _NEARLY = 0.7
@@ -60,7 +60,7 @@ class Takeoff:
         step = profile.steps[self._step]
         if step is Step.MODE:
             done = vehicle.in_guided_mode
-            call = self._calls.call(now, DO_SET_MODE, (*profile.mode_params, 0.0, 0.0, 0.0, 0.0))
+            call = self._calls.call(now, DO_SET_MODE, profile.mode_call)
         elif step is Step.ARM:
             done = vehicle.armed
             call = self._calls.call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))

@@ -103,6 +103,12 @@ class Vehicle:
         return self.in_guided_mode or (self.profile is not None and self.mode == self.profile.hold_mode)
 
     @property
+    def starved(self) -> bool:
+        """Whether it is disarmed in the mode in which its checks before arming fail without set-points."""
+        profile = self.profile
+        return profile is not None and profile.streams_first and self.in_guided_mode and not self.armed
+
+    @property
     def healthy(self) -> bool:
         """Whether its checks before arming have passed."""
         return self.status is not None and bool(self.status.health & PREARM_OK)

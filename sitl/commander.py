@@ -155,9 +155,16 @@ class Commander:
         if denial := self._flavour.mode_denial(mode, status):
             return denial
         self._switch(mode, now)
-        if not self.armed:
+        if not self.armed or self._flavour.armable_mode(mode):
             self._chosen = mode
         return None
+
+    def mode_doubt(self, now: int) -> str | None:
+        """What speaks against arming in the present mode at ``now`` (µs), where the pre-arm check counts
+        that."""
+        if self.armed or not self._flavour.checks_mode:
+            return None
+        return self._flavour.arming_denial(self.status(now))
 
     @property
     def follows(self) -> bool:
@@ -190,7 +197,7 @@ class Commander:
         elif self.mode in MODES:
             self._journey(now)
         elif guidance.activity is Activity.TAKEOFF and guidance.reached:
-            self.mode = self._flavour.after_takeoff
+            self.mode = self._chosen = self._flavour.after_takeoff
             guidance.settle()
         if not self.landed:
             self._postpone(now)
@@ -210,7 +217,7 @@ class Commander:
             self._switch(Mode.RETURN, now)
         elif event is Event.FINISHED:
             self._voice.inform("Mission finished")
-            self.mode = self._flavour.after_mission
+            self.mode = self._chosen = self._flavour.after_mission
             self._guidance.hold()
 
     def _switch(self, mode: Mode, now: int) -> None:

@@ -86,11 +86,12 @@ class Failsafes:
             self._breach = Breach.NONE
         if not commander.armed and self._flavour.repeats_doubts and now - self._said_at >= _AGAIN:
             self._said_at = now
-            self.say_doubts()
+            self.say_doubts(now)
 
-    def say_doubts(self) -> None:
-        """One text for each."""
-        for doubt in self.doubts():
+    def say_doubts(self, now: int) -> None:
+        """One text for each, at ``now`` (µs)."""
+        of_mode = self._commander.mode_doubt(now)
+        for doubt in [*([of_mode] if of_mode else []), *self.doubts()]:
             self._voice.warn(f"{self._flavour.doubt_prefix}{doubt}")
 
     # Within

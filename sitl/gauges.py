@@ -97,11 +97,14 @@ class Gauges:
             self._config.epoch,
             self._version,
             self._mission,
-            commander.ready and (commander.armed or not self._failsafes.doubts()),
+            commander.ready and (commander.armed or self._armable(now)),
             self._failsafes.fence_status,
             self._lift,
             lambda: plant.state,
         )
+
+    def _armable(self, now: int) -> bool:
+        return not self._failsafes.doubts() and self._commander.mode_doubt(now) is None
 
     def _landed_state(self) -> int:
         """MAV_LANDED_STATE. Who sinks because nobody steers is not landing."""

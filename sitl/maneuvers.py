@@ -48,9 +48,9 @@ class Maneuvers:
         itinerary: Itinerary,
         following: Following,
         estimate: Callable[[], Estimate],
-        say_doubts: Callable[[], None],
+        say_doubts: Callable[[int], None],
     ) -> None:
-        """``say_doubts``: what speaks against arming, as texts."""
+        """``say_doubts``: what speaks against arming at a time (µs), as texts."""
         self._commander = commander
         self._flavour = flavour
         self._guidance = guidance
@@ -83,7 +83,7 @@ class Maneuvers:
         # PX4 runs its checks in flight as well.
         if self._commander.armed and self._flavour.stops:
             return Denial(TEMPORARILY_REJECTED, "Checks refused: armed")
-        self._say_doubts()
+        self._say_doubts(order.now)
         return None
 
     def _follow(self, order: Order) -> Denial | None:

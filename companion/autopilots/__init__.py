@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 from mavlink_bridge.messages import Heartbeat
 
+Params = tuple[float, float, float, float, float, float, float]
+
 
 class Step(Enum):
     """One stage on the way into the air; which order is the autopilot's."""
@@ -21,10 +23,11 @@ class Profile(NamedTuple):
     """An autopilot's ways. ``mode_params`` are p1…p3 of DO_SET_MODE; ``setpoint_mask`` is the type_mask to
     send.
 
-    ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer. ``streams_first``: set-points must
-    flow before the mode is granted. ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level,
-    not above home. ``hold_params``: p1…p3 of DO_SET_MODE for the mode, ``hold_mode`` and ``hold_name``, in
-    which it stays where it is by itself. ``fallen_modes``: what custom_mode may be when set-points were
+    ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer, in the mode ``guided_name``.
+    ``streams_first``: set-points must flow before the mode is granted, and before its checks pass in it.
+    ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level, not above home.
+    ``hold_params``: p1…p3 of DO_SET_MODE for the mode, ``hold_mode`` and ``hold_name``, in which it stays
+    where it is by itself. ``fallen_modes``: what custom_mode may be when set-points were
     missing for too long; ``loss_modes``: those of them that no pilot flies in. ``takeoff_modes`` and
     ``land_modes``: those into which NAV_TAKEOFF, where it changes the mode, and NAV_LAND lead.
     """
@@ -34,6 +37,7 @@ class Profile(NamedTuple):
     steps: tuple[Step, ...]
     mode_params: tuple[float, float, float]
     guided_custom_mode: int
+    guided_name: str
     setpoint_mask: int
     streams_first: bool
     takeoff_absolute: bool
@@ -44,6 +48,16 @@ class Profile(NamedTuple):
     fallen_modes: frozenset[int] = frozenset()
     loss_modes: frozenset[int] = frozenset()
     takeoff_modes: frozenset[int] = frozenset()
+
+    @property
+    def mode_call(self) -> Params:
+        """All parameters of DO_SET_MODE for the mode in which our set-points steer."""
+        return (*self.mode_params, 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def hold_call(self) -> Params:
+        """The same for the one in which it stays where it is by itself."""
+        return (*self.hold_params, 0.0, 0.0, 0.0, 0.0)
 
 
 def is_guided(profile: Profile, heartbeat: Heartbeat) -> bool:

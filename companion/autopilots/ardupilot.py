@@ -11,6 +11,7 @@ ARDUPILOT = Profile(
     steps=(Step.MODE, Step.ARM, Step.TAKEOFF),
     mode_params=(1.0, 4.0, 0.0),
     guided_custom_mode=4,
+    guided_name="GUIDED",
     setpoint_mask=0,
     streams_first=False,
     takeoff_absolute=False,

@@ -12,6 +12,7 @@ PX4 = Profile(
     steps=(Step.ARM, Step.TAKEOFF, Step.MODE),
     mode_params=(1.0, 6.0, 0.0),
     guided_custom_mode=6 << 16,
+    guided_name="OFFBOARD",
     setpoint_mask=0,
     streams_first=True,
     takeoff_absolute=True,

@@ -119,8 +119,8 @@ class Flavour(Protocol):
     after_takeoff: Mode
     after_landing: Mode
     keeps_choice: bool
-    """Whether the mode that was chosen on the ground comes back when it is disarmed, and GUIDED when its
-    set-points do."""
+    """Whether the last mode that was chosen and may be armed in comes back when it is disarmed, and GUIDED
+    when its set-points do."""
     after_return: Mode
     after_mission: Mode
     """The mode when the last item is done."""
@@ -143,6 +143,8 @@ class Flavour(Protocol):
     """STATUSTEXT (253) of what speaks against arming begins so."""
     repeats_doubts: bool
     """Whether it says them without being asked."""
+    checks_mode: bool
+    """Whether its pre-arm check (SYS_STATUS) asks for a mode in which it may be armed."""
     battery_patience: int
     """µs; a battery counts as low when it has been so for as long."""
     loiter: Mode
@@ -170,6 +172,10 @@ class Flavour(Protocol):
 
     def requested(self, main: int, sub: int, /) -> Mode | None:
         """The mode that DO_SET_MODE (176) asks for by parameters 2 and 3, None when there is none such."""
+        ...
+
+    def armable_mode(self, mode: Mode, /) -> bool:
+        """Whether it can be armed in this mode."""
         ...
 
     def arming_denial(self, status: Status) -> str | None:

@@ -109,6 +109,7 @@ class ArduPilot:
     blind_text = "EKF Failsafe: changed to LAND Mode"
     doubt_prefix = "PreArm: "
     repeats_doubts = True
+    checks_mode = False
     # BATT_LOW_TIMER.
     battery_patience = 10_000_000
     repositioning = Mode.GUIDED
@@ -147,9 +148,12 @@ class ArduPilot:
     def requested(self, main: int, _sub: int, /) -> Mode | None:
         return _MODES.get(main)
 
+    def armable_mode(self, mode: Mode, /) -> bool:
+        return mode not in _NOT_ARMABLE
+
     def arming_denial(self, status: Status) -> str | None:
         name = _NAMES.get(status.mode, status.mode.name)
-        return f"{name} mode is not armable" if status.mode in _NOT_ARMABLE else None
+        return None if self.armable_mode(status.mode) else f"{name} mode is not armable"
 
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
         if mode is Mode.STANDBY and status.armed and not status.landed:

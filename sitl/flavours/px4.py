@@ -90,6 +90,7 @@ class Px4:
     blind_text = "Failsafe: no position, blind land"
     doubt_prefix = "Preflight Fail: "
     repeats_doubts = False
+    checks_mode = True
     battery_patience = 0
     repositioning = Mode.HOLD
     loiter = Mode.HOLD
@@ -122,12 +123,13 @@ class Px4:
     def requested(self, main: int, sub: int, /) -> Mode | None:
         return _MODES.get((main, sub))
 
+    def armable_mode(self, mode: Mode, /) -> bool:
+        return mode not in (Mode.FOLLOW, Mode.RETURN, Mode.LAND)
+
     def arming_denial(self, status: Status) -> str | None:
         if status.mode is Mode.GUIDED and not _streaming(status):
             return "no offboard signal"
-        if status.mode in (Mode.FOLLOW, Mode.RETURN):
-            return f"{status.mode.name} mode is not armable"
-        return None
+        return None if self.armable_mode(status.mode) else f"{status.mode.name} mode is not armable"
 
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
         # On the ground any mode can be chosen; then the stream counts when it is to be armed.

@@ -113,7 +113,8 @@ class PerfectAutopilot:
             CommandAck(AUTOPILOT, message.command, 0, 0, 0, message.source.system, message.source.component)
         ]
         if message.command == MODE:
-            self.mode = self.profile.guided_custom_mode
+            held = p == self.profile.hold_call
+            self.mode = self.profile.hold_mode if held else self.profile.guided_custom_mode
         elif message.command == ARM:
             self.armed = p[0] == 1.0
         elif message.command == TAKEOFF:

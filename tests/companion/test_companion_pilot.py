@@ -243,6 +243,67 @@ def test_without_a_heartbeat_for_three_seconds_nothing_is_steered(flavour):
     assert rig.pilot.streaming
 
 
+OFFBOARD, HOLD, AUTO_LAND = 6 << 16, 4 << 16 | 3 << 24, 4 << 16 | 6 << 24
+
+
+def down(flavour):
+    """Landing, told to, and some seconds later."""
+    rig = Rig(flavour).escorting()
+    rig.pilot.land()
+    rig.pilot.settled()
+    landing = min(PROFILES[flavour].land_modes)
+    rig.run(3.0, beat(flavour, armed=True, mode=landing), landed(4), acks=True)
+    rig.sent.clear()
+    return rig
+
+
+@pytest.mark.parametrize("mode", [OFFBOARD, AUTO_LAND])
+@pytest.mark.parametrize("acks", [True, False])
+def test_a_px4_that_has_landed_is_asked_to_hold_until_it_says_so_for_five_seconds_at_most(mode, acks):
+    rig = down("px4")
+    sent = rig.run(1.0, beat("px4", mode=mode), landed(1), acks=acks)
+    assert set(sent) == {(MODE, (1.0, 4.0, 3.0, 0.0, 0.0, 0.0, 0.0))}
+    assert rig.pilot.phase is Phase.LAND
+    assert rig.run(1.0, beat("px4", mode=HOLD), landed(1)) == []
+    assert rig.pilot.phase is Phase.DONE
+    rig = down("px4")
+    rig.run(4.9, beat("px4", mode=mode), landed(1), acks=acks)
+    assert rig.pilot.phase is Phase.LAND
+    rig.run(0.3, beat("px4", mode=mode), landed(1), acks=acks)
+    assert rig.pilot.phase is Phase.DONE
+
+
+def test_after_landing_nobodys_mode_is_changed_but_the_own_and_an_arducopters_never():
+    for flavour, mode in (("px4", 3 << 16), ("px4", HOLD), ("ardupilot", 9), ("ardupilot", 4)):
+        rig = down(flavour)
+        assert rig.run(1.0, beat(flavour, mode=mode), landed(1)) == []
+        assert rig.pilot.phase is Phase.DONE
+
+
+def test_a_px4_that_falls_silent_when_it_has_landed_is_not_waited_for():
+    rig = down("px4")
+    rig.run(0.1, beat("px4", mode=OFFBOARD), landed(1))
+    rig.run(6.0)
+    assert rig.pilot.phase is Phase.DONE
+
+
+@pytest.mark.parametrize("health", [HEALTHY, ILL], ids=["passes", "fails"])
+@pytest.mark.parametrize("armed", [False, True])
+def test_before_a_go_the_mode_is_touched_only_where_a_disarmed_px4_fails_its_checks_by_it(health, armed):
+    rig = Rig("px4")
+    sent = rig.run(2.0, beat("px4", armed=armed, mode=OFFBOARD), health, landed(1), acks=True)
+    asked = {call for call in sent if call[0] == MODE}
+    assert asked == ({(MODE, (1.0, 4.0, 3.0, 0.0, 0.0, 0.0, 0.0))} if health is ILL and not armed else set())
+    assert ("OFFBOARD" in rig.pilot.waiting_for) == bool(asked)
+    assert not rig.pilot.streaming
+    # Nor in another mode.
+    for flavour, mode in (("px4", HOLD), ("px4", 3 << 16), ("ardupilot", 4), ("ardupilot", 9)):
+        rig = Rig(flavour)
+        sent = rig.run(2.0, beat(flavour, mode=mode), ILL, landed(1))
+        assert MODE not in {command for command, _ in sent}
+        assert rig.pilot.waiting_for == "the autopilot's pre-arm checks"
+
+
 @pytest.mark.parametrize("blind", [None, state(HEIGHT, age=500_001)], ids=["nothing", "old"])
 def test_who_is_blind_lands_without_settling(blind):
     rig = Rig().escorting()

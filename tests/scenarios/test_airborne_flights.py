@@ -11,9 +11,10 @@ import pytest
 from flight_facts import check_told, clock, log
 from lockstep_flights import Flown, check, fly, scenario, setpoints
 
+from companion.calls import DO_SET_MODE
 from companion.node import COMPONENT
 from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase
-from companion.takeoff import ARM_DISARM, DO_SET_MODE
+from companion.takeoff import ARM_DISARM
 from mavlink_bridge.messages import CommandInt, CommandLong
 from outrider.flight import EPOCH
 from outrider.names import LINK_NUMBERS

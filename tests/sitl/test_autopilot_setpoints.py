@@ -12,6 +12,7 @@ from autopilot_rig import (
     FLAVOURS,
     LAND,
     POSITION_YAW,
+    SET_MODE,
     VELOCITY_YAW,
     ZERO,
     Rig,
@@ -21,9 +22,11 @@ from autopilot_rig import (
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mavlink_bridge.messages import Heartbeat, PositionTarget, StatusText
+from mavlink_bridge.messages import Heartbeat, PositionTarget, SetpointLocal, StatusText, SysStatus
 from sitl.flavours import Mode
 
+CHECK = 401
+"""RUN_PREARM_CHECKS."""
 CALM = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 BAD = st.sampled_from((math.nan, math.inf, -math.inf, 3e38))
 ANY = st.one_of(BAD, st.floats(-50, 50, width=32))
@@ -314,6 +317,51 @@ def test_px4_comes_back_to_the_mode_that_was_chosen_on_the_ground():
     rig.run(15.0)
     assert not rig.autopilot.armed
     assert rig.autopilot.mode is Mode.GUIDED
+
+
+def test_px4_comes_back_to_offboard_after_a_landing_and_fails_its_checks_there_without_set_points():
+    """As PX4 1.16.1 does: the last mode that was chosen and may be armed in, in the air too."""
+    rig = Rig("px4").hover(3.0)
+    stay = setpoint(POSITION_YAW, (0.0, 0.0, -3.0))
+    rig.steer(2.0, stay)
+    assert rig.order(LAND) == [0]
+    rig.run(12.0)
+    assert not rig.autopilot.armed
+    assert rig.autopilot.mode is Mode.GUIDED
+
+    def passes():
+        rig.heard.clear()
+        rig.run(1.1, *every)
+        return bool(rig.all(SysStatus)[-1].health & 0x10000000)
+
+    every: tuple[SetpointLocal, ...] = ()
+    assert not passes()
+    rig.heard.clear()
+    assert rig.order(CHECK) == [0]
+    assert rig.texts == ["Preflight Fail: no offboard signal"]
+    every = (stay,)
+    assert passes()
+    every = ()
+    assert not passes()
+    assert rig.order(SET_MODE, 1, 4, 3) == [0]
+    assert passes()
+
+
+def test_a_px4_in_flight_has_nothing_against_its_mode():
+    rig = Rig("px4").hover(3.0)
+    assert rig.order(SET_MODE, 1, 4, 5) == [0]
+    rig.heard.clear()
+    assert rig.order(CHECK) == [0]
+    assert rig.texts == []
+
+
+def test_an_arducopter_passes_its_checks_in_whatever_mode():
+    rig = Rig("ardupilot").hover(3.0)
+    assert rig.order(LAND) == [0]
+    rig.run(12.0)
+    assert not rig.autopilot.armed
+    assert rig.autopilot.mode is Mode.LAND
+    assert rig.all(SysStatus)[-1].health & 0x10000000
 
 
 @pytest.mark.parametrize(("streams", "beats"), [("normal", 1), ("quiet", 0)])
