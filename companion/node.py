@@ -18,6 +18,7 @@ from companion.planner import Plan, Planner
 from companion.planning import Planning, Tally
 from companion.reactions import Reactions
 from companion.reception import LINKS, accepts
+from companion.round_trips import RoundTrips
 from companion.setpoint import is_finite, setpoint
 from companion.sharing import Sharing
 from companion.voice import Voice
@@ -71,6 +72,7 @@ class Companion:
         }
         self.watch = Watch(config)
         self._reactions = Reactions()
+        self._round_trips = RoundTrips(self._source)
         self._next_look = self._looked_late = 0
         self._certified = (
             CertifiedFlight(config, self._source, fleet) if config.avoidance == "certified" else None
@@ -163,6 +165,7 @@ class Companion:
             return self._encode(ground=answers)
         view = self.world.at(now)
         commands = self.pilot.step(now, view)
+        asked = self._round_trips.due(now, self.world.late)
         self._look(now, view)
         self._aims.forget(view)
         self._planning.fly(now, view, cautious=self.watch.blinkered)
@@ -173,7 +176,7 @@ class Companion:
         told = [] if certified is None else certified.messages(now, farewell=leaving)
         said = self._said(now)
         return self._encode(
-            autopilot=[*commands, *setpoints, *shared.autopilot, *said["autopilot"]],
+            autopilot=[*commands, *asked, *setpoints, *shared.autopilot, *said["autopilot"]],
             swarm=shared.swarm + told,
             ground=[*answers, *said["ground"]],
         )
@@ -205,11 +208,20 @@ class Companion:
                     continue
                 if link == "autopilot":
                     self.pilot.hear(message)
+                    if isinstance(message, Timesync):
+                        self._hear_time(now, message)
+                        continue
                 if self._certified is not None and link == "swarm" and isinstance(message, Tunnel | Timesync):
                     self._certified.hear(now, message)
                 else:
                     self.world.hear(now, link, message)
         return answers
+
+    def _hear_time(self, now: int, message: Timesync) -> None:
+        """What may be the autopilot's answer to what it was asked for the time."""
+        answer = self._round_trips.hear(message)
+        if answer is not None:
+            self.world.answered(now, answer)
 
     def _look(self, now: int, view: View) -> None:
         """See what is wrong, ten times a second, and react to what begins."""
@@ -231,6 +243,8 @@ class Companion:
             self.world.clock_steps,
             self.world.moves,
             self.world.displaced,
+            self.world.clock_lost,
+            self._round_trips.unanswered(now),
         )
         for change in self.watch.look(situation):
             concern = change.concern

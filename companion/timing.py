@@ -6,13 +6,18 @@ A line below all lags is the offset plus the least delay, which is a setting; wh
 age. One way alone, a link that became slow cannot be told from a clock that stood still. So the line falls
 with any lag, and rises no faster than clocks drift: **a delay that grows never makes a message younger**.
 
-Two things are believed against that, after long evidence. A lag that has grown steadily for half a minute is
-a clock of another rate, as a simulator's is (1 % and more); the rate is that of the line below the lags, as
-Moon, Skelly and Towsley lay it ("Estimation and removal of clock skew from network delay measurements",
-1999). And where a minute long nothing was younger than would be of use, that is the clock: one that stood for
-a moment must not ground a vehicle for ever. A step *back* of the stamps further than messages can overtake
-each other is a clock that began anew, as soon as a second of it has been heard as it was sent: what waited
-somewhere comes in a burst instead.
+A sender that can be asked tells the two apart: what its clock shows in an answer it showed after the question
+left, so the offset is at least the question's time minus that stamp, however slow the way back. To that the
+line is laid at once, and for as long as answers come nothing else raises it: a message's age is then never
+understated, and overstated by no more than the question took.
+
+Where no answers come, two things are believed after long evidence. A lag that has grown steadily for half a
+minute is a clock of another rate, as a simulator's is (1 % and more); the rate is that of the line below the
+lags, as Moon, Skelly and Towsley lay it ("Estimation and removal of clock skew from network delay
+measurements", 1999). And where a minute long nothing was younger than would be of use, that is the clock:
+one that stood for a moment must not ground a vehicle for ever. A step *back* of the stamps further than
+messages can overtake each other is a clock that began anew, as soon as a second of it has been heard as it
+was sent: what waited somewhere comes in a burst instead.
 
 A track keeps its own time, which runs as the sender's clock does and is only read with an offset: it is the
 sender's where stamps were of use from the first. So what a track makes of a message does not depend on when
@@ -49,6 +54,8 @@ _LIVE = 0.75
 """So much of their stamps' span must the arrivals of witnesses take; a queue that drains takes less."""
 _FEW = 8
 """Messages of a brief line."""
+_ANSWERED = 10 * _SECOND
+"""µs after an answer in which the line is not raised by what lags seem to say."""
 _REPEATS = 4
 """The same stamp so often in succession, and for a second, is no duplicate: this clock stands."""
 
@@ -89,13 +96,16 @@ class SenderClock:
     is still dated, two seconds at least. ``skew``: the companion's time minus the track's own, as known at
     the last message. ``heard``: messages that the line stands on; ``laid``: how often there was a new one.
     ``brief``: the line is that of the last few messages alone. It is for a simulation's clock, which stands
-    whenever its machine is busy; a delay that grows is then not seen.
+    whenever its machine is busy; a delay that grows is then not seen. ``lost``: what the sender's clock has
+    lost against ours, by its own answers.
     """
 
     __slots__ = (
+        "_answered",
         "_base",
         "_begun",
         "_delay",
+        "_lag",
         "_lately",
         "_least",
         "_line",
@@ -113,6 +123,7 @@ class SenderClock:
         "brief",
         "heard",
         "laid",
+        "lost",
         "skew",
     )
 
@@ -121,6 +132,9 @@ class SenderClock:
         self.heard = 0
         self.laid = 0
         self.brief = False
+        self.lost = 0
+        self._lag = 0
+        self._answered: int | None = None
         self._lately: deque[int] = deque(maxlen=_FEW)
         self._delay = delay
         self._tolerance = max(latest, _STEP)
@@ -166,6 +180,8 @@ class SenderClock:
         if self._suspects:
             self._suspects.clear()
         self.heard += 1
+        self._lag = lag
+        self._lately.append(lag)
         self._follow(received, lag, expected)
         self.skew = round(self._line) - self._delay - self._base
         return Dated(stamp + self._base, True)
@@ -175,6 +191,38 @@ class SenderClock:
         if stamp <= 0 or self._base is None:
             return received - self._delay
         return min(stamp + self._base + self.skew, received - self._delay)
+
+    @property
+    def late(self) -> int:
+        """By how much (µs) the quickest of the last few messages was later than the line has it."""
+        if self.brief or self._base is None or not self._lately:
+            return 0
+        return max(0, min(self._lately) - round(self._line))
+
+    def answered(self, received: int, asked: int, stamp: int) -> None:
+        """The sender's clock showed ``stamp`` at some time between ``asked`` and ``received`` (ours): an
+        answer to what was asked of it. One that is of another clock than its messages counts for nothing."""
+        if self.brief or self._base is None or not 0 < asked <= received:
+            return
+        if abs(received - stamp - self._lag) > self._tolerance:
+            return
+        self._answered = received
+        received = max(received, self._received)
+        line = self._line + self._rate * (received - self._received)
+        # Dated by that line a message is as old as it would be if the question had taken no time; but the
+        # quickest are no younger than ever.
+        least = min(asked - stamp + self._delay, *self._lately)
+        if least > line:
+            self.lost += round(least - line)
+            self._received, self._line, self._rate = received, float(least), _DRIFT
+            self._forget()
+            self.skew = least - self._delay - self._base
+
+    def _forget(self) -> None:
+        """The lags so far were of another line."""
+        self._pieces.clear()
+        received, lag = self._received, self._lag
+        self._least = _Least(received, received, lag, max(lag - self._line, 0.0))
 
     def _by_arrival(self, received: int) -> Dated:
         if not self._timed:
@@ -193,6 +241,9 @@ class SenderClock:
         self._stamp = self._newest = stamp
         self._repeats, self._repeated = 0, received
         self._suspects.clear()
+        self._answered, self._lag = None, lag
+        self._lately.clear()
+        self._lately.append(lag)
         self._received, self._line, self._rate = received, float(lag), 0.0
         self._pieces.clear()
         self._least = _Least(received, received, lag, 0.0)
@@ -225,7 +276,6 @@ class SenderClock:
     def _follow(self, received: int, lag: int, expected: float) -> None:
         """Keep the line at or below the lags; with every piece, see whether it may be laid higher."""
         if self.brief:
-            self._lately.append(lag)
             self._received, self._line, self._rate = received, float(min(self._lately)), 0.0
             return
         self._received = received = max(received, self._received)
@@ -242,6 +292,10 @@ class SenderClock:
 
     def _raise(self, received: int) -> None:
         pieces = self._pieces
+        if self._answered is not None and received - self._answered <= _ANSWERED:
+            self._rate = _DRIFT
+            self._forget()
+            return
         if len(pieces) == 1:
             # Until then the line lay still; it may have risen since.
             self._line += _DRIFT * (received - pieces[0].received)

@@ -118,6 +118,22 @@ class Track:
             return False
         return self._rewind.put(dated, z)
 
+    @property
+    def late(self) -> int:
+        """By how much (µs) the quickest of the last few messages was later than it should be: of a slow link,
+        or of a slow clock."""
+        return self._clock.late
+
+    @property
+    def clock_lost(self) -> int:
+        """What (µs) the sender's clock has lost, by its own ``answered``."""
+        return self._clock.lost
+
+    def answered(self, received: int, asked: int, stamp: int) -> None:
+        """The sender's clock showed ``stamp`` between ``asked`` and ``received``, both of ours; µs."""
+        if self._config.stamps:
+            self._clock.answered(received, asked, stamp)
+
     def when(self, received: int, stamp: int) -> int:
         """When another message of the same sender was true, µs: one that arrived at ``received`` and left
         with ``stamp``."""

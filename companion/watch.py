@@ -6,6 +6,7 @@ concern's end but by an order; and a sentence for the ground, said when it begin
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from enum import Enum
 from typing import NamedTuple
@@ -39,7 +40,9 @@ class Situation(NamedTuple):
     """What concerns are judged by. ``late``: µs by which this step comes after the last one's due time;
     ``neighbours``: age (µs) by system id; ``holding``: what is flown; ``failing``: since when (µs) no plan
     could be solved, None while they can; ``clock_steps``: how often the autopilot's clock has been set;
-    ``moves``: how often its origin has moved, the last time with the vehicle by ``displaced`` m."""
+    ``moves``: how often its origin has moved, the last time with the vehicle by ``displaced`` m;
+    ``clock_lost``: µs that its clock has lost in all; ``unanswered``: its messages come late, and it does not
+    tell whether that is its clock."""
 
     now: int
     view: View
@@ -52,6 +55,8 @@ class Situation(NamedTuple):
     clock_steps: int
     moves: int = 0
     displaced: float = 0.0
+    clock_lost: int = 0
+    unanswered: bool = False
 
 
 class Change(NamedTuple):
@@ -82,6 +87,7 @@ class Watch:
         self.concerns: dict[str, Concern] = {}
         self._late, self._clock_set, self._origin_moved = _Lately(), _Lately(), _Lately()
         self._clock_steps = self._moves = 0
+        self._lost: deque[tuple[int, int]] = deque()
         self._target_seen = False
 
     def look(self, s: Situation) -> list[Change]:
@@ -109,6 +115,8 @@ class Watch:
             self._fence(s),
             self._lateness(s),
             self._clock(s),
+            self._slow_clock(s),
+            self._late_messages(s),
             self._origin(s),
             *self._others(s),
         ]
@@ -184,6 +192,22 @@ class Watch:
         self._clock_steps = s.clock_steps
         return Concern("clock", "The autopilot's clock has jumped") if jumped else None
 
+    def _slow_clock(self, s: Situation) -> Concern | None:
+        """Over some seconds; what is lost once is but a stall."""
+        lost = self._lost
+        lost.append((s.now, s.clock_lost))
+        while s.now - lost[0][0] > _LOSING:
+            lost.popleft()
+        most = _SLOW if "slow clock" not in self.concerns else 0.25 * _SLOW
+        if s.clock_lost - lost[0][1] <= most * _LOSING or s.phase in _ON_THE_GROUND:
+            return None
+        return Concern("slow clock", "Autopilot's clock is slow: followed")
+
+    def _late_messages(self, s: Situation) -> Concern | None:
+        if not s.unanswered or s.phase in _ON_THE_GROUND:
+            return None
+        return Concern("late messages", "Autopilot is heard late: slow link or clock")
+
     def _origin(self, s: Situation) -> Concern | None:
         moved = self._origin_moved.after(s.now, s.moves != self._moves)
         self._moves = s.moves
@@ -205,3 +229,5 @@ _NEIGHBOUR = "neighbour "
 _ON_THE_GROUND = (Phase.CONNECT, Phase.DONE)
 _REMEMBERED = 5_000_000
 """µs."""
+_SLOW, _LOSING = 0.01, 10_000_000
+"""Share of the time that a clock loses, over so many µs."""

@@ -16,6 +16,7 @@ from companion.neighbours import Neighbours
 from companion.obstacles import FixedObstacles
 from companion.origins import Origins
 from companion.reception import AUTOPILOT
+from companion.round_trips import Answer
 from companion.sensed import Sensed, Stance
 from companion.target import Target
 from companion.tracks import State, Track
@@ -93,7 +94,7 @@ class World:
         self._left: State | None = None
         self._placed = 0
         # Of the tracks in the frames before.
-        self._clock_steps = 0
+        self._clock_steps = self._clock_lost = 0
         self.moves = 0
         """How often the autopilot's origin has moved in flight."""
         self.displaced = 0.0
@@ -141,6 +142,20 @@ class World:
     def simulated(self, value: bool) -> None:
         # The others' clocks follow the same simulation's, each by what it sees of it.
         self._own.brief = self.neighbours.brief = value
+
+    @property
+    def late(self) -> int:
+        """By how much (µs) messages of the own autopilot are later than its clock and link explain."""
+        return self._own.late
+
+    @property
+    def clock_lost(self) -> int:
+        """What (µs) the autopilot's clock has lost against ours, by its own answers."""
+        return self._clock_lost + self._own.clock_lost
+
+    def answered(self, now: int, answer: Answer) -> None:
+        """The own autopilot has told what its clock shows."""
+        self._own.answered(now, *answer)
 
     @property
     def clock_steps(self) -> int:
@@ -233,6 +248,7 @@ class World:
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
                 self._clock_steps += self._own.clock_steps
+                self._clock_lost += self._own.clock_lost
                 # Where the vehicle was in the old frame must not be flown to in the new one.
                 simulated, self._own = self.simulated, Track(self.config.own)
                 self.simulated = simulated

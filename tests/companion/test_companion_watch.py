@@ -118,6 +118,8 @@ LIMITS = {
     ),
     "a late step": ("lateness", {"late": GUARD.late_us}, {"late": GUARD.late_us + 1}, TELL),
     "a jump of the clock": ("clock", {"clock_steps": 0}, {"clock_steps": 1}, TELL),
+    "a clock that loses a percent": ("slow", {"clock_lost": 0}, {"clock_lost": 100_001}, TELL),
+    "late messages": ("late", {}, {"unanswered": True}, TELL),
     "an origin that moved": ("origin", {}, {"moves": 1, "displaced": GUARD.displaced}, TELL),
     "a jump with the origin": (
         "origin",
@@ -147,6 +149,7 @@ def test_a_concern_begins_at_its_limit_is_said_once_and_ends(name):
         vehicle=vehicle(now=60 * SECOND),
         clock_steps=bad.get("clock_steps", 0),
         moves=bad.get("moves", 0),
+        clock_lost=bad.get("clock_lost", 0),
     )
     assert {change.begins for change in watch.look(later)} == {False}
     assert watch.concerns == {}
@@ -158,6 +161,17 @@ def test_on_the_ground_nothing_of_a_flight_concerns_it(phase):
     for _, _, bad, _ in LIMITS.values():
         if "phase" not in bad and not {"late", "clock_steps", "neighbours"} & set(bad):
             assert watch.look(situation(**{**bad, "phase": phase})) == []
+
+
+def test_a_slow_clock_is_said_once_however_its_losses_are_spread():
+    for share, every, said in ((0.06, 0.1, 1), (0.0101, 0.1, 1), (0.05, 7.0, 1), (0.002, 0.1, 0)):
+        watch, begun = Watch(CONFIG), 0
+        for k in range(900):
+            lost = round(1e6 * share * every * (0.1 * k // every))
+            at = SECOND + 100_000 * k
+            changes = watch.look(situation(now=at, vehicle=vehicle(now=at), clock_lost=lost))
+            begun += sum(change.begins for change in changes)
+        assert begun == said
 
 
 # In flight

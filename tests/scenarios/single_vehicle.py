@@ -3,6 +3,7 @@ one, as by another ``outrider fly``."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import count
 from typing import Any, TypeVar
 
@@ -14,7 +15,7 @@ from companion.node import COMPONENT, Companion
 from companion.pilot import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import CommandLong, Message, Source, StatusText
+from mavlink_bridge.messages import CommandLong, Message, Source, StatusText, Timesync
 from mavlink_bridge.node import Datagram
 from sitl.autopilot_config import AutopilotConfig
 from sitl.node import Autopilot
@@ -30,17 +31,26 @@ M = TypeVar("M", bound=Message)
 
 
 class SingleVehicle:
-    """``heard``: what the autopilot said, ``sent``: what the companion did, with its time (µs) and link."""
+    """``heard``: what the autopilot said, ``sent``: what the companion did, with its time (µs) and link.
+    ``pace``: how much time (µs) has passed for the vehicle when so much has for the companion."""
 
-    def __init__(self, flavour: str, settings: dict[str, Any] | None = None, **vehicle: Any) -> None:
+    def __init__(
+        self,
+        flavour: str,
+        settings: dict[str, Any] | None = None,
+        pace: Callable[[int], int] = lambda passed: passed,
+        **vehicle: Any,
+    ) -> None:
         place = {"latitude": SITE.latitude, "longitude": SITE.longitude, "altitude": SITE.altitude}
         config = AutopilotConfig(**{"system_id": SYSTEM, "flavour": flavour, **place, **vehicle})
         self.autopilot = Autopilot(config, FIREFLY, SITE, seed=1)
         self.config = CompanionConfig.model_validate({**SETTINGS, **(settings or {})})
-        self.now = BOOT
+        self.now, self._pace = BOOT, pace
         self.heard: list[tuple[int, Message]] = []
         self.sent: list[tuple[int, str, Message]] = []
-        self._codec, self._writer = Codec(), Codec()
+        self._codec, self._reader, self._writer = Codec(), Codec(), Codec()
+        self.timeless = False
+        """Whether no question for the time reaches the autopilot."""
         self.companion = self._companion()
         self._down: list[Datagram] = []
 
@@ -68,8 +78,8 @@ class SingleVehicle:
         return [m.text for _, link, m in self.sent if link == "ground" and isinstance(m, StatusText)]
 
     def step(self, *orders: Message) -> None:
-        up = [datagram for datagram in self._down if datagram.link == "autopilot"]
-        inbox = self.autopilot.step(self.now, up)
+        up = [Datagram(link, self._kept(data)) for link, data in self._down if link == "autopilot"]
+        inbox = self.autopilot.step(BOOT + self._pace(self.now - BOOT), up)
         for datagram in inbox:
             self.heard += [(self.now, message) for message in self._codec.feed(datagram.data)]
         if orders:
@@ -78,6 +88,12 @@ class SingleVehicle:
         for link, data in self._down:
             self.sent += [(self.now, link, message) for message in self._codec.feed(data)]
         self.now += TICK
+
+    def _kept(self, data: bytes) -> bytes:
+        if not self.timeless:
+            return data
+        messages = [message for message in self._reader.feed(data) if not isinstance(message, Timesync)]
+        return b"".join(map(self._writer.encode, messages))
 
     def order(self, command: int, *params: float) -> None:
         """COMMAND_LONG to the companion, from the ground."""
