@@ -22,7 +22,7 @@ class Calls:
     words."""
 
     def __init__(self, own: Source) -> None:
-        self._own = own
+        self.own = self._own = own
         self.refusals: deque[str] = deque(maxlen=_REFUSALS)
         self.refused = 0
         """How many refusals there were; one that is but repeated counts once."""

@@ -33,7 +33,8 @@ class _Asking(Onlooker):
         """Requests for messages alone."""
         super().step(now, view)
         self.lacking = self._readiness.missing(view, go=self._height is not None)
-        return self._readiness.requests(now)
+        wishes = self._readiness.wishes(now) if self._readiness.heard else []
+        return [*self._readiness.requests(now), *wishes]
 
 
 class DryRun(Understudy):

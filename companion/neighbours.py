@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.config import CompanionConfig
+from companion.doubts import Doubts
 from companion.earshot import Ages, Earshot
 from companion.estimator import Measured
 from companion.familiars import Familiars
@@ -24,6 +25,7 @@ from companion.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.plan_clock import PlanClock
 from companion.reception import AUTOPILOT
 from companion.tracks import State, Track, measured
+from mavlink_bridge.doubt_wire import PAYLOAD_TYPE as DOUBT
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition, Tunnel
@@ -87,6 +89,7 @@ class Neighbours:
         self._things = {one.system for one in config.moving}
         self.earshot = Earshot(config)
         self._familiars = Familiars()
+        self._doubts = Doubts()
 
     @property
     def brief(self) -> bool:
@@ -136,12 +139,16 @@ class Neighbours:
         self._familiars.note(now, self._rows[system], track)
 
     def hear_plan(self, now: int, message: Tunnel) -> None:
-        """A neighbour's horizon in a TUNNEL. One in another fleet frame, from the future or from long ago is
-        refused, unless it is the sender's clock that is wrong."""
+        """What a neighbour tells in a TUNNEL: its horizon, or how far it may be from where it says that it
+        is. A horizon in another fleet frame, from the future or from long ago is refused, unless it is the
+        sender's clock that is wrong."""
         system = message.source.system
-        if system == self._system or message.payload_type != PAYLOAD_TYPE:
+        if system == self._system or message.payload_type not in (PAYLOAD_TYPE, DOUBT):
             return
         try:
+            if message.payload_type == DOUBT:
+                self._doubts.hear(now, system, message.payload)
+                return
             origin, horizon = _read(message.payload)
         except PlanWireError:
             self.refused_plans += 1
@@ -180,7 +187,7 @@ class Neighbours:
         """Whose word counts for a while, as of vehicles that fly by plans and limits like ours."""
         plans = self._table.at(self._ids, self._times)
         trusted = self._familiars.trusted(self.earshot.now, self._states, plans)
-        for system in self._things:
+        for system in self._things | self._doubts.systems(self.earshot.now):
             if system in self._rows:
                 trusted[self._rows[system]] = False
         return trusted
@@ -200,9 +207,10 @@ class Neighbours:
         self._put_down()
         age = now - self._times
         ids, states, times, since = self._ids, self._states, self._times, now - self._arrivals
+        doubtful = self._doubts.systems(now)
         if places is not None and ids:
             near = self.earshot.near(places, states, age)
-            for system in self._things:
+            for system in self._things | doubtful:
                 if system in self._rows:
                     near[self._rows[system]] = True
             if not near.all():
@@ -237,9 +245,12 @@ class Neighbours:
                 positions[moving] += ahead[:, None] * states[moving, None, 3:6]
         count = len(ids)
         found = Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count], self._margin[:count])
+        further[trusted] = 0.0
+        if doubtful:
+            # Plans, too, lead from where it believes to be.
+            further += self._doubts.radii(ids)
         if not further.any():
             return found
-        further[trusted] = 0.0
         return found._replace(
             d_min=found.d_min + further, d_safe=found.d_safe + further, radius=found.radius + further
         )

@@ -165,13 +165,16 @@ class Companion:
             return self._encode(ground=answers)
         view = self.world.at(now)
         commands = self.pilot.step(now, view)
+        self.world.doubt = self.pilot.vehicle.positioning.radius
         asked = self._round_trips.due(now, self.world.late)
         self._look(now, view)
         self._aims.forget(view)
         self._planning.fly(now, view, cautious=self.watch.blinkered)
         setpoints = self._setpoints(now, view)
         certified = self._certified
-        shared = self._sharing.due(now, view, self.guard.horizon if certified is None else None)
+        shared = self._sharing.due(
+            now, view, self.guard.horizon if certified is None else None, self.world.doubt
+        )
         leaving = self.pilot.phase in (Phase.LAND, Phase.DONE)
         told = [] if certified is None else certified.messages(now, farewell=leaving)
         said = self._said(now)

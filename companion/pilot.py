@@ -115,6 +115,7 @@ class Pilot:
         """A message of the own autopilot."""
         if isinstance(message, CommandAck):
             self._calls.hear(message)
+            self._readiness.hear(message)
         else:
             self.vehicle.hear(message)
 
@@ -206,6 +207,11 @@ class Pilot:
     def step(self, now: int, view: View) -> list[Message]:
         """Commands to send now."""
         self.vehicle.tick(now)
+        commands = self._act(now, view)
+        connected = self.phase is not Phase.CONNECT or self._readiness.heard
+        return [*commands, *self._readiness.wishes(now)] if connected else commands
+
+    def _act(self, now: int, view: View) -> list[Message]:
         if self.phase in STEERED:
             self._keep(now)
         if self.phase is Phase.SETTLE:
@@ -281,6 +287,7 @@ class Pilot:
         self.phase, self._owner, self._settling_since = Phase.CONNECT, Owner.OURS, None
         self._height = None
         self._calls.forget()
+        self._readiness.forget()
 
     def _settle(self, now: int, view: View) -> None:
         """Land without settling when that cannot go on: blind, or too long."""

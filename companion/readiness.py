@@ -7,11 +7,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from companion.autopilots import Params
 from companion.calls import DO_SET_MODE, Calls
 from companion.config import CompanionConfig
 from companion.vehicle import UNDEFINED, Vehicle
 from companion.world import View
-from mavlink_bridge.messages import Message
+from mavlink_bridge.messages import CommandAck, Message
 
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
 OPERATORS_GO = "the operator's go"
@@ -23,10 +24,16 @@ _FAR = 20_000.0
 STREAMS: Mapping[int, int] = MappingProxyType({32: 20_000, 30: 100_000, 1: 1_000_000, 245: 500_000})
 """Message ids and intervals (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
 EXTENDED_SYS_STATE. The attitude tells only where the nose points when the set-points begin."""
-_NEEDED = tuple(
-    (SET_MESSAGE_INTERVAL, (float(identifier), float(interval), 0.0, 0.0, 0.0, 0.0, 0.0))
-    for identifier, interval in STREAMS.items()
-)
+GPS_RAW, HEALTH = 24, 500_000
+"""GPS_RAW_INT, and the interval (µs) of that and of the message in which the estimator tells how it is. No
+start waits for them: a vehicle may have neither."""
+
+
+def _interval(message: int, interval: int) -> tuple[int, Params]:
+    return SET_MESSAGE_INTERVAL, (float(message), float(interval), 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+_NEEDED = tuple(_interval(message, interval) for message, interval in STREAMS.items())
 
 
 class Readiness:
@@ -36,6 +43,30 @@ class Readiness:
         self._config = config
         self._vehicle = vehicle
         self._calls = calls
+        self._wishes = Calls(calls.own)
+
+    def hear(self, ack: CommandAck) -> None:
+        """An answer of the autopilot."""
+        self._wishes.hear(ack)
+
+    def forget(self) -> None:
+        """Nothing was asked or answered."""
+        self._wishes.forget()
+
+    @property
+    def heard(self) -> bool:
+        """Whether all that is needed was answered."""
+        return all(self._calls.answered(*call) for call in _NEEDED)
+
+    def wishes(self, now: int) -> list[Message]:
+        """For messages that tell how well the vehicle knows where it is; later than for those that are
+        needed, as an answer names the command alone."""
+        profile = self._vehicle.profile
+        if profile is None or not self._vehicle.alive:
+            return []
+        wanted = [_interval(message, HEALTH) for message in (GPS_RAW, profile.estimator_message)]
+        open_ = [call for call in wanted if not self._wishes.answered(*call)]
+        return self._wishes.call(now, *open_[0]) if open_ else []
 
     def unseen(self, view: View) -> str:
         """What has not been heard that every plan needs."""
@@ -66,7 +97,7 @@ class Readiness:
             return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
         if not vehicle.healthy:
             return f"the autopilot's pre-arm checks{self._starving()}"
-        if not all(self._calls.answered(*call) for call in _NEEDED):
+        if not self.heard:
             return "the autopilot's answers to SET_MESSAGE_INTERVAL"
         return "" if go else OPERATORS_GO
 

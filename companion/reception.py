@@ -14,7 +14,7 @@ _DISTANCES, _TRAFFIC = 330, 246
 _WHERE = {33, 385}
 """What a neighbour says of where it is and will be: not decoded while it is out of earshot."""
 _WANTED = {
-    "autopilot": {0, 1, 30, 32, 49, 77, 111, 245, 253},
+    "autopilot": {0, 1, 24, 30, 32, 49, 77, 111, 193, 230, 245, 253},
     "swarm": {33, 111, 385},
     "ground": {75, 76},
 }

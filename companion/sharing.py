@@ -11,6 +11,8 @@ from typing import NamedTuple
 from companion.config import CompanionConfig
 from companion.horizon import Array, Horizon
 from companion.world import View
+from mavlink_bridge.doubt_wire import PAYLOAD_TYPE as DOUBT
+from mavlink_bridge.doubt_wire import pack as pack_doubt
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, enu_to_ned, yaw_to_ned
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, Source, Tunnel
@@ -18,6 +20,8 @@ from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
 
 ONBOARD_CONTROLLER, AUTOPILOT_INVALID, ACTIVE = 18, 8, 4
 _SECOND = 1_000_000
+_TAKES_BACK = 3_000_000
+"""µs for which it is said that there is no doubt any more."""
 
 
 class Shared(NamedTuple):
@@ -36,14 +40,16 @@ class Sharing:
         self._fleet = fleet
         self._boot: int | None = None
         self._next = [0, 0, 0]
+        self._doubted: int | None = None
 
     @property
     def next_due(self) -> int:
         """When (µs) there is something to share again."""
         return min(self._next)
 
-    def due(self, now: int, view: View, horizon: Horizon | None) -> Shared:
-        """What is due at ``now`` (µs). Without a flown ``horizon`` none is shared."""
+    def due(self, now: int, view: View, horizon: Horizon | None, doubt: float = 0.0) -> Shared:
+        """What is due at ``now`` (µs). Without a flown ``horizon`` none is shared. ``doubt``: how far (m) the
+        vehicle may be from where it says that it is."""
         if self._boot is None:
             self._boot = now
             self._next = [now, now, now]
@@ -56,6 +62,11 @@ class Sharing:
         fresh = view.own is not None and view.own.age <= self._config.guard.own_stale_us
         if self._passes(1, now, rates.state_us) and fresh:
             shared.swarm.append(self._position(now - self._boot, view))
+            if doubt > 0.0:
+                self._doubted = now
+            if self._doubted is not None and now - self._doubted <= _TAKES_BACK:
+                # GLOBAL_POSITION_INT has no field for it.
+                shared.swarm.append(Tunnel(self._own, 0, 0, DOUBT, pack_doubt(doubt)))
         if self._passes(2, now, rates.plan_us) and horizon is not None and self._config.shares_plan:
             plan = plan_message(horizon, self._own, self._fleet)
             if plan is not None:

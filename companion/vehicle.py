@@ -6,7 +6,17 @@ from collections import deque
 
 from companion.autopilots import Profile, is_guided
 from companion.autopilots.known import profile_of
-from mavlink_bridge.messages import ExtendedSysState, Heartbeat, Message, StatusText, SysStatus
+from companion.positioning import Positioning
+from mavlink_bridge.messages import (
+    EkfStatus,
+    EstimatorStatus,
+    ExtendedSysState,
+    GpsRaw,
+    Heartbeat,
+    Message,
+    StatusText,
+    SysStatus,
+)
 
 WARNING = 4
 """MAV_SEVERITY."""
@@ -32,6 +42,7 @@ class Vehicle:
         """What it said last, of any severity; ``told`` counts all of it."""
         self.told = 0
         self.status: SysStatus | None = None
+        self.positioning = Positioning()
         self._extended: ExtendedSysState | None = None
         self._beaten: Heartbeat | None = None
         self._extended_seen: ExtendedSysState | None = None
@@ -47,6 +58,8 @@ class Vehicle:
             self.status = message
         elif isinstance(message, ExtendedSysState):
             self._extended = message
+        elif isinstance(message, GpsRaw | EkfStatus | EstimatorStatus):
+            self.positioning.hear(message)
         elif isinstance(message, StatusText):
             self.texts.append(message)
             self.told += 1
@@ -56,6 +69,7 @@ class Vehicle:
     def tick(self, now: int) -> None:
         """It is ``now`` (µs)."""
         self.now = now
+        self.positioning.tick(now)
         if self.heartbeat is not self._beaten:
             self._beaten, self._beat_at = self.heartbeat, now
         if self._extended is not self._extended_seen:

@@ -100,14 +100,16 @@ class Watch:
 
     @property
     def blinkered(self) -> bool:
-        """Whether what it knows of the others may be old, or what it does late."""
-        return "lateness" in self.concerns or any(name.startswith(_NEIGHBOUR) for name in self.concerns)
+        """Whether what it knows of the others, or of itself, may be old, or what it does late."""
+        vague = "lateness" in self.concerns or "positioning" in self.concerns
+        return vague or any(name.startswith(_NEIGHBOUR) for name in self.concerns)
 
     # Each: a concern, or nothing
 
     def _judge(self, s: Situation) -> list[Concern]:
         found = [
             self._own(s),
+            self._positioning(s),
             self._target(s),
             self._solver(s),
             self._battery(s),
@@ -129,6 +131,12 @@ class Watch:
         lost = age > guard.own_lost_us
         text = "Own position is lost: landing" if lost else "Own position is old: braking"
         return Concern(f"own state {lost}", text, Reaction.LAND if lost else Reaction.TELL)
+
+    def _positioning(self, s: Situation) -> Concern | None:
+        trouble = s.vehicle.positioning.trouble
+        if not trouble or s.phase in _ON_THE_GROUND:
+            return None
+        return Concern("positioning", f"{trouble}: dead reckoning", severity=Severity.CRITICAL)
 
     def _target(self, s: Situation) -> Concern | None:
         if s.view.target is not None:

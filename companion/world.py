@@ -99,6 +99,8 @@ class World:
         """How often the autopilot's origin has moved in flight."""
         self.displaced = 0.0
         """m by which the last of these moved the vehicle itself in the fleet's frame; it should not have."""
+        self.doubt = 0.0
+        """How far (m) the own vehicle may be from where it says that it is, beyond what is usual."""
         self.stamp = 0
         """The last time (µs since its boot) that the own autopilot told, 0 before the first."""
 
@@ -196,6 +198,13 @@ class World:
             )
         if config.proximity is not None or config.traffic is not None:
             obstacles = obstacles.joined(self.sensed.obstacles(now, prediction, self._reach))
+        if self.doubt:
+            further = self.doubt
+            obstacles = obstacles._replace(
+                d_min=obstacles.d_min + further,
+                d_safe=obstacles.d_safe + further,
+                radius=obstacles.radius + further,
+            )
         return obstacles
 
     def _hear_distances(self, now: int, message: ObstacleDistance) -> None:

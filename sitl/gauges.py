@@ -88,6 +88,8 @@ class Gauges:
             flavour.echoes_yaw,
             plant.sensors.gps.located,
             plant.sensors.gps.fixed,
+            plant.sensors.gps.strain,
+            plant.sensors.gps.spread,
             plant.sensors.silent(now),
             self._waking(),
             self._home,

@@ -37,7 +37,9 @@ class Positioning:
 
     ``position`` and ``velocity`` (m, m/s, local NED) are that error; ``located``: whether the filter says
     that it has a position; ``fixed``: whether there is GPS; ``resets`` counts the jumps of the estimate;
-    ``nominal``: all of this is as if nothing had ever happened, until something does.
+    ``nominal``: all of this is as if nothing had ever happened, until something does. ``strain``: innovation
+    of a position over its gate; from 1 on GPS is refused. ``spread``: σ (m) of what coasting has added so
+    far, as the filter itself sees it.
     """
 
     def __init__(self, patience: float, dt: float, random: np.random.Generator) -> None:
@@ -50,7 +52,7 @@ class Positioning:
         self._drift = (0.0, 0.0)
         self._speed = (0.0, 0.0)
         self._push = (0.0, 0.0)
-        self._coasted = self._refused = 0.0
+        self._coasted = self._refused = self._gap = 0.0
         self.fixed = True
         self.located = True
         self.nominal = True
@@ -64,6 +66,14 @@ class Positioning:
     @property
     def velocity(self) -> Vector:
         return self._speed[0], self._speed[1], 0.0
+
+    @property
+    def strain(self) -> float:
+        return 0.0 if self.nominal or self._goes else self._gap / _GATE
+
+    @property
+    def spread(self) -> float:
+        return 0.0 if self.fixed else 0.5 * _COASTING * self._coasted**2
 
     # What happens to GPS, from the next step on
 
@@ -122,7 +132,7 @@ class Positioning:
     def _follow(self) -> None:
         """Go after GPS, or refuse to."""
         (gx, gy, gz), (x, y, z) = self._target, self._offset
-        gap = math.hypot(gx - x, gy - y, gz - z)
+        self._gap = gap = math.hypot(gx - x, gy - y, gz - z)
         if gap > _GATE:
             self._refused += self._dt
             if self._refused >= _GIVES_IN:
@@ -138,5 +148,5 @@ class Positioning:
     def _reset(self) -> None:
         self._offset = self._target
         self._drift = self._speed = (0.0, 0.0)
-        self._refused = 0.0
+        self._refused = self._gap = 0.0
         self.resets += 1

@@ -65,12 +65,15 @@ _EKF_READY: Final = 0x1 | 0x2 | 0x4 | 0x8 | 0x10 | 0x20 | 0x100 | 0x200
 _EKF_WAITING: Final = 0x1 | 0x80 | 0x400
 # Without GPS for too long: attitude, vertical velocity and height by barometer, constant position assumed.
 _EKF_LOST: Final = 0x1 | 0x4 | 0x20 | 0x80
+# Innovation over gate of a filter that is well.
+_TESTED: Final = 0.05
 
 
 class Snapshot(NamedTuple):
     """All that a message may tell. ``time`` since boot (µs); ``base_mode`` with the armed bit; ``target``
     gives the set-point that is followed now, None when there is none. ``located``: the estimator has a
-    position or waits for its first; ``fixed``: there is GPS; ``silent``: position messages fail to come.
+    position or waits for its first; ``fixed``: there is GPS; ``strain``, ``spread``: those of
+    ``Positioning``; ``silent``: position messages fail to come.
     ``waking`` 0…1: how far GPS and filter have come up, if that is shown; ``charge`` None without a battery;
     ``throttle`` 0…1; ``unbreached``: MAV_SYS_STATUS_GEOFENCE where it is told; ``epoch``: Unix time of the
     boot (µs), 0 if nobody knows; ``version`` is what AUTOPILOT_VERSION says; ``mission`` gives
@@ -92,6 +95,8 @@ class Snapshot(NamedTuple):
     echoes_yaw: bool
     located: bool
     fixed: bool
+    strain: float
+    spread: float
     silent: bool
     waking: float
     home: Home
@@ -172,7 +177,8 @@ def position_target(s: Snapshot) -> Message | None:
 
 
 def ekf_status(s: Snapshot) -> Message:
-    return EkfStatus(s.source, estimator_flags(s))
+    good = _TESTED if s.located else 0.0
+    return EkfStatus(s.source, estimator_flags(s), good, max(good, s.strain), _TESTED, _TESTED)
 
 
 def estimator_flags(s: Snapshot) -> int:

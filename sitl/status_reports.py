@@ -108,8 +108,9 @@ def fence_status(s: Snapshot) -> Message:
 
 def estimator_status(s: Snapshot) -> Message:
     good = 0.05 if s.located else _NAN
-    ratios = good, good, 0.05, 0.05, _NAN, _NAN
-    return EstimatorStatus(s.source, s.time, *ratios, 0.3, 0.3, estimator_flags(s))
+    # Its ratios are squares.
+    ratios = good, max(good, s.strain**2), 0.05, 0.05, _NAN, _NAN
+    return EstimatorStatus(s.source, s.time, *ratios, 0.3 + s.spread, 0.3, estimator_flags(s))
 
 
 def home(s: Snapshot) -> Message | None:

@@ -20,8 +20,8 @@ class Step(Enum):
 
 
 class Profile(NamedTuple):
-    """An autopilot's ways. ``mode_params`` are p1…p3 of DO_SET_MODE; ``setpoint_mask`` is the type_mask to
-    send.
+    """An autopilot's ways. ``estimator_message``: the id of the one by which its estimator tells how it is.
+    ``mode_params`` are p1…p3 of DO_SET_MODE; ``setpoint_mask`` is the type_mask to send.
 
     ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer, in the mode ``guided_name``.
     ``streams_first``: set-points must flow before the mode is granted, and before its checks pass in it.
@@ -34,6 +34,7 @@ class Profile(NamedTuple):
 
     name: str
     autopilot: int
+    estimator_message: int
     steps: tuple[Step, ...]
     mode_params: tuple[float, float, float]
     guided_custom_mode: int

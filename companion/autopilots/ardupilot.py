@@ -8,6 +8,7 @@ from companion.autopilots import Profile, Step
 ARDUPILOT = Profile(
     name="ArduPilot",
     autopilot=3,
+    estimator_message=193,
     steps=(Step.MODE, Step.ARM, Step.TAKEOFF),
     mode_params=(1.0, 4.0, 0.0),
     guided_custom_mode=4,

@@ -9,6 +9,7 @@ _HOLD = 4 << 16 | 3 << 24
 PX4 = Profile(
     name="PX4",
     autopilot=12,
+    estimator_message=230,
     steps=(Step.ARM, Step.TAKEOFF, Step.MODE),
     mode_params=(1.0, 6.0, 0.0),
     guided_custom_mode=6 << 16,

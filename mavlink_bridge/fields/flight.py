@@ -285,11 +285,11 @@ def timesync(s: m.Source, f: Fields) -> m.Timesync:
 
 
 def ekf_status(s: m.Source, f: Fields) -> m.EkfStatus:
-    return m.EkfStatus(s, f[5])
+    return m.EkfStatus(s, f[5], *f[:4])
 
 
 def ekf_status_fields(x: m.EkfStatus) -> Fields:
-    return 0.0, 0.0, 0.0, 0.0, 0.0, x.flags, 0.0
+    return x.velocity, x.horizontal, x.vertical, x.magnetic, 0.0, x.flags, 0.0
 
 
 def extended_sys_state(s: m.Source, f: Fields) -> m.ExtendedSysState:

@@ -223,10 +223,15 @@ class FenceStatus(NamedTuple):
 
 
 class EkfStatus(NamedTuple):
-    """EKF_STATUS_REPORT (193, ardupilotmega): bit mask of ESTIMATOR flags."""
+    """EKF_STATUS_REPORT (193, ardupilotmega): bit mask of ESTIMATOR flags; ratios of innovations to their
+    gates (below 1 is good)."""
 
     source: Source
     flags: int
+    velocity: float = 0.0
+    horizontal: float = 0.0
+    vertical: float = 0.0
+    magnetic: float = 0.0
 
 
 class ExtendedSysState(NamedTuple):

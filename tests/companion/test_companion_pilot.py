@@ -171,7 +171,8 @@ def test_every_stream_is_asked_for_until_the_autopilot_has_heard_it(seed):
         arrived = [call for call in new if lossy.random() > 0.5]
         heard |= {params[0] for command, params in arrived if command == INTERVAL}
         answers = [ack(command) for command, _ in arrived if lossy.random() > 0.33]
-    assert heard == {32.0, 30.0, 1.0, 245.0}
+    # And then for what tells how well it knows its place.
+    assert heard == {32.0, 30.0, 1.0, 245.0, 24.0, 193.0}
 
 
 def test_an_autopilot_that_answers_no_request_is_asked_for_every_stream():

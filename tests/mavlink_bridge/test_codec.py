@@ -96,7 +96,7 @@ KINDS: dict[type[m.Message], st.SearchStrategy[Any]] = {
         m.PositionTarget, source, boot, u8, u16, vector(f32), vector(f32), vector(f32), f32, f32
     ),
     m.Timesync: st.builds(m.Timesync, source, signed(64), signed(64)),
-    m.EkfStatus: st.builds(m.EkfStatus, source, u16),
+    m.EkfStatus: st.builds(m.EkfStatus, source, u16, f32, f32, f32, f32),
     m.ExtendedSysState: st.builds(m.ExtendedSysState, source, u8, u8),
     m.StatusText: st.builds(m.StatusText, source, u8, text),
     m.Tunnel: st.builds(m.Tunnel, source, u8, u8, u16, st.binary(max_size=128)),

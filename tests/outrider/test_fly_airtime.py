@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from companion_bench import TARGET, Bench, seen_at
@@ -12,7 +13,7 @@ from said import Run
 from shipped import FIREFLY
 
 from companion.pilot import Phase
-from companion.readiness import STREAMS
+from companion.readiness import GPS_RAW, HEALTH, STREAMS
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key
@@ -42,6 +43,7 @@ FAST = FlyConfig(system=1, target=100, origin=HERE)
 RADIO = FlyConfig(system=1, target=100, origin=HERE, radio=57600)
 KEY = Key(b"k" * 32)
 SECONDS = 8
+Flavour = Literal["ardupilot", "px4"]
 
 
 def weighed(bench: Bench, link: str) -> list[int]:
@@ -145,15 +147,19 @@ def test_what_has_no_baud_rate_is_not_doubted() -> None:
 
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["plain", "signed"])
-def test_what_an_autopilot_says_is_what_is_stated(key: Key | None) -> None:
+@pytest.mark.parametrize(("flavour", "estimator"), [("ardupilot", 193), ("px4", 230)])
+def test_what_an_autopilot_says_is_what_is_stated(flavour: Flavour, estimator: int, key: Key | None) -> None:
     """The emulated one, asked as a companion asks."""
-    config = AutopilotConfig(system_id=1, latitude=47.4, longitude=8.5, altitude=500.0, start_height=20.0)
+    config = AutopilotConfig(
+        system_id=1, flavour=flavour, latitude=47.4, longitude=8.5, altitude=500.0, start_height=20.0
+    )
     signing = None if key is None else Signing(key)
     autopilot = Autopilot(config, FIREFLY, FleetFrame(47.4, 8.5, 500.0), 1, signing=signing)
     asking = Codec(None, None if key is None else Signing(key))
+    wanted = {**STREAMS, GPS_RAW: HEALTH, estimator: HEALTH}
     wishes = [
         CommandLong(Source(1, 195), 1, 1, 511, 0, (float(number), float(each), 0.0, 0.0, 0.0, 0.0, 0.0))
-        for number, each in STREAMS.items()
+        for number, each in wanted.items()
     ]
     autopilot.step(0, [Datagram("autopilot", asking.encode(wish)) for wish in wishes])
     sizes: Counter[int] = Counter()
@@ -164,7 +170,7 @@ def test_what_an_autopilot_says_is_what_is_stated(key: Key | None) -> None:
                 size = 12 + data[1] + (13 if data[2] & 1 else 0)
                 sizes[int.from_bytes(data[7:10], "little")] += size
                 data = data[size:]
-    counted = sum(sizes[number] for number in (0, *STREAMS))
+    counted = sum(sizes[number] for number in (0, *wanted))
     stated = SECONDS * told(key is not None)
     # Zeros at a message's end are left out, and the time may begin and end with one of each kind.
     assert 0.97 * stated < counted <= stated + 300

@@ -6,14 +6,16 @@ from __future__ import annotations
 from typing import Final
 
 from companion.config import CompanionConfig
-from companion.readiness import STREAMS
+from companion.readiness import HEALTH, STREAMS
 from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.endpoints import BAUD_RATES, Endpoint, Serial
 from mavlink_bridge.messages import (
     Attitude,
+    EstimatorStatus,
     ExtendedSysState,
     GlobalPosition,
+    GpsRaw,
     Heartbeat,
     LocalPosition,
     Message,
@@ -47,6 +49,11 @@ _TOLD: Final[dict[int, Message]] = {
     32: LocalPosition(_ONE, 1, _ANY, _ANY),
     245: ExtendedSysState(_ONE, 1, 1),
 }
+_HEALTH: Final[tuple[Message, ...]] = (
+    GpsRaw(_ONE, 1, 3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 9, 1.0, 1.0, 1.0, 1.0),
+    EstimatorStatus(_ONE, 1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1),
+)
+"""What its estimator says is shorter where it is an ArduPilot."""
 _USB: Final = "ttyACM"
 """A device whose baud rate is a number without a meaning."""
 
@@ -101,7 +108,8 @@ def steered(config: CompanionConfig, signed: bool) -> float:
 def told(signed: bool) -> float:
     """Bytes a second that an autopilot says: what it is asked for, and its heartbeat."""
     streams = sum(_size(_TOLD[number], signed) * _SECOND / each for number, each in STREAMS.items())
-    return streams + _size(_BEAT, signed)
+    health = sum(_size(message, signed) for message in _HEALTH) * _SECOND / HEALTH
+    return streams + health + _size(_BEAT, signed)
 
 
 def doubts_of_autopilot(endpoint: Endpoint, config: CompanionConfig, signed: bool, *, dry_run: bool) -> str:
