@@ -15,6 +15,7 @@ from companion.calls import DO_SET_MODE, Calls
 from companion.config import CompanionConfig
 from companion.custody import Custody, Owner, Passage
 from companion.horizon import Array
+from companion.landing import Landing, landed
 from companion.readiness import Readiness
 from companion.takeoff import NAV_TAKEOFF, Takeoff
 from companion.vehicle import Vehicle
@@ -62,6 +63,9 @@ class Pilot:
         self.waiting_for = "a heartbeat of the autopilot"
         self._settling_since: int | None = None
         self._landed_at: int | None = None
+        self._returning = False
+        self.landing: Landing | None = None
+        """Where it has landed; None before."""
         self._height: float | None = None
         self._go_at: int | None = None
         self._passage = Passage(0)
@@ -123,7 +127,7 @@ class Pilot:
         """The operator's go: climb to ``height`` metres above the start, or take over where it flies already;
         on the way back, or while it holds, go on with the escort. Whether it is taken."""
         if self.phase in (Phase.HOLD, Phase.RETURN, Phase.ESCORT):
-            self.phase = Phase.ESCORT
+            self.phase, self._returning = Phase.ESCORT, False
             return True
         if self.phase not in (Phase.CONNECT, Phase.PREPARE, Phase.YIELDED) or not 0.5 <= height <= 120.0:
             return False
@@ -143,13 +147,13 @@ class Pilot:
     def hold(self) -> bool:
         """The operator's order to stay where it is. Whether it is taken."""
         if self.phase in (Phase.ESCORT, Phase.RETURN):
-            self.phase = Phase.HOLD
+            self.phase, self._returning = Phase.HOLD, False
         return self.phase is Phase.HOLD
 
     def come_back(self) -> bool:
         """The operator's order to fly to where it started, and to land there. Whether it is taken."""
         if self.phase in (Phase.ESCORT, Phase.HOLD):
-            self.phase = Phase.RETURN
+            self.phase, self._returning = Phase.RETURN, True
         return self.phase in (Phase.RETURN, Phase.SETTLE, Phase.LAND)
 
     def streamed(self, now: int) -> None:
@@ -167,6 +171,8 @@ class Pilot:
         somebody else has, nor for one in the air that is not as we would leave it, nor for one that is not
         heard, but that a go is taken back."""
         if self.phase in STEERED:
+            # Where it is, from now on, if it was still on its way.
+            self._returning = self._returning and self.phase is not Phase.RETURN
             self.phase = Phase.SETTLE
         elif self.phase is Phase.PREPARE:
             self._alight()
@@ -228,14 +234,14 @@ class Pilot:
             return self._connect(now, view)
         if self.phase is Phase.PREPARE:
             return self._prepare(now, view)
-        return self._land(now) if self.phase is Phase.LAND else []
+        return self._land(now, view) if self.phase is Phase.LAND else []
 
-    def _land(self, now: int) -> list[Message]:
+    def _land(self, now: int, view: View) -> list[Message]:
         """Told once: an autopilot that lands and then does something else was told so by somebody. And not
         unheard: a pilot may have it."""
         vehicle, profile = self.vehicle, self.profile
         if vehicle.heartbeat is not None and not vehicle.armed:
-            return self._leave(now) if vehicle.beat_at - self._arming > _ARMS else []
+            return self._leave(now, view) if vehicle.beat_at - self._arming > _ARMS else []
         if not vehicle.alive:
             return []
         if profile is not None and vehicle.flies:
@@ -248,13 +254,15 @@ class Pilot:
             return []
         return self._calls.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
 
-    def _leave(self, now: int) -> list[Message]:
+    def _leave(self, now: int, view: View) -> list[Message]:
         """Disarmed. PX4 is then in the mode in which it was steered, where its checks before the next flight
         fail: it is asked for another one, unless somebody has chosen one already."""
         vehicle, profile = self.vehicle, self.profile
         if self._landed_at is None:
             self._landed_at = now
             self._calls.forget()
+            doubt, returning = vehicle.positioning.radius, self._returning
+            self.landing = landed(self._config, self.start, view.own, doubt, returning=returning)
         if profile is not None and profile.streams_first and now - self._landed_at <= _LEAVES:
             if not vehicle.alive:
                 return []
@@ -285,6 +293,7 @@ class Pilot:
     def _start_anew(self) -> None:
         """As at the beginning: a new go is needed."""
         self.phase, self._owner, self._settling_since = Phase.CONNECT, Owner.OURS, None
+        self._returning = False
         self._height = None
         self._calls.forget()
         self._readiness.forget()

@@ -15,7 +15,7 @@ from companion.node import COMPONENT, Companion
 from companion.pilot import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import CommandLong, Message, Source, StatusText, Timesync
+from mavlink_bridge.messages import CommandLong, LocalPosition, Message, Source, StatusText, Timesync
 from mavlink_bridge.node import Datagram
 from sitl.autopilot_config import AutopilotConfig
 from sitl.node import Autopilot
@@ -51,6 +51,8 @@ class SingleVehicle:
         self._codec, self._reader, self._writer = Codec(), Codec(), Codec()
         self.timeless = False
         """Whether no question for the time reaches the autopilot."""
+        self.mute = False
+        """Whether nothing that it says of its place reaches the companion."""
         self.companion = self._companion()
         self._down: list[Datagram] = []
 
@@ -78,10 +80,14 @@ class SingleVehicle:
         return [m.text for _, link, m in self.sent if link == "ground" and isinstance(m, StatusText)]
 
     def step(self, *orders: Message) -> None:
-        up = [Datagram(link, self._kept(data)) for link, data in self._down if link == "autopilot"]
+        up = [datagram for datagram in self._down if datagram.link == "autopilot"]
+        if self.timeless:
+            up = [Datagram(link, self._without(Timesync, data)) for link, data in up]
         inbox = self.autopilot.step(BOOT + self._pace(self.now - BOOT), up)
         for datagram in inbox:
             self.heard += [(self.now, message) for message in self._codec.feed(datagram.data)]
+        if self.mute:
+            inbox = [Datagram(link, self._without(LocalPosition, data)) for link, data in inbox]
         if orders:
             inbox = [*inbox, Datagram("ground", b"".join(map(self._writer.encode, orders)))]
         self._down = self.companion.step(self.now, inbox)
@@ -89,10 +95,8 @@ class SingleVehicle:
             self.sent += [(self.now, link, message) for message in self._codec.feed(data)]
         self.now += TICK
 
-    def _kept(self, data: bytes) -> bytes:
-        if not self.timeless:
-            return data
-        messages = [message for message in self._reader.feed(data) if not isinstance(message, Timesync)]
+    def _without(self, kind: type[Message], data: bytes) -> bytes:
+        messages = [message for message in self._reader.feed(data) if not isinstance(message, kind)]
         return b"".join(map(self._writer.encode, messages))
 
     def order(self, command: int, *params: float) -> None:

@@ -25,6 +25,7 @@ def summary(flight: Flight, directory: Path) -> dict[str, object]:
         "fault": flight.fault,
         "restarts": [{"wall_s": lost, "why": why} for lost, why in flight.restarts],
         "last_word": flight.last_word or None,
+        "landed_off_m": None if flight.landing.off is None else round(flight.landing.off, 2),
         "phases": [{"phase": phase, "wall_s": began} for phase, began in diary.phases],
         "concerns": dict(diary.concerns),
         **flight.figures,

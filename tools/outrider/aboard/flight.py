@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from companion.dry_run import ONLOOKER
+from companion.landing import Landing
 from companion.last_word import LastWord
 from companion.node import COMPONENT
 from companion.pilot import Phase
@@ -27,6 +28,7 @@ from outrider.aboard.diary import Diary
 from outrider.aboard.farewell import farewell
 from outrider.aboard.identify import Identification
 from outrider.aboard.intercom import Desk, OrderLink, intercom
+from outrider.aboard.landing import verdict
 from outrider.aboard.news import State
 from outrider.aboard.orders import QUIT, Orders, answered, understood
 from outrider.aboard.pulse import Pulse
@@ -76,7 +78,9 @@ class Flight:
         self._orders = Orders(asked.system, asked.config.takeoff_height, self._signing)
         self._began = time.monotonic()
         self._pulse = Pulse(self._began)
-        self._left = self._go_given = self._failed = False
+        self.landing = Landing(False, None)
+        """The last, where it ended on the ground."""
+        self._left = self._go_given = self._failed = self._elsewhere = False
         self._trouble = ""
         self._simulated: bool | None = None
 
@@ -101,7 +105,7 @@ class Flight:
                 # Not before: an end that nobody has open takes with it, at the next beat, what waits at ours.
                 orders.release()
             if self._over():
-                self.fault = self.fault or self._failed
+                self.fault = self.fault or self._failed or self._elsewhere
                 return
             place = self._directory / f"restart-{len(self.restarts)}"
             if self._signing is not None:
@@ -159,8 +163,9 @@ class Flight:
                 crew.kill()
                 self._lose("its process is not heard any more")
                 return
-            if self.state.phase == Phase.DONE.value:
-                self.ended = self.ended or "landed"
+            if self.state.phase == Phase.DONE.value and not self.ended:
+                landing = self.landing
+                self.ended, self._elsewhere = verdict(landing.off, returning=landing.returning)
 
     def _over(self) -> bool:
         """Whether it is time to end; ``ended`` says why."""
@@ -196,6 +201,8 @@ class Flight:
             elif kind == "ack":
                 answer = answered(news["command"], news["result"], self.state.phase, self.waiting)
                 self.diary.note("answer", answer)
+            elif kind == "landing":
+                self.landing = Landing(**news)
             elif kind == "figures":
                 self.figures = news
             elif kind == "fault":

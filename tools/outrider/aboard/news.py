@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from companion.dry_run import DryRun
+from companion.landing import Landing
 from companion.pilot import Phase
 from companion.readiness import OPERATORS_GO
 from companion.vehicle import Vehicle
@@ -91,6 +92,7 @@ class News:
         self._plan_ms = (0.0, 0.0)
         self._told = self._refused = self._steps = 0
         self._judged = self._twin = False
+        self._landing: Landing | None = None
         self._concerns: dict[str, Concern] = {}
         self._sentences: dict[str, str] = {}
         self._lately: dict[tuple[str, str], float] = {}
@@ -150,6 +152,11 @@ class News:
     def _changes(self, at: float) -> None:
         node, pilot = self._companion, self._companion.pilot
         vehicle = pilot.vehicle
+        if pilot.landing is not self._landing:
+            self._landing = pilot.landing
+            if self._landing is not None:
+                # Before the phase: whoever hears that it is over has to know where.
+                self._tell(kind="landing", **self._landing._asdict())
         sentences = {
             "phase": pilot.phase.value,
             "waiting": self._waiting(),
