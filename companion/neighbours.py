@@ -224,7 +224,8 @@ class Neighbours:
         positions, trusted = self._table.positions(ids, now, now - stale)
         begins, silent = positions[:, 0], age > stale
         if silent.any():
-            late = silent & (since <= stale)
+            # By more than every message is: who has just fallen silent is not late.
+            late = silent & (since <= stale - config.neighbour.delay_us)
             beside = late & (_beside(begins, states[:, 0:3]) | _beside(begins, here))
             held = silent if config.guard.flown_on_us else late
             if held.any():

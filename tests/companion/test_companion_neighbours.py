@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from companion_rig import LAWS, ZERO, numbers, vectors
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
@@ -89,6 +89,7 @@ def test_without_a_plan_a_neighbour_is_held_where_it_is_now(x, v):
 
 @LAWS
 @given(x=vectors(50.0), v=vectors(5.0), later=st.integers(0, 900_000))
+@example(x=X, v=V, later=500_001)
 def test_without_a_plan_it_may_be_carried_on_at_constant_velocity(x, v, later):
     config = CompanionConfig(neighbour_prediction="velocity")
     obstacles = hearing(position(x, v), config=config).obstacles(NOW + later)
