@@ -9,6 +9,7 @@ import numpy as np
 from companion.bearings import turned
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
+from companion.formation import Spread, even_turn, outside, taking_part
 from companion.horizon import Array, Motion
 from companion.pilot import Phase, Pilot
 from companion.planner import Aim, standing
@@ -20,6 +21,10 @@ _BACK, _STILL = 0.5, 0.5
 """m and m/s: so near to where it started, and so slow, it is back."""
 _BESIDE, _PATIENCE = 5.0, 10_000_000
 """m and µs: who is so near and has come no nearer for so long is back too."""
+
+
+_NOBODY = np.empty((0, 3))
+_NOBODY.flags.writeable = False
 
 
 class Aims:
@@ -36,6 +41,7 @@ class Aims:
         self._held: Array | None = None
         self._began: Array | None = None
         self._nearest, self._nearer_at = inf, 0
+        self._lane = 0.0
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self.goal: Array | None = None
@@ -55,10 +61,23 @@ class Aims:
         elif phase is Phase.ESCORT and self._config.task == "escort" and view.target is not None:
             self._held = None
 
-    def aim(self, now: int, view: View, measured: Motion, obstacles: Obstacles, *, cautious: bool) -> Aim:
+    def aim(
+        self,
+        now: int,
+        view: View,
+        measured: Motion,
+        obstacles: Obstacles,
+        mates: Array = _NOBODY,
+        below: int = 0,
+        *,
+        cautious: bool,
+    ) -> Aim:
         """For a plan at ``now`` (µs) from ``measured`` on, ``cautious`` no further than that speed goes;
-        ``obstacles``: of which it settles clear. SurfaceError where the surface has no nearest point."""
-        aim = self._destination(now, view, measured, obstacles)
+        ``obstacles``: of which it settles clear; ``mates`` (M, 3): where the others are that share the
+        surface; ``below``: how many of the others have a smaller id. SurfaceError where the surface has no
+        nearest point."""
+        self._lane = self._config.guard.return_step * below
+        aim = self._destination(now, view, measured, obstacles, mates)
         speed = self._config.guard.cautious_speed
         return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
 
@@ -72,7 +91,7 @@ class Aims:
             return aim
         return aim._replace(destination=measured.position + drift + most / far * way)
 
-    def _destination(self, now: int, view: View, measured: Motion, obstacles: Obstacles) -> Aim:
+    def _destination(self, now: int, view: View, measured: Motion, obstacles: Obstacles, mates: Array) -> Aim:
         target, phase, task = view.target, self._pilot.phase, self._config.task
         if phase is Phase.RETURN:
             place = self._way_back(now, measured)
@@ -84,21 +103,35 @@ class Aims:
             began = measured.position if self._began is None else self._began
             place = began if self.goal is None else self.goal
         elif phase is not Phase.HOLD and target is not None:
-            return self._around(target, measured)
+            return self._around(target, measured, mates)
         else:
             # Told to, or because nobody is there to be stood around: where it is, clear of the others.
             place = self._place_to_hold(measured)
         return standing(place, None if target is None else target.position)
 
-    def _around(self, target: State, measured: Motion) -> Aim:
+    def _around(self, target: State, measured: Motion, mates: Array) -> Aim:
         """The surface around the target where that will be at the end of the horizon."""
         ahead, rate, surface = self._seconds, self._config.turn_rate, self._surface
         (end,), (velocity,) = target.ahead(np.array([ahead]))
-        offset = surface.nearest(measured.position - target.position)
+        here = measured.position - target.position
+        turn = self._turn(here, mates - target.position)
+        offset = surface.nearest(turned(here, turn) if turn else here)
         if rate:
             offset = surface.nearest(turned(offset, rate * ahead))
             velocity = velocity + rate * np.array([-offset[1], offset[0], 0.0])
+        if turn:
+            offset = outside(offset, turn)
         return Aim(end + offset, velocity, target.position, end, surface)
+
+    def _turn(self, offset: Array, mates: Array) -> float:
+        """By how much (rad) the vehicle goes round, from its ``offset`` (3,) from the target towards its
+        place among ``mates`` (M, 3)."""
+        formation = self._config.formation
+        if not isinstance(formation, Spread) or not len(mates):
+            return 0.0
+        here = self._surface.nearest(offset)
+        others = taking_part(formation, mates, float(np.linalg.norm(here)))
+        return max(-formation.turn, min(formation.turn, even_turn(offset, others)))
 
     def _place_to_hold(self, measured: Motion) -> Array:
         """Where it was when it was told to stay or to come back, or when the target was lost."""
@@ -107,12 +140,12 @@ class Aims:
         return self._held
 
     def _way_back(self, now: int, measured: Motion) -> Array:
-        """Above where it started, as high as it flies now, or as near to that as it is allowed; told to the
-        pilot when it is there, or beside it and comes no nearer."""
+        """Above where it started, as high as it flies now and its lane is above that, or as near to that as
+        it is allowed; told to the pilot when it is there, or beside it and comes no nearer."""
         start = self._pilot.start
         if start is None:
             return measured.position
-        height = float(self._place_to_hold(measured)[2])
+        height = float(self._place_to_hold(measured)[2]) + self._lane
         above: Array = np.clip(np.array([start[0], start[1], height]), self._low, self._high)
         off = above - measured.position
         far = hypot(off[0], off[1])

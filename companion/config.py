@@ -13,12 +13,14 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from companion.certified.settings import CertifiedConfig
+from companion.formation import FormationConfig, Nearest
 from companion.moving import Moving, MovingPost, MovingSphere
 from companion.obstacles import Obstacle, Post, Sphere
 from companion.proximity import ProximityConfig
 from companion.settings import Positive, Settings, WireStep
 from companion.surfaces import Circle, Surface, SurfaceConfig
 from companion.target_source import GlobalPositionSource, TargetSource
+from companion.tracking import TrackingConfig
 from companion.traffic import TrafficConfig
 from companion.voice import VoiceConfig
 
@@ -69,6 +71,11 @@ class LimitsConfig(Settings):
     u_max: Bounds = (2.0, 2.0, 2.0)
     v_max: Bounds = (5.0, 5.0, 5.0)
     a_total: float = Field(7.0, gt=0.0, le=30.0, description="m/s²; the firefly at 35° of tilt has 6.9")
+    j_max: Bounds | None = Field(
+        None,
+        description="m/s³ an axis: a hard bound on how fast a plan's acceleration changes; null: none, as the"
+        " paper",
+    )
     box_min: Triple = (-20.0, -20.0, 3.0)
     box_max: Triple = (20.0, 20.0, 10.0)
 
@@ -118,6 +125,16 @@ class FieldConfig(Potential):
         description="m/s², relative deceleration to count on when closing; null is the paper's bare field",
     )
 
+    turn: float = Field(
+        0.0,
+        ge=0.0,
+        le=1.0,
+        description="rad: by so much the force of what closes in is turned to the side of `turning_sense`, so"
+        " that a vehicle that is met head on moves aside and not ahead",
+    )
+    reaction: float = Field(
+        0.0, ge=0.0, le=2.0, description="s that pass until a vehicle brakes: with bounded jerk about a/(2 j)"
+    )
     smoothing_us: int = Field(
         50_000, ge=0, le=2_000_000, description="time constant of the field's low-pass, µs; 0 for none"
     )
@@ -259,6 +276,28 @@ class GuardConfig(Settings):
         5.0, description="m by which the own place may change with the autopilot's origin; beyond, it lands"
     )
     tube: Positive = Field(1.0, description="m of tracking error at which the plan is anchored anew")
+    blend: Positive | None = Field(
+        None,
+        description="1/s: a plan begins between the last plan and the vehicle, and comes nearer to it at this"
+        " rate; out of the tube by 0.2 m a plan; null: on the plan, and out of the tube where the vehicle is",
+    )
+    astray_us: int = Field(
+        0,
+        ge=0,
+        le=10_000_000,
+        description="a vehicle beside its plan comes back to it with this time constant: own and others' ways"
+        " are taken so; 0: as planned while within 1 m",
+    )
+    return_step: float = Field(
+        0.0,
+        ge=0.0,
+        le=20.0,
+        description="m: on the way back the vehicles fly so far above each other, in the order of their ids",
+    )
+    near: Positive | None = Field(
+        None,
+        description="m to a neighbour: nearer is a concern, and the vehicle flies cautiously; null: none",
+    )
 
 
 class RatesConfig(Settings):
@@ -317,10 +356,14 @@ class CompanionConfig(Settings):
     surfaces: tuple[OwnSurface, ...] = Field(
         (), max_length=255, description="of vehicles that have their own"
     )
+    formation: FormationConfig = Field(
+        Nearest(), description="how the vehicles share the surface: each its nearest point, or spread evenly"
+    )
     turn_rate: float = Field(
         0.0, ge=-1.0, le=1.0, description="rad/s, counter-clockwise from above: the ring turns on its surface"
     )
     heading: HeadingConfig = HeadingConfig()
+    tracking: TrackingConfig = TrackingConfig()
     certified: CertifiedConfig = CertifiedConfig()
     guard: GuardConfig = GuardConfig()
     rates: RatesConfig = RatesConfig()

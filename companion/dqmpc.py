@@ -4,8 +4,11 @@ Settled against the text. The variable is the total acceleration a = u + f, beca
 nothing else: f only shifts the bounds, a ∈ [f + u_min, f + u_max]. Gravity is absent: u is relative to hover,
 and the vehicle's controller carries the weight (with g in the dynamics and |u| ≤ 2 the problem has no
 solution). The vehicle's own bound, ‖u + f‖ ≤ a_total, holds for every solution: the box is shrunk from
-outside until its far corner lies in that ball. State limits that no input can keep (a large f does that) are
-widened to what is reachable, so that every QP has a solution.
+outside until its far corner lies in that ball. The box comes before the field: where the bounds that f has
+shifted leave no input that keeps it, these bounds are opened again towards what the vehicle has, as little as
+is enough; with bounded jerk the speed limits come before the field, too. Only a limit that even this cannot
+keep is widened to what is reachable, so that every QP has a solution. With ``j_max`` the jerk is bounded, too
+(``jerk``).
 """
 
 from __future__ import annotations
@@ -14,10 +17,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.config import CostConfig, HorizonConfig, LimitsConfig
 from companion.errors import SolverError
 from companion.horizon import Array
+from companion.jerk import Flown, JerkRows
 from companion.prediction import prediction
 from companion.solver import QpSolver
 
@@ -42,13 +47,16 @@ class AxisQp(NamedTuple):
 
 class Problem(NamedTuple):
     """The vectors of the three QPs, (3, n) and (3, 2n): c, bounds of a, bounds of velocities and positions
-    1…N + 1."""
+    1…N + 1. ``far`` (3, n): the largest |a| that the vehicle has on that axis, whatever the field. ``flown``:
+    what the plan goes on from, where jerk is bounded."""
 
     c: Array
     x_l: Array
     x_u: Array
     h_l: Array
     h_u: Array
+    far: Array
+    flown: Flown | None = None
 
 
 class Solution(NamedTuple):
@@ -59,7 +67,7 @@ class Solution(NamedTuple):
 
 
 class _Solvers(NamedTuple):
-    """For one weight Ω_t: −P⁻¹ (n, n), the QP with bounds on a alone, and the QP with state limits."""
+    """For one weight Ω_t: −P⁻¹ (n, n), the QP without state limits, and the QP with them."""
 
     minimiser: Array
     bounded: QpSolver
@@ -78,6 +86,7 @@ class Dqmpc:
         self.S_v, self.S_x, self._time = prediction(n, dt)
         self.G: Array = np.vstack([self.S_v, self.S_x])
         self._G_T: Array = np.ascontiguousarray(self.G.T)
+        self._jerk = None if limits.j_max is None else JerkRows(n, dt, np.array(limits.j_max))
         self._u = np.array(limits.u_max)[:, None]
         ones, no = np.ones(n), np.zeros(n)
         # [v, x] (3, 2) times this is what velocities and positions 1…n are without any input (3, 2n).
@@ -106,10 +115,17 @@ class Dqmpc:
         )
 
     def problem(
-        self, x: Array, v: Array, f: Array, destination: Array, velocity: Array, omega_scale: float
+        self,
+        x: Array,
+        v: Array,
+        f: Array,
+        destination: Array,
+        velocity: Array,
+        omega_scale: float,
+        flown: Flown | None = None,
     ) -> Problem:
         """The QPs' vectors from state (3,), (3,), field f (N + 1, 3), destination x̌ (3,) and terminal
-        velocity (3,)."""
+        velocity (3,); ``flown`` counts where jerk is bounded, and its absence there means at rest."""
         fT = f.T
         reach = np.abs(fT) + self._u
         norm = np.sqrt((reach * reach).sum(axis=0))
@@ -121,58 +137,124 @@ class Dqmpc:
         off = np.empty((3, 2))
         off[:, 0], off[:, 1] = x + self.seconds * v - destination, v - velocity
         free = state @ self._drift
-        return Problem((omega_scale * off) @ self._pull, x_l, x_u, self._low - free, self._high - free)
+        if self._jerk is not None and flown is None:
+            flown = Flown(np.zeros(3), self.dt)
+        return Problem(
+            (omega_scale * off) @ self._pull, x_l, x_u, self._low - free, self._high - free, far, flown
+        )
 
     def reachable(self, problem: Problem) -> Problem:
-        """The problem with every state limit that no input can keep widened to what is reachable, and a
-        little."""
-        low, high = problem.x_l @ self._G_T, problem.x_u @ self._G_T
+        """The problem with state limits that can be kept: first the bounds on a are opened for them, as
+        little as is enough; what even then no input keeps is widened to what is reachable, and a little."""
+        _, x_l, x_u, h_l, h_u, far, flown = problem
+        least, most = -far, far
+        if self._jerk is not None and flown is not None:
+            a_l, a_u = self._jerk.reach(flown)
+            x_l, x_u = np.minimum(np.maximum(x_l, a_l), a_u), np.maximum(np.minimum(x_u, a_u), a_l)
+            least, most = np.minimum(np.maximum(least, a_l), a_u), np.maximum(np.minimum(most, a_u), a_l)
+        least, most = np.minimum(least, x_l), np.maximum(most, x_u)
+        margin = _WIDEN * ((most - least) @ self._G_T)
+        x_u = x_u + self._opened(h_l - x_u @ self._G_T, most - x_u, margin)
+        x_l = x_l - self._opened(x_l @ self._G_T - h_u, x_l - least, margin)
+        low, high = x_l @ self._G_T, x_u @ self._G_T
         margin = _WIDEN * (high - low)
         return problem._replace(
-            h_l=np.minimum(problem.h_l, high - margin), h_u=np.maximum(problem.h_u, low + margin)
+            x_l=np.minimum(x_l, problem.x_l),
+            x_u=np.maximum(x_u, problem.x_u),
+            h_l=np.minimum(h_l, high - margin),
+            h_u=np.maximum(h_u, low + margin),
         )
+
+    def _opened(self, missing: Array, room: Array, margin: Array) -> Array:
+        """What bounds (3, n) on a have to give way by, of the ``room`` (3, n) that they have, so that rows
+        (3, 2n) gain what is ``missing`` there, and a ``margin``: the same share of it at every n."""
+        if self._jerk is None:
+            # The paper's field may make a vehicle faster than v_max; nothing takes it out of the box.
+            missing = missing[:, self.n :]
+            gains, margin = self._G_T[:, self.n :], margin[:, self.n :]
+        else:
+            gains = self._G_T
+        if (missing <= 0.0).all():
+            return np.zeros_like(room)
+        gain = np.maximum(room @ gains, _TOLERANCE)
+        share = np.where(missing > 0.0, (missing + margin) / gain, 0.0).max(axis=1)
+        opened: Array = np.minimum(share, 1.0)[:, None] * room
+        return opened
 
     def axis(self, problem: Problem, axis: int, omega_scale: float) -> AxisQp:
         """One axis in full, for another solver or a KKT check."""
         problem = self.reachable(problem)
+        low, high = self._rows(problem)
         return AxisQp(
             self.hessian(omega_scale),
             problem.c[axis],
-            self.G,
-            problem.h_l[axis],
-            problem.h_u[axis],
+            self.G if self._jerk is None else np.vstack([self.G, self._jerk.D]),
+            low[axis],
+            high[axis],
             problem.x_l[axis],
             problem.x_u[axis],
         )
 
+    def _rows(self, problem: Problem) -> tuple[Array, Array]:
+        """Bounds (3, m) of all rows: velocities, positions and, where it is bounded, changes of a."""
+        if self._jerk is None or problem.flown is None:
+            return problem.h_l, problem.h_u
+        d_l, d_u = self._jerk.bounds(problem.flown)
+        return np.hstack([problem.h_l, d_l]), np.hstack([problem.h_u, d_u])
+
     def solve(self, problem: Problem, omega_scale: float) -> Solution:
         """Solve the three axes, each with no more constraints than matter.
 
-        The free minimiser is the solution where it lies within the bounds on a; otherwise PIQP solves with
-        these bounds, and once more with all constraints where that solution breaks a state limit. An axis
-        whose state limits contradict each other is solved without them and counted; its bounds on a always
-        hold. SolverError only if even that fails.
+        The free minimiser is the solution where it lies within the bounds on a and on jerk; otherwise PIQP
+        solves with these bounds, and once more with all constraints where that solution breaks a state limit.
+        An axis whose constraints contradict each other is solved without its state limits and counted; its
+        bounds on a and on jerk always hold. SolverError only if even that fails.
         """
         solvers = self._solvers(omega_scale)
-        c, x_l, x_u, h_l, h_u = problem
+        c, x_l, x_u, h_l, h_u = problem[:5]
         a: Array = solvers.minimiser @ c.T
         # Asked so that a NaN anywhere fails both questions, and reaches a solver that refuses it.
         inside = ((a >= x_l.T) & (a <= x_u.T)).all(axis=0)
-        for i in np.flatnonzero(~inside):
-            a[:, i] = solvers.bounded.solve(c[i], x_l[i], x_u[i])
-        rows = self.G @ a
-        kept = ((rows >= h_l.T - _TOLERANCE) & (rows <= h_u.T + _TOLERANCE)).all(axis=0)
         relaxed = 0
+        if self._jerk is None or problem.flown is None:
+            for i in np.flatnonzero(~inside):
+                a[:, i] = solvers.bounded.solve(c[i], x_l[i], x_u[i])
+        else:
+            d_l, d_u = self._jerk.bounds(problem.flown)
+            change = self._jerk.D @ a
+            inside &= ((change >= d_l.T) & (change <= d_u.T)).all(axis=0)
+            for axis in np.flatnonzero(~inside).tolist():
+                a[:, axis], failed = self._bounded(
+                    solvers.bounded, self._jerk, problem, axis, d_l[axis], d_u[axis]
+                )
+                relaxed += failed
+        rows = self.G @ a
+        kept: NDArray[np.bool_] = np.all((rows >= h_l.T - _TOLERANCE) & (rows <= h_u.T + _TOLERANCE), axis=0)
         if not kept.all():
-            _, _, _, h_l, h_u = self.reachable(problem)
-        for i in np.flatnonzero(~kept):
-            try:
-                a[:, i] = solvers.limited.solve(c[i], x_l[i], x_u[i], h_l[i], h_u[i])
-            except SolverError:
-                relaxed += 1
-        # PIQP keeps bounds to 1e-8: the last digits are ours.
-        np.minimum(np.maximum(a, x_l.T), x_u.T, out=a)
+            opened = self.reachable(problem)
+            low, high = self._rows(opened)
+            for i in np.flatnonzero(~kept):
+                try:
+                    a[:, i] = solvers.limited.solve(c[i], opened.x_l[i], opened.x_u[i], low[i], high[i])
+                except SolverError:
+                    relaxed += 1
+            x_l = np.where(kept[:, None], x_l, opened.x_l)
+            x_u = np.where(kept[:, None], x_u, opened.x_u)
+        if self._jerk is None:
+            # PIQP keeps bounds to 1e-8: the last digits are ours.
+            np.minimum(np.maximum(a, x_l.T), x_u.T, out=a)
         return Solution(a, relaxed)
+
+    def _bounded(
+        self, solver: QpSolver, jerk: JerkRows, problem: Problem, i: int, low: Array, high: Array
+    ) -> tuple[Array, bool]:
+        """One axis with bounds on a and on jerk; where they contradict each other, the jerk's: what comes
+        nearest to the middle of the others. Whether that was so."""
+        try:
+            return solver.solve(problem.c[i], problem.x_l[i], problem.x_u[i], low, high), False
+        except SolverError:
+            middle = np.minimum(np.maximum(0.0, problem.x_l[i]), problem.x_u[i])
+            return jerk.limited(middle, low, high), True
 
     def gradient(self, a: Array, x_end: Array, v_end: Array, destination: Array, velocity: Array) -> Array:
         """∇J = ∂J/∂x(N+1) + ∂J/∂u(N) as a vector (3,), divided by Ω_t (Sec. III-C.1).
@@ -190,4 +272,7 @@ class Dqmpc:
     def _build(self, omega_scale: float) -> _Solvers:
         P = self.hessian(omega_scale)
         minimiser: Array = -np.asarray(np.linalg.inv(P), dtype=np.float64)
-        return _Solvers(minimiser, QpSolver(P), QpSolver(P, self.G))
+        if self._jerk is None:
+            return _Solvers(minimiser, QpSolver(P), QpSolver(P, self.G))
+        D = self._jerk.D
+        return _Solvers(minimiser, QpSolver(P, D), QpSolver(P, np.vstack([self.G, D])))

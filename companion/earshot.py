@@ -122,6 +122,8 @@ class Earshot:
         ``closing`` m/s."""
         config = self._config
         field, band = config.field, config.tangential
-        braking = 0.0 if field.braking is None else np.square(closing) / (2.0 * field.braking)
+        braking = np.zeros_like(closing)
+        if field.braking is not None:
+            braking = np.square(closing) / (2.0 * field.braking) + field.reaction * closing
         reach = field.d_safe + field.margin(2) + np.maximum(braking, band.d_band + band.reach_s * closing)
         return np.asarray(np.maximum(reach, config.approach_angle.reach + FADING), dtype=np.float64)

@@ -10,9 +10,9 @@ Closing speed. From d_safe = 3 m the bare field cannot stop two vehicles that me
 about 10 m/s² net. So the distance that enters F is what would be left after braking, d − ċ²/(2 a_rel) with ċ
 the speed of closing and a_rel the relative deceleration to count on. At rest this is the paper's field; when
 closing fast its reach grows with the square of the speed, and d_min is approached no faster than can be
-braked. Who moves away has as much to spare, up to twice its distance from d_min: a field that pushes as hard
-on the way out as on the way in flings vehicles out of every encounter. ``braking=None`` is the paper's field
-alone.
+braked. With bounded jerk a vehicle brakes late: ``reaction`` seconds of closing are taken off, too. Who moves
+away has as much to spare, up to twice its distance from d_min: a field that pushes as hard on the way out as
+on the way in flings vehicles out of every encounter. ``braking=None`` is the paper's field alone.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from companion.horizon import Array
 
 _VEHICLES = np.zeros(1)
 _VEHICLES.flags.writeable = False
+_CLOSES = 1.0
+"""m/s."""
 _NEAR = 1e-6
 """Below this distance (m) no direction is away; the force then points along +x rather than nowhere."""
 
@@ -67,12 +69,20 @@ def magnitude(distance: Array, d_min: Array, d_safe: Array, gain: float, clamp: 
 
 
 def repulsion(
-    own: Array, obstacles: Obstacles, gain: float, clamp: float, braking: float | None, dt: float
+    own: Array,
+    obstacles: Obstacles,
+    gain: float,
+    clamp: float,
+    braking: float | None,
+    dt: float,
+    reaction: float = 0.0,
+    turn: float = 0.0,
 ) -> Array:
     """Σ_j F_rep (N + 1, 3) on the own predicted positions (N + 1, 3), each source clamped to ``clamp`` m/s².
 
-    ``braking`` is a_rel (m/s²) of the module's docstring, ``dt`` (s) the step between the predicted
-    positions.
+    ``braking`` is a_rel (m/s²) of the module's docstring, ``reaction`` (s) what passes until it brakes,
+    ``dt`` (s) the step between the predicted positions. ``turn`` (rad, counter-clockwise from above): by
+    so much the force of an obstacle is turned that closes at ``_CLOSES`` or faster, by less of a slower one.
     """
     if not obstacles.ids:
         return np.zeros_like(own)
@@ -81,7 +91,7 @@ def repulsion(
     reserve = distance
     if braking is not None:
         spare = np.maximum(distance - obstacles.d_min[:, None], 0.0)
-        reserve = distance - np.maximum(stopping_distance(distance, braking, dt), -spare)
+        reserve = distance - np.maximum(stopping_distance(distance, braking, dt, reaction), -spare)
     if (reserve >= obstacles.d_safe[:, None]).all():
         return np.zeros_like(own)
     force = magnitude(reserve, obstacles.d_min[:, None], obstacles.d_safe[:, None], gain, clamp)
@@ -89,17 +99,39 @@ def repulsion(
     if near.any():
         away[near] = (1.0, 0.0, 0.0)
         distance[near] = 1.0
+    if turn:
+        away = _turned(away, turn * np.clip(closing_speed(distance, dt) / _CLOSES, 0.0, 1.0))
     result: Array = np.einsum("jn,jni->ni", force / distance, away)
     return result
 
 
-def stopping_distance(distance: Array, braking: float, dt: float) -> Array:
-    """ċ²/(2 a_rel) (M, N + 1) from predicted distances (M, N + 1), with ċ their rate; negative where they
-    grow."""
+def _turned(away: Array, angle: Array) -> Array:
+    """Vectors (M, N + 1, 3) turned about the vertical by ``angle`` (M, N + 1)."""
+    c, s = np.cos(angle), np.sin(angle)
+    turned = away.copy()
+    turned[..., 0] = c * away[..., 0] - s * away[..., 1]
+    turned[..., 1] = s * away[..., 0] + c * away[..., 1]
+    return turned
+
+
+def closing_speed(distance: Array, dt: float) -> Array:
+    """How fast distances (M, N + 1) shrink, m/s; negative where they grow."""
+    closing = np.empty_like(distance)
+    np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
+    closing[:, -1] = closing[:, -2]
+    closing /= dt
+    return closing
+
+
+def stopping_distance(distance: Array, braking: float, dt: float, reaction: float = 0.0) -> Array:
+    """ċ²/(2 a_rel) + ċ·``reaction`` (M, N + 1) from predicted distances (M, N + 1), with ċ their rate;
+    negative where they grow."""
     closing = np.empty_like(distance)
     np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
     closing[:, -1] = closing[:, -2]
     result: Array = closing * np.abs(closing) * (0.5 / (braking * dt**2))
+    if reaction:
+        result += closing * (reaction / dt)
     return result
 
 

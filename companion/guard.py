@@ -11,6 +11,11 @@ import numpy as np
 from companion.config import CompanionConfig
 from companion.horizon import Horizon, Motion, roll_out
 
+_STEP = 0.2
+"""m: no set-point is moved by more at once."""
+_BESIDE = 0.3
+"""m: autopilots are so far beside their set-points all the time."""
+
 
 class Holding(Enum):
     """What the vehicle is flying, and why."""
@@ -32,6 +37,8 @@ class Guard:
         self.held = 0
         self.failures = 0
         self.anchored_anew = 0
+        self._lost = False
+        self._anchored_at = 0
         self.failing: int | None = None
         """Since when (µs) the solver finds no plan; None while it does."""
 
@@ -70,16 +77,31 @@ class Guard:
         """The state to plan from: the flown horizon's, unless the vehicle has left the tube around it.
 
         Planning from the plan keeps the set-point continuous and lets the autopilot reject wind; out of the
-        tube the plan starts anew at the measured state.
+        tube the plan starts anew at the measured state. With ``guard.blend`` it is brought nearer to the
+        vehicle all the time, so slowly that no set-point jumps; out of the tube faster, but no step is longer
+        than 0.2 m.
         """
+        last, self._anchored_at = self._anchored_at, now
         if self.horizon is None:
             return position
         reference = self.horizon.at(now)
-        off = reference.position - position.position
-        if float(off @ off) > self._config.guard.tube**2:
-            self.anchored_anew += 1
-            return position
-        return reference
+        off = position.position - reference.position
+        size = float(np.sqrt(off @ off))
+        lost, self._lost = self._lost, size > self._config.guard.tube
+        blend = self._config.guard.blend
+        if blend is None:
+            self.anchored_anew += self._lost
+            return position if self._lost else reference
+        self.anchored_anew += self._lost and not lost
+        if self._lost:
+            share = min(_STEP / size, 1.0)
+        else:
+            share = min(blend * max(size - _BESIDE, 0.0) * (now - last) * 1e-6, _STEP) / max(size, _BESIDE)
+        return Motion(
+            reference.position + share * off,
+            reference.velocity + share * (position.velocity - reference.velocity),
+            reference.acceleration,
+        )
 
 
 def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import compress
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,8 @@ _MOST = 255
 _VOICE = 1_000_000
 """µs for which a vehicle's autopilot is not listened to where its companion speaks, too."""
 _STRAYED = 1.0
-"""A neighbour further than this (m) from its own plan is not where it says: its track counts."""
+"""A neighbour further than this (m) from its own plan is not where it says: its track counts. With
+``guard.astray_us`` it is ``guard.tube``."""
 
 
 @lru_cache(maxsize=1024)
@@ -54,6 +56,15 @@ def _placed(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measure
     """What a message measures, as ``measured`` has it; each worked out once in a process."""
     position = fleet.to_enu(message.latitude, message.longitude, message.altitude)
     return measured(position, ned_to_enu(message.velocity_ned), upward=upward)
+
+
+def fading(config: CompanionConfig) -> Array | None:
+    """How much (N + 1, 1) is left, at n = 0…N, of what a vehicle is beside its plan now; None where that does
+    not count."""
+    if not config.guard.astray_us:
+        return None
+    ahead = config.horizon.dt_us * np.arange(config.horizon.steps + 1.0)
+    return np.asarray(np.exp(-ahead / config.guard.astray_us))[:, None]
 
 
 class Neighbours:
@@ -75,12 +86,16 @@ class Neighbours:
         self._came: dict[int, int] = {}
         self._arrivals = np.zeros(0, dtype=np.int64)
         self._clocks: dict[int, PlanClock] = {}
+        self._fading = fading(config)
+        self._strayed = _STRAYED if self._fading is None else config.guard.tube
         self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
         margin = config.field.margin(2)
         self._margin: Array = np.full(_MOST, margin)
         self._d_min: Array = np.full(_MOST, config.field.d_min + margin)
         self._d_safe: Array = np.full(_MOST, config.field.d_safe + margin)
         self.refused_plans = 0
+        self.closest = inf
+        """m: how near a neighbour has been, by what was heard of it; looked at where ``guard.near`` is."""
         # When (µs) a vehicle's companion last said where it is; whether its track is of its autopilot's word.
         self._spoken: dict[int, int] = {}
         self._by_autopilot: dict[int, bool] = {}
@@ -226,16 +241,23 @@ class Neighbours:
         if silent.any():
             # By more than every message is: who has just fallen silent is not late.
             late = silent & (since <= stale - config.neighbour.delay_us)
-            beside = late & (_beside(begins, states[:, 0:3]) | _beside(begins, here))
+            beside = late & (
+                _beside(begins, states[:, 0:3], self._strayed) | _beside(begins, here, self._strayed)
+            )
             held = silent if config.guard.flown_on_us else late
             if held.any():
                 names = tuple(compress(ids, held.tolist()))
                 here[held], further[held] = self._held(
                     names, states[held], times[held], age[held], late[held]
                 )
-            trusted &= beside | (~late & _beside(begins, here))
+            trusted &= beside | (~late & _beside(begins, here, self._strayed))
         else:
-            trusted &= _beside(begins, here)
+            trusted &= _beside(begins, here, self._strayed)
+        if self._fading is not None:
+            # Beside its plan, and on the way back to it.
+            positions += np.where(trusted & ~silent, 1.0, 0.0)[:, None, None] * (
+                self._fading * (here - begins)[:, None, :]
+            )
         if not trusted.all():
             lost = ~trusted
             positions[lost] = here[lost][:, None]
@@ -268,6 +290,37 @@ class Neighbours:
             meant = limit(self._table.accelerations(ids, times), self._config.limits.a_total)
         return flown_on(states, meant, most, np.where(late, 0.0, 1e-6 * guard.plan_stale_us))
 
+    def nearest(self, now: int, own: State | None) -> tuple[int, float] | None:
+        """The neighbour that is nearest to the ``own`` place by what was heard of it, and how near (m); None
+        without any in the air. What stands on the ground is nobody's concern."""
+        if own is None or self._config.guard.near is None or not self._ids:
+            return None
+        self._put_down()
+        age = np.minimum(np.maximum(now - self._times, 0), self._config.neighbour.extrapolate_us)
+        off = self._states[:, 0:3] + 1e-6 * age[:, None] * self._states[:, 3:6] - own.position
+        distance = np.sqrt(np.vecdot(off, off))
+        index = int(np.argmin(distance))
+        nearest = float(distance[index])
+        self.closest = min(self.closest, nearest)
+        return self._ids[index], nearest
+
+    @property
+    def below(self) -> int:
+        """How many of those heard so far have a smaller system id than the own."""
+        return sum(system < self._system for system in self._ids if system not in self._things)
+
+    def mates(self, now: int) -> Array:
+        """Where the vehicles are (M, 3) that fly by plans of their own: whose plan is fresh."""
+        self._put_down()
+        if not self._ids:
+            return np.empty((0, 3))
+        _, fresh = self._table.positions(self._ids, now, now - self._config.guard.plan_stale_us)
+        for system in self._things & self._rows.keys():
+            fresh[self._rows[system]] = False
+        age = np.minimum(np.maximum(now - self._times[fresh], 0), self._config.neighbour.extrapolate_us)
+        states = self._states[fresh]
+        return np.asarray(states[:, 0:3] + 1e-6 * age[:, None] * states[:, 3:6])
+
     def last_heard(self) -> list[tuple[int, int, Array, Array]]:
         """System id, time (µs), position (3,) and velocity (3,) of everybody's last known state."""
         self._put_down()
@@ -293,7 +346,8 @@ class Neighbours:
         self._fresh.clear()
 
 
-def _beside(planned: Array, places: Array) -> NDArray[np.bool_]:
-    """Which (M,) of the ``planned`` places (M, 3) are near enough to those for the plan to count."""
+def _beside(planned: Array, places: Array, strayed: float) -> NDArray[np.bool_]:
+    """Which (M,) of the ``planned`` places (M, 3) are within ``strayed`` (m) of those, so that the plan
+    counts."""
     off = planned - places
-    return np.asarray(np.vecdot(off, off) <= _STRAYED**2)
+    return np.asarray(np.vecdot(off, off) <= strayed**2)

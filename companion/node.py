@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from companion.aims import Aims
 from companion.certified.flight import CertifiedFlight
 from companion.config import CompanionConfig, MethodName
@@ -84,6 +86,7 @@ class Companion:
         self._planning = Planning(
             config, self.world, self.pilot, self._aims, certified, stopwatch, self._dials.note
         )
+        self._v_max = np.array(config.limits.v_max)
         self._boot: int | None = None
         self._next_setpoint = 0
         self.not_finite = 0
@@ -165,7 +168,7 @@ class Companion:
             return self._encode(ground=answers)
         view = self.world.at(now)
         commands = self.pilot.step(now, view)
-        self.world.doubt = self.pilot.vehicle.positioning.radius
+        self.world.doubt = self.pilot.vehicle.positioning.radius + self._planning.tracking.excess
         asked = self._round_trips.due(now, self.world.late)
         self._look(now, view)
         self._aims.forget(view)
@@ -248,6 +251,8 @@ class Companion:
             self.world.displaced,
             self.world.clock_lost,
             self._round_trips.unanswered(now),
+            float(np.linalg.norm(self._planning.tracking.error)) if self.pilot.streaming else 0.0,
+            self.world.neighbours.nearest(now, view.own),
         )
         for change in self.watch.look(situation):
             concern = change.concern
@@ -267,7 +272,18 @@ class Companion:
         time = now + self.config.setpoint_lead_us
         since_boot = now - (now if self._boot is None else self._boot)
         yaw = self._planning.yaw(time)
-        message = setpoint(time, since_boot, horizon, yaw, view.local, self._source, profile.setpoint_mask)
+        message = setpoint(
+            time,
+            since_boot,
+            horizon,
+            yaw,
+            view.local,
+            self._source,
+            profile.setpoint_mask,
+            self._planning.tracking.compensation,
+            self._planning.tracking.bias,
+            self._v_max,
+        )
         if not is_finite(message):
             # Nothing of it may leave: the plan begins anew where the vehicle is measured to be.
             self.not_finite += 1

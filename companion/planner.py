@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import expm1
+from math import expm1, inf
 from typing import NamedTuple
 
 import numpy as np
@@ -12,11 +12,15 @@ from companion.config import CompanionConfig, MethodName
 from companion.dqmpc import Dqmpc, Problem
 from companion.forces import Obstacles, limit, repulsion
 from companion.horizon import Array, Horizon, roll_out
+from companion.jerk import Flown, rate_limited
 from companion.methods import Influence, Method, Scene
 from companion.methods.approach_angle import ApproachAngle
 from companion.methods.swivel import Swivel
 from companion.methods.tangential import Tangential
 from companion.surfaces import Surface
+
+_ZERO = np.zeros(3)
+_ZERO.flags.writeable = False
 
 
 class Aim(NamedTuple):
@@ -57,16 +61,24 @@ class Planner:
         self._methods = build(config)
         self._gradient: Array = np.zeros(3)
         self._force: Array = np.zeros((config.horizon.steps + 1, 3))
-        self._smooth_at: int | None = None
+        self._planned_at: int | None = None
 
     def use(self, methods: tuple[MethodName, ...]) -> None:
         """From the next plan on, with nothing latched."""
         self._methods = build(self.config.model_copy(update={"methods": methods}))
 
     def plan(
-        self, now: int, position: Array, velocity: Array, prediction: Array, aim: Aim, obstacles: Obstacles
+        self,
+        now: int,
+        position: Array,
+        velocity: Array,
+        prediction: Array,
+        aim: Aim,
+        obstacles: Obstacles,
+        acceleration: Array = _ZERO,
     ) -> Plan:
-        """One plan from the state at ``now`` (µs). ``prediction`` (N + 1, 3): the previous plan at n = 0…N.
+        """One plan from the state at ``now`` (µs), with the ``acceleration`` (3,) that is flown until then.
+        ``prediction`` (N + 1, 3): the previous plan at n = 0…N.
 
         SolverError when there is no solution: the caller holds what it has.
         """
@@ -84,9 +96,16 @@ class Planner:
             aim.target_end,
             aim.surface,
         )
-        influence = self._influence(now, scene)
+        elapsed = self._elapsed(now)
+        influence = self._influence(elapsed, scene)
         problem = self.dqmpc.problem(
-            position, velocity, influence.force, influence.destination, aim.velocity, influence.omega_scale
+            position,
+            velocity,
+            influence.force,
+            influence.destination,
+            aim.velocity,
+            influence.omega_scale,
+            None if self.config.limits.j_max is None else Flown(acceleration, elapsed),
         )
         solution = self.dqmpc.solve(problem, influence.omega_scale)
         horizon = roll_out(now, self.config.horizon.dt_us, position, velocity, solution.acceleration)
@@ -98,7 +117,12 @@ class Planner:
             horizon, aim, influence.force, self._gradient, influence.omega_scale, solution.relaxed, problem
         )
 
-    def _influence(self, now: int, scene: Scene) -> Influence:
+    def _elapsed(self, now: int) -> float:
+        """Seconds since the last plan; ∞ for the first."""
+        last, self._planned_at = self._planned_at, now
+        return inf if last is None else (now - last) * 1e-6
+
+    def _influence(self, elapsed: float, scene: Scene) -> Influence:
         config = self.config
         a_total = config.limits.a_total
         field = repulsion(
@@ -108,6 +132,8 @@ class Planner:
             _NEAREST_COUNTS * a_total,
             config.field.braking,
             self.dqmpc.dt,
+            config.field.reaction,
+            config.field.turn * _SIGNS[config.turning_sense],
         )
         influence = Influence(field, 1.0, scene.destination)
         for method in self._methods:
@@ -115,19 +141,25 @@ class Planner:
         force = influence.force
         if config.planar:
             force = force * _FLAT
-        return influence._replace(force=self._smoothed(now, limit(force, a_total)))
+        return influence._replace(force=self._smoothed(elapsed, limit(force, a_total)))
 
-    def _smoothed(self, now: int, force: Array) -> Array:
-        """The field without its steps: neighbours' plans arrive at 10 Hz and would jolt the attitude."""
-        last, self._smooth_at = self._smooth_at, now
-        if last is not None and self.config.field.smoothing_us > 0:
-            share = -expm1(-(now - last) / self.config.field.smoothing_us)
+    def _smoothed(self, elapsed: float, force: Array) -> Array:
+        """The field without its steps: neighbours' plans arrive at 10 Hz and would jolt the attitude. With
+        bounded jerk it changes no faster than the acceleration may, in time and along the horizon."""
+        j_max, dt = self.config.limits.j_max, self.dqmpc.dt
+        if j_max is not None:
+            jerk = min(j_max)
+            force = rate_limited(force, self._force[0], jerk * min(elapsed, dt), jerk * dt)
+        elif elapsed < inf and self.config.field.smoothing_us > 0:
+            share = -expm1(-1e6 * elapsed / self.config.field.smoothing_us)
             force = self._force + share * (force - self._force)
         self._force = force
         return force
 
 
 _FLAT = np.array([1.0, 1.0, 0.0])
+_SIGNS = {"own": 0.0, "right": 1.0, "left": -1.0}
+"""Of the angle by which forces are turned; where each vehicle has a sense of its own they are not."""
 _NEAREST_COUNTS = 20.0
 """The sum is limited to a_total, not its parts: were each limited, two that push from behind would cancel one
 that is about to be hit."""

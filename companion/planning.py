@@ -15,18 +15,23 @@ from companion.certified.keeper import Why
 from companion.config import CompanionConfig
 from companion.errors import CompanionError, SurfaceError
 from companion.forces import Obstacles
+from companion.formation import Spread
 from companion.guard import Guard
 from companion.heading import Heading, Yaw
 from companion.horizon import Array, Motion
+from companion.neighbours import fading
 from companion.pilot import Phase, Pilot
 from companion.plan_log import PlanLog
 from companion.planner import Aim, Plan, Planner
+from companion.tracking import Tracking
 from companion.world import View, World
 from mavlink_bridge.frames import LocalFrame
 
 _LONGEST_NS = (1 << 32) - 1
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
+_NOBODY = np.empty((0, 3))
+_NOBODY.flags.writeable = False
 
 
 class Tally(NamedTuple):
@@ -65,10 +70,13 @@ class Planning:
         self._stopwatch, self._told = stopwatch, took
         self.planner = Planner(config)
         self.guard = Guard(config)
+        self.tracking = Tracking(config.tracking)
         self._heading = Heading(config.heading, config.horizon)
         self._obstacles = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
         self._frame: LocalFrame | None = None
+        self._shares_surface = isinstance(config.formation, Spread)
         self._fastest = hypot(*config.limits.v_max)
+        self._fading = fading(config)
         self._flown = 0
         self._plans = self._relaxed = 0
         self._plan_ns = array("I")
@@ -125,6 +133,7 @@ class Planning:
         self._flown = now
         if not self._pilot.streaming or view.own is None or view.local is None:
             self.guard.rest()
+            self.tracking.reset()
             return
         stale = view.own.age > self._config.guard.own_stale_us
         measured = Motion(view.own.position, self._bounded(view.own.velocity), _ZERO)
@@ -146,8 +155,16 @@ class Planning:
         if not self._pilot.guided:
             # Set-points flow before they steer: a plan would run away from the vehicle.
             self.guard.start(now, measured)
+            self.tracking.reset()
             return
+        self._observe(now, measured)
         self._plan(now, view, measured, cautious=cautious)
+
+    def _observe(self, now: int, measured: Motion) -> None:
+        """See how the vehicle follows what it was sent."""
+        horizon, profile = self.guard.horizon, self._pilot.profile
+        if horizon is not None and profile is not None:
+            self.tracking.observe(now, horizon.at(now), measured, profile.loop)
 
     def _begin(self, now: int, yaw: float, measured: Motion) -> None:
         """To steer, from the ``measured`` state on."""
@@ -201,8 +218,13 @@ class Planning:
                 if horizon is None
                 else horizon.positions(now, config.steps + 1, config.dt_us)
             )
+            if self._fading is not None and horizon is not None:
+                # The others avoid the vehicle, not its plan.
+                prediction = prediction + self._fading * self.tracking.error
             self._obstacles = obstacles = self._world.obstacles(now, view, prediction)
-            self.plan = self.planner.plan(now, state.position, state.velocity, prediction, aim, obstacles)
+            self.plan = self.planner.plan(
+                now, state.position, state.velocity, prediction, aim, obstacles, state.acceleration
+            )
         except CompanionError:
             self.guard.hold(now, solver=True)
             return
@@ -236,7 +258,9 @@ class Planning:
             here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
             self._obstacles = self._world.obstacles(now, view, here)
         try:
-            aim = self._aims.aim(now, view, measured, self._obstacles, cautious=cautious)
+            mates = self._world.neighbours.mates(now) if self._shares_surface else _NOBODY
+            below = self._world.neighbours.below if self._config.guard.return_step else 0
+            aim = self._aims.aim(now, view, measured, self._obstacles, mates, below, cautious=cautious)
         except SurfaceError:
             return None
         if self._config.traffic is None:

@@ -10,20 +10,41 @@ from __future__ import annotations
 
 from math import isfinite
 
+import numpy as np
+
 from companion.heading import Yaw
 from companion.horizon import Array, Horizon
 from mavlink_bridge.frames import LocalFrame
 from mavlink_bridge.messages import SetpointLocal, Source, Vector
 
 FRAME_LOCAL_NED = 1
+NONE: Array = np.zeros(3)
+"""No compensation."""
+NONE.flags.writeable = False
+UNBOUNDED: Array = np.full(3, np.inf)
+UNBOUNDED.flags.writeable = False
 
 
 def setpoint(
-    time: int, since_boot: int, horizon: Horizon, yaw: Yaw, local: LocalFrame, own: Source, mask: int
+    time: int,
+    since_boot: int,
+    horizon: Horizon,
+    yaw: Yaw,
+    local: LocalFrame,
+    own: Source,
+    mask: int,
+    compensation: Array = NONE,
+    bias: Array = NONE,
+    v_max: Array = UNBOUNDED,
 ) -> SetpointLocal:
     """SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame, frame 1: the horizon and ``yaw`` at
-    ``time`` (µs)."""
+    ``time`` (µs). ``compensation`` (3,), m/s²: what is added to the acceleration, ``bias``
+    (3,), m/s, to the velocity (``tracking``), which ``v_max`` (3,) bounds."""
     motion = horizon.at(time)
+    velocity = motion.velocity
+    if bias is not NONE:
+        most = np.maximum(np.abs(velocity), v_max)
+        velocity = np.minimum(np.maximum(velocity + bias, -most), most)
     return SetpointLocal(
         own,
         since_boot,
@@ -32,8 +53,8 @@ def setpoint(
         FRAME_LOCAL_NED,
         mask,
         _vector(local.position_to_local(motion.position)),
-        _vector(local.velocity_to_local(motion.velocity)),
-        _vector(local.velocity_to_local(motion.acceleration)),
+        _vector(local.velocity_to_local(velocity)),
+        _vector(local.velocity_to_local(motion.acceleration + compensation)),
         local.yaw_to_local(yaw.yaw),
         # NED yaw turns clockwise: the rate changes sign with the frame.
         -yaw.rate,

@@ -41,8 +41,9 @@ class Situation(NamedTuple):
     ``neighbours``: age (µs) by system id; ``holding``: what is flown; ``failing``: since when (µs) no plan
     could be solved, None while they can; ``clock_steps``: how often the autopilot's clock has been set;
     ``moves``: how often its origin has moved, the last time with the vehicle by ``displaced`` m;
-    ``clock_lost``: µs that its clock has lost in all; ``unanswered``: its messages come late, and it does not
-    tell whether that is its clock."""
+    ``clock_lost``: µs that its clock has lost in all; ``unanswered``: its messages come late, and it does
+    not tell whether that is its clock; ``error``: how far (m) the vehicle is from its set-points;
+    ``nearest``: the neighbour that is nearest to it, and how near (m)."""
 
     now: int
     view: View
@@ -57,6 +58,8 @@ class Situation(NamedTuple):
     displaced: float = 0.0
     clock_lost: int = 0
     unanswered: bool = False
+    error: float = 0.0
+    nearest: tuple[int, float] | None = None
 
 
 class Change(NamedTuple):
@@ -86,6 +89,7 @@ class Watch:
         self._config = config
         self.concerns: dict[str, Concern] = {}
         self._late, self._clock_set, self._origin_moved = _Lately(), _Lately(), _Lately()
+        self._astray = _Lately()
         self._clock_steps = self._moves = 0
         self._lost: deque[tuple[int, int]] = deque()
         self._target_seen = False
@@ -101,8 +105,8 @@ class Watch:
     @property
     def blinkered(self) -> bool:
         """Whether what it knows of the others, or of itself, may be old, or what it does late."""
-        vague = "lateness" in self.concerns or "positioning" in self.concerns
-        return vague or any(name.startswith(_NEIGHBOUR) for name in self.concerns)
+        vague = not _VAGUE.isdisjoint(self.concerns)
+        return vague or any(name.startswith((_NEIGHBOUR, _CLOSE)) for name in self.concerns)
 
     # Each: a concern, or nothing
 
@@ -115,6 +119,8 @@ class Watch:
             self._battery(s),
             self._autopilot(s),
             self._fence(s),
+            self._tracking(s),
+            self._near(s),
             self._lateness(s),
             self._clock(s),
             self._slow_clock(s),
@@ -179,6 +185,22 @@ class Watch:
             return Concern("failsafe", "Autopilot reports a failsafe")
         return None
 
+    def _tracking(self, s: Situation) -> Concern | None:
+        alarm = self._config.tracking.alarm
+        if alarm is None or s.phase in _ON_THE_GROUND:
+            return None
+        return (
+            Concern("tracking", "Vehicle is beside its set-points: slower")
+            if self._astray.after(s.now, s.error > alarm)
+            else None
+        )
+
+    def _near(self, s: Situation) -> Concern | None:
+        near = self._config.guard.near
+        if near is None or s.nearest is None or s.phase in _ON_THE_GROUND or s.nearest[1] >= near:
+            return None
+        return Concern(f"near {s.nearest[0]}", f"Neighbour {s.nearest[0]} is near: slower")
+
     def _fence(self, s: Situation) -> Concern | None:
         guard, own = self._config.guard, s.view.own
         if own is None or s.phase in _ON_THE_GROUND:
@@ -233,7 +255,8 @@ class Watch:
         return [Concern(f"{_NEIGHBOUR}{system}", f"Neighbour {system} is not heard") for system in lost]
 
 
-_NEIGHBOUR = "neighbour "
+_NEIGHBOUR, _CLOSE = "neighbour ", "near "
+_VAGUE = frozenset(("lateness", "positioning", "tracking"))
 _ON_THE_GROUND = (Phase.CONNECT, Phase.DONE)
 _REMEMBERED = 5_000_000
 """µs."""

@@ -66,7 +66,7 @@ def reach(config: CompanionConfig) -> float:
     """How far from the own horizon (m) something can be and still act: the field and the band, both grown for
     closing at v_max."""
     field, band, speed = config.field, config.tangential, max(config.limits.v_max)
-    stopping = 0.0 if field.braking is None else speed**2 / (2.0 * field.braking)
+    stopping = 0.0 if field.braking is None else speed**2 / (2.0 * field.braking) + field.reaction * speed
     return field.d_safe + field.margin(1) + max(stopping, band.d_band + band.reach_s * speed)
 
 

@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 from sitl.autonomy_config import BatteryFailsafeConfig, FenceConfig, FollowConfig
 from sitl.backends.physics import PhysicsName
 from sitl.battery import BatteryConfig
+from sitl.position_control.gains import ArduPilotGains, Px4Gains, ResponseName
 from sitl.profiles import ProfileName
-from sitl.response import ResponseName
 
 Rate = Annotated[float, Field(ge=0.0, le=1000.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -65,9 +65,11 @@ class AutopilotConfig(BaseModel):
     physics: PhysicsName = Field("own", description="what moves the vehicle: our own integrator, or JSBSim")
     response: ResponseName = Field(
         "exact",
-        description="exact: it is where its set-points say; firmware: it lags as the real one did, with the"
-        " gains that are the firmware's defaults",
+        description="exact: it is where its set-points say; firmware: where the firmware's position"
+        " controller flies the airframe of its own simulator",
     )
+    ardupilot: ArduPilotGains = Field(ArduPilotGains(), description="of its position controller")
+    px4: Px4Gains = Field(Px4Gains(), description="of its position controller")
     start_height: float = Field(
         0.0,
         ge=0.0,

@@ -50,11 +50,12 @@ class Course:
 
     @property
     def reference(self) -> Reference | None:
-        """What is tracked now, without the derivatives that are read from it; None when nothing is."""
+        """What the autopilot is asked to track now, without the derivatives that are read from it; None when
+        nothing is. A firmware's response follows it late."""
         guidance = self._guidance
         if guidance.activity is Activity.IDLE:
             return None
-        motion = self._origin.motion_to_site(guidance.motion)
+        motion = self._origin.motion_to_site(guidance.asked)
         yaw = guidance.yaw + self._origin.turn
         return Reference(motion[0], motion[1], motion[2], yaw=yaw, yaw_rate=guidance.yaw_rate)
 

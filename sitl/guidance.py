@@ -12,8 +12,9 @@ from typing import Final
 
 from mavlink_bridge.messages import Vector
 from sitl.autopilot_config import AutopilotConfig
-from sitl.response import RESPONSES, Motion, Response
-from sitl.setpoints import POSITION, VELOCITY, Pose, Setpoint
+from sitl.position_control.airframe import Motion
+from sitl.response import response_of
+from sitl.setpoints import POSITION, VELOCITY, ZERO, Pose, Setpoint
 from sitl.shaper import Heading, Limits, Shaper
 
 _STAY: Final = Setpoint((VELOCITY, VELOCITY, VELOCITY))
@@ -44,15 +45,15 @@ class Guidance:
 
     def __init__(self, config: AutopilotConfig) -> None:
         self._limits: dict[Activity, Limits] = {}
+        self._response = response_of(config)
         self.configure(config)
         self._shaper = Shaper()
-        exact = config.response == "exact"
-        self._response = None if exact else Response(RESPONSES[config.flavour])
         self._heading = Heading(config.max_yaw_rate, config.max_yaw_acceleration)
         self._setpoint = _STAY
         self._received = 0
         self._deadline = _FOR_EVER
         self._interrupted: tuple[Activity, Setpoint] | None = None
+        self._asked: Motion | None = None
         self.activity = Activity.IDLE
         self.timed_out = False
 
@@ -70,6 +71,8 @@ class Guidance:
             Activity.HOLD: Limits(config.max_speed, *gentle),
             Activity.LAND: Limits(config.max_speed, *gentle),
         }
+        if self._response is not None:
+            self._response.configure(config)
 
     @property
     def motion(self) -> Motion:
@@ -78,6 +81,11 @@ class Guidance:
             return self._response.motion
         shaper = self._shaper
         return shaper.position, shaper.velocity, shaper.acceleration
+
+    @property
+    def asked(self) -> Motion:
+        """What set-points ask for now; where none do, the motion."""
+        return self._asked if self._asked is not None and self._chased else self.motion
 
     @property
     def yaw(self) -> float:
@@ -99,6 +107,9 @@ class Guidance:
         age = (now - self._received) * 1e-6
         if self.activity is Activity.GO:
             return self._setpoint
+        if self._chased:
+            # ArduPilot carries a set-point forward until its time-out; PX4 leaves it as it came.
+            return self._setpoint.after(age if config.flavour == "ardupilot" else 0.0, math.inf)
         return self._setpoint.after(age, config.thrusting).limited(config.max_speed, config.max_acceleration)
 
     def idle(self) -> None:
@@ -128,6 +139,8 @@ class Guidance:
             self._interrupted = Activity.TRACK, setpoint
             return
         self._begin(Activity.TRACK, setpoint)
+        if self._chased:
+            return
         # A trajectory that is being passed through takes effect at once, not at the end of the next step.
         self._shaper.advance(self.wanted(now), self._limits[Activity.TRACK], 0.0)
 
@@ -192,8 +205,8 @@ class Guidance:
         if self._response is not None:
             self._response.relocate(position, velocity)
 
-    def advance(self, now: int, step: int) -> None:
-        """Move the reference from ``now`` to ``now + step`` (µs)."""
+    def advance(self, now: int, step: int, wind: Vector = ZERO) -> None:
+        """Move the reference from ``now`` to ``now + step`` (µs), in air that moves with ``wind`` (m/s)."""
         activity = self.activity
         if activity is Activity.IDLE:
             return
@@ -207,11 +220,17 @@ class Guidance:
             wanted = self._setpoint
             if activity is Activity.HOLD and wanted.yaw is None and self._resting:
                 return
-        self._shaper.advance(wanted, self._limits[self.activity], dt)
         self._heading.advance(wanted.yaw, wanted.yaw_rate, dt)
-        if self._response is not None:
-            shaper = self._shaper
-            self._response.advance((shaper.position, shaper.velocity, shaper.acceleration), dt)
+        shaper, response = self._shaper, self._response
+        if response is not None and self._chased:
+            self._asked = wanted.position, wanted.velocity, wanted.acceleration
+            response.advance(self._asked, dt, wind)
+            # What comes after the stream begins where the firmware has got to.
+            shaper.position, shaper.velocity, shaper.acceleration = response.desired
+            return
+        shaper.advance(wanted, self._limits[self.activity], dt)
+        if response is not None:
+            response.advance((shaper.position, shaper.velocity, shaper.acceleration), dt, wind)
 
     def _expire(self, last: Setpoint) -> None:
         """Set-points come no more: brake and hold. ArduPilot forgets what velocity it was told, but not the
@@ -221,6 +240,15 @@ class Guidance:
             self._shaper.restart(last.position)
         self.hold()
         self.timed_out = True
+
+    @property
+    def _chased(self) -> bool:
+        """Whether the firmware's own position controller has the set-points, as they are."""
+        return (
+            self._response is not None
+            and self.activity is Activity.TRACK
+            and self._setpoint.levels == (POSITION, POSITION, POSITION)
+        )
 
     @property
     def _resting(self) -> bool:

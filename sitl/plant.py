@@ -85,7 +85,7 @@ class Plant:
                 reference = self._believed(reference)
             idle = armed and reference is None
             self._trace.append(vehicle.advance(count, reference, wind, idle=idle))
-            guidance.advance(begin, step)
+            guidance.advance(begin, step, self._local(wind))
             self._steps += count
             self._truth = self._belief = None
             if not self.sensors.exact:
@@ -156,6 +156,10 @@ class Plant:
             return weather.wind(now)
         u, v, w = self.state.velocity.tolist()
         return weather.wind(now, self._ground - float(self.state.position[2]), (u, v, w))
+
+    def _local(self, wind: Vector) -> Vector:
+        """A velocity in the site's NED, in the vehicle's own."""
+        return wind if wind == ZERO else self._origin.vector_to_local(np.array(wind))
 
     def _believed(self, reference: Reference) -> Reference:
         """The reference that makes the physics fly as on the estimate."""

@@ -19,6 +19,29 @@ class Step(Enum):
     TAKEOFF = "take-off"
 
 
+class Shaping(NamedTuple):
+    """How the trajectory follows the set-points: its acceleration changes by at most ``jerk`` (m/s³), and
+    corrects its velocity at the rate ``velocity``, its position at the rate ``position`` (1/s)."""
+
+    jerk: float
+    position: float
+    velocity: float
+
+
+class Loop(NamedTuple):
+    """Gains of an autopilot's horizontal position loop, its defaults: it asks for the velocity v_r +
+    ``position`` · error (1/s), and for the acceleration a_r + ``velocity`` · its error (1/s). ``slew``: how
+    fast (m/s³) what is added to a_r may change beside what plans ask for. ``shaping``: of an autopilot that
+    chases set-points with a trajectory of its own. ``bias``: rate (1/s²) at which the velocity
+    set-point corrects for an estimated velocity that is off, where no integral of the autopilot's does."""
+
+    position: float
+    velocity: float
+    slew: float
+    shaping: Shaping | None = None
+    bias: float = 0.0
+
+
 class Profile(NamedTuple):
     """An autopilot's ways. ``estimator_message``: the id of the one by which its estimator tells how it is.
     ``mode_params`` are p1…p3 of DO_SET_MODE; ``setpoint_mask`` is the type_mask to send.
@@ -30,6 +53,7 @@ class Profile(NamedTuple):
     where it is by itself. ``fallen_modes``: what custom_mode may be when set-points were
     missing for too long; ``loss_modes``: those of them that no pilot flies in. ``takeoff_modes`` and
     ``land_modes``: those into which NAV_TAKEOFF, where it changes the mode, and NAV_LAND lead.
+    ``loop``: how it follows set-points.
     """
 
     name: str
@@ -49,6 +73,7 @@ class Profile(NamedTuple):
     fallen_modes: frozenset[int] = frozenset()
     loss_modes: frozenset[int] = frozenset()
     takeoff_modes: frozenset[int] = frozenset()
+    loop: Loop = Loop(1.0, 2.0, 1.0)
 
     @property
     def mode_call(self) -> Params:

@@ -3,7 +3,7 @@ best)."""
 
 from __future__ import annotations
 
-from companion.autopilots import Profile, Step
+from companion.autopilots import Loop, Profile, Shaping, Step
 
 ARDUPILOT = Profile(
     name="ArduPilot",
@@ -20,4 +20,7 @@ ARDUPILOT = Profile(
     hold_mode=17,
     hold_name="BRAKE",
     land_modes=frozenset((9,)),
+    # PSC_POSXY_P and PSC_VELXY_P; of PSC_JERK_XY, 5 m/s³, plans have most.
+    # The trajectory's gains are the jerk over WPNAV_ACCEL, 2.5 m/s², and half of that.
+    loop=Loop(1.0, 2.0, 1.0, Shaping(jerk=5.0, position=1.0, velocity=2.0)),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from companion.autopilots import Profile, Step
+from companion.autopilots import Loop, Profile, Step
 
 _HOLD = 4 << 16 | 3 << 24
 
@@ -26,4 +26,7 @@ PX4 = Profile(
     fallen_modes=frozenset((3 << 16, _HOLD, 4 << 16 | 5 << 24, 4 << 16 | 6 << 24)),
     loss_modes=frozenset((_HOLD,)),
     takeoff_modes=frozenset((4 << 16 | 2 << 24,)),
+    # MPC_XY_P and MPC_XY_VEL_P_ACC.
+    # Its position loop has no integral: an estimated velocity that is off by 0.3 m/s stays 0.3 m beside.
+    loop=Loop(0.95, 1.8, 4.0, bias=0.25),
 )

@@ -19,7 +19,7 @@ def test_who_hovers_above_a_landed_vehicle_lands_beside_it(
 ) -> None:
     """The first vehicle lands where it is, which is where the second has to go: it must move aside in the
     end."""
-    monkeypatch.setattr(conductor, "_LAND_CAP", 25_000_000)
+    monkeypatch.setitem(conductor._LAND_CAPS, "land", 25_000_000)
 
     def stay(self: Operator, system: int, position: np.ndarray) -> None:
         if system == 11:

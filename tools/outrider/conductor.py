@@ -28,7 +28,8 @@ _TOSSED = 0.8
 """The same in turbulent air."""
 PREPARE_CAP = 90_000_000
 """µs within which all vehicles must hover, or nothing comes of the flight."""
-_SETTLE, _AFTER, _LAND_CAP = 500_000, 5_000_000, 60_000_000
+_SETTLE, _AFTER = 500_000, 5_000_000
+_LAND_CAPS = {"land": 60_000_000, "return": 120_000_000}
 
 
 class Stage(Enum):
@@ -119,10 +120,9 @@ class Conductor:
         elif self.stage is Stage.LAND:
             if not sight.armed:
                 self.stage = Stage.DONE
-            elif sight.now - self._land_at > _LAND_CAP:
-                self.failure = (
-                    f"not all vehicles were down {_LAND_CAP // 1_000_000} s after the order to land"
-                )
+            elif sight.now - self._land_at > (cap := _LAND_CAPS[self._scenario.ending]):
+                order = self._scenario.ending
+                self.failure = f"not all vehicles were down {cap // 1_000_000} s after the order to {order}"
                 self.stage = Stage.DONE
         return self.stage is Stage.DONE
 
@@ -192,5 +192,6 @@ class Conductor:
 
     def _land(self, now: int) -> None:
         self.stage, self._land_at = Stage.LAND, now
+        order = self._operator.come_back if self._scenario.ending == "return" else self._operator.land
         for system in self._scenario.systems:
-            self._operator.land(system)
+            order(system)

@@ -125,7 +125,7 @@ class Fleet:
         facing = 0.0 if self._facing is None else bearing(place, self._facing)
         config = AutopilotConfig(
             system_id=self.systems[k],
-            flavour=self.scenario.flavour,
+            flavour=self.scenario.flavour_of(k),
             latitude=latitude,
             longitude=longitude,
             altitude=altitude,

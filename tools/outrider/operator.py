@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.node import COMPONENT
-from companion.orders import DO_REPOSITION
+from companion.orders import DO_REPOSITION, NAV_RETURN
 from companion.pilot import NAV_LAND, NAV_TAKEOFF
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
@@ -45,6 +45,12 @@ class Operator:
         self._open.pop((system, NAV_TAKEOFF), None)
         params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0)
         self._order(CommandLong(self._source, system, COMPONENT, NAV_LAND, 0, params))
+
+    def come_back(self, system: int) -> None:
+        """Return to where you started and land there; an order to take off that is still open is taken
+        back."""
+        self._open.pop((system, NAV_TAKEOFF), None)
+        self._order(CommandLong(self._source, system, COMPONENT, NAV_RETURN, 0, (0.0,) * 7))
 
     def goal(self, system: int, position: NDArray[np.float64]) -> None:
         """Go to ``position`` (3,), fleet-local ENU."""

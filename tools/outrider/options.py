@@ -10,11 +10,12 @@ from pydantic_core import ErrorDetails
 
 from companion.config import Avoidance, MethodName
 from outrider.errors import InputError
-from outrider.scenario import Points, Scenario
+from outrider.scenario import FlavourName, Points, Scenario
 from outrider.schema_nodes import Schema
 
 AVOIDANCES = get_args(Avoidance)
 METHODS = get_args(MethodName)
+FLAVOURS = get_args(FlavourName)
 _SLOWEST_PLAN = 10_000_000
 """µs."""
 _FASTEST_AIR = 50.0
@@ -34,6 +35,8 @@ class Options(NamedTuple):
     replan_hz: float | None = None
     wind: str | None = None
     physics: str | None = None
+    flavour: str | None = None
+    response: str | None = None
 
 
 def apply(scenario: Scenario, options: Options) -> Scenario:
@@ -57,6 +60,10 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
         changes["sensors"] = options.sensors
     if options.physics is not None:
         changes["physics"] = options.physics
+    if options.flavour is not None:
+        changes["flavour"] = _flavours(options.flavour)
+    if options.response is not None:
+        changes["autopilot"] = {**scenario.autopilot.model_dump(), "response": options.response}
     if options.wind is not None:
         changes["weather"] = {**scenario.weather.model_dump(), "wind": wind_of(options.wind)}
     if options.replan_hz is not None:
@@ -145,6 +152,17 @@ def wind_of(text: str) -> list[float]:
             f"from -{_FASTEST_AIR:g} to {_FASTEST_AIR:g}"
         )
     return parts + [0.0] * (3 - len(parts))
+
+
+def _flavours(text: str) -> str | tuple[str, ...]:
+    names = tuple(text.split(","))
+    for name in names:
+        if name not in FLAVOURS:
+            raise InputError(
+                f"--flavour {text}: {name!r} is no firmware; allowed are {' and '.join(FLAVOURS)}, or several"
+                " joined by commas"
+            )
+    return names[0] if len(names) == 1 else names
 
 
 def _methods(text: str) -> tuple[str, ...]:

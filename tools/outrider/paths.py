@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -71,12 +72,16 @@ class ClosedPath:
 
 
 class Walk:
-    """One who goes along ``path``: stands at its beginning, then sets out with ``setting_out`` m/s² until
-    ``speed`` m/s, and goes round and round. Times are µs."""
+    """Motion along ``path``: at rest at its beginning, then with ``setting_out`` m/s² up to ``speed`` m/s,
+    round and round. ``paces`` (s after the start, m/s) are speeds that it changes to later, as gently. Times
+    are µs."""
 
-    def __init__(self, path: ClosedPath, speed: float, setting_out: float) -> None:
+    def __init__(
+        self, path: ClosedPath, speed: float, setting_out: float, paces: Sequence[tuple[float, float]] = ()
+    ) -> None:
         self.path = path
         self._speed, self._setting_out = speed, setting_out
+        self._profile = _profile([(0.0, speed), *paces], setting_out) if paces else None
         self._start: int | None = None
 
     def begin(self, now: int) -> None:
@@ -95,6 +100,32 @@ class Walk:
     def _gone(self, times: NDArray[np.int64]) -> tuple[Array, Array]:
         """How far it has come (n,), m, and how fast it is (n,), m/s."""
         since = np.zeros(len(times)) if self._start is None else np.maximum(times - self._start, 0) * 1e-6
+        if self._profile is not None:
+            begins, gone, speeds, gains = self._profile
+            part = np.searchsorted(begins, since, side="right") - 1
+            spent = since - begins[part]
+            reached = speeds[part] + gains[part] * spent
+            return gone[part] + 0.5 * (speeds[part] + reached) * spent, reached
         ramp = self._speed / self._setting_out
         speed = self._setting_out * np.minimum(since, ramp)
         return 0.5 * speed * np.minimum(since, ramp) + self._speed * np.maximum(since - ramp, 0.0), speed
+
+
+def _profile(paces: Sequence[tuple[float, float]], gain: float) -> tuple[Array, Array, Array, Array]:
+    """Pieces of constant acceleration, each (n,): when it begins (s), the way gone (m), the speed (m/s) and
+    the acceleration (m/s²) from then on. A pace that ends before it is reached is left as it is then."""
+    pieces = [(0.0, 0.0, 0.0)]
+    speed = 0.0
+    for index, (begin, wanted) in enumerate(paces):
+        ends = paces[index + 1][0] if index + 1 < len(paces) else np.inf
+        change = gain if wanted > speed else -gain
+        reached = begin + abs(wanted - speed) / gain
+        pieces.append((begin, speed, change if reached > begin else 0.0))
+        speed += change * (min(reached, ends) - begin)
+        if reached < ends:
+            speed = wanted
+            pieces.append((reached, speed, 0.0))
+    begins, speeds, gains = (np.array(column) for column in zip(*pieces, strict=True))
+    spent = np.diff(begins)
+    gone = np.concatenate([[0.0], np.cumsum(speeds[:-1] * spent + 0.5 * gains[:-1] * spent**2)])
+    return begins, gone, speeds, gains

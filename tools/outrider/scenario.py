@@ -24,7 +24,10 @@ from outrider.scenario_places import (
     Starts,
     Target,
 )
+from sitl.position_control.gains import ResponseName
 from sitl.weather import WeatherConfig
+
+FlavourName = Literal["ardupilot", "px4"]
 
 __all__ = [
     "FIRST_SYSTEM",
@@ -54,9 +57,14 @@ class Timing(Part):
 
 
 class AutopilotPart(Part):
-    """Parameters of the autopilots: for how long a set-point counts. After that ArduPilot brakes, and PX4
+    """How the autopilots fly set-points, and for how long one counts. After that ArduPilot brakes, and PX4
     leaves offboard mode."""
 
+    response: ResponseName = Field(
+        "exact",
+        description="exact: a vehicle is where its set-points say; firmware: the firmware's position"
+        " controller, with stock parameters, on the airframe of its own simulator",
+    )
     guided_timeout: float = Field(3.0, ge=0.1, le=60.0, description="s, ArduPilot's GUID_TIMEOUT")
     offboard_timeout: float = Field(1.0, ge=0.1, le=60.0, description="s, PX4's COM_OF_LOSS_T")
 
@@ -69,7 +77,9 @@ class Scenario(Part):
     task: Literal["escort", "antipodal", "goto"]
     vehicles: int = Field(ge=1, le=244, description="how many fly the task; bystanders are more")
     vehicle: str = Field("firefly", description="file in config/vehicles")
-    flavour: Literal["ardupilot", "px4"] = "ardupilot"
+    flavour: FlavourName | tuple[FlavourName, ...] = Field(
+        "ardupilot", description="firmware of all vehicles, or a list that is gone through again and again"
+    )
     autopilot: AutopilotPart = AutopilotPart()
     origin: Origin = Origin()
     starts: Starts
@@ -79,6 +89,9 @@ class Scenario(Part):
     )
     airborne: bool = Field(
         False, description="begin in the air, hovering at the starts, and end there: no take-off, no landing"
+    )
+    ending: Literal["land", "return"] = Field(
+        "land", description="what the operator orders in the end: land here, or return to the start and land"
     )
     target: Target
     obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed, known to all companions")
@@ -105,6 +118,10 @@ class Scenario(Part):
             isinstance(self.target, FixedTarget)
             and (self.target.jump_to is not None or bool(self.target.jumps))
         )
+
+    def flavour_of(self, k: int) -> FlavourName:
+        """The firmware of vehicle ``k`` (0…)."""
+        return self.flavour if isinstance(self.flavour, str) else self.flavour[k % len(self.flavour)]
 
     @property
     def duration_s(self) -> float:
@@ -166,6 +183,8 @@ class Scenario(Part):
             )
 
     def _place_faults(self) -> Iterator[str]:
+        if not self.flavour:
+            yield "flavour is an empty list; allowed: ardupilot, px4, or a list of them"
         if self.size > _MOST_SYSTEMS:
             yield f"vehicles and bystanders are {self.size}; at most {_MOST_SYSTEMS} are allowed"
         if self.task == "antipodal" and not isinstance(self.starts, Ring):

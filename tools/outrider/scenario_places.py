@@ -101,15 +101,30 @@ class FixedTarget(Part):
         return self
 
 
+class Pace(Part):
+    """From ``after_s`` seconds after the goal event on the target goes at this speed."""
+
+    after_s: Seconds
+    speed: float = Field(ge=0.0, le=20.0, description="m/s")
+
+
 class PathTarget(Part):
     """A target on a smooth closed path through some places, at a constant speed; it sets out at the goal
-    event."""
+    event. With ``paces`` it changes its speed later."""
 
     kind: Literal["path"]
     through: tuple[Position, ...] = Field(min_length=3, max_length=100, description="m, ENU; in this order")
-    speed: float = Field(gt=0.0, le=20.0, description="m/s")
+    speed: float = Field(ge=0.0, le=20.0, description="m/s")
+    paces: tuple[Pace, ...] = Field((), max_length=100, description="in the order of time")
     setting_out: float = Field(1.0, gt=0.0, le=10.0, description="m/s², until it has its speed")
     rate_hz: float = Field(5.0, gt=0.0, le=50.0)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        times = [pace.after_s for pace in self.paces]
+        if times != sorted(times):
+            raise ValueError("paces must be in the order of after_s")
+        return self
 
 
 class RecordedTarget(Part):

@@ -115,7 +115,9 @@ class Walking:
     system = TARGET_SYSTEM
 
     def __init__(self, config: PathTarget, fleet: FleetFrame) -> None:
-        self._walk = Walk(ClosedPath(np.array(config.through)), config.speed, config.setting_out)
+        paces = [(pace.after_s, pace.speed) for pace in config.paces]
+        path = ClosedPath(np.array(config.through))
+        self._walk = Walk(path, config.speed, config.setting_out, paces)
         self._aside: Array | None = None
         self._beacon = Beacon(TARGET_SYSTEM, LINK, config.rate_hz, fleet)
 

@@ -21,10 +21,11 @@ _COMMAND: Final = Struct("<28xH")
 class Departures:
     """``messages`` by link, ``commands`` to the autopilot by their number, and ``setpoints``."""
 
-    def __init__(self, limits: LimitsConfig) -> None:
+    def __init__(self, limits: LimitsConfig, compensation: float = 0.0) -> None:
+        """``compensation``: what may be added to a plan's acceleration, m/s²."""
         self.messages: Counter[str] = Counter()
         self.commands: Counter[int] = Counter()
-        self.setpoints = gauge_for(limits)
+        self.setpoints = gauge_for(limits, compensation=compensation)
         self.newest: SetpointLocal | None = None
         self._codec = Codec(lambda identifier, _system, _component: identifier == _SETPOINT)
 

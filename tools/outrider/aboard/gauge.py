@@ -85,10 +85,15 @@ class SetpointGauge:
         return [what for what, is_so in wrong.items() if is_so]
 
 
-def gauge_for(limits: LimitsConfig, heading: HeadingConfig | None = None) -> SetpointGauge:
-    """For a companion with these limits; without ``heading`` its yaw is left to itself, as it jumps where a
+def gauge_for(
+    limits: LimitsConfig, heading: HeadingConfig | None = None, compensation: float = 0.0
+) -> SetpointGauge:
+    """For a companion with these limits, and up to so much ``compensation`` (m/s²) beside its plan's
+    acceleration; without ``heading`` its yaw is left to itself, as it jumps where a
     flight goes on that a pilot has turned."""
-    return SetpointGauge(hypot(*limits.v_max), limits.a_total, inf if heading is None else heading.rate_max)
+    return SetpointGauge(
+        hypot(*limits.v_max), limits.a_total + compensation, inf if heading is None else heading.rate_max
+    )
 
 
 _ROUNDED = 1e-3

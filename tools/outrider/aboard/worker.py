@@ -116,7 +116,7 @@ class Worker:
         wall = WallClock()
         followed = self.followed(wall)
         cockpit = Cockpit(node, wall, followed, self._signing, self._twin)
-        departures = Departures(node.config.limits)
+        departures = Departures(node.config.limits, node.config.tracking.largest)
         news = News(cockpit, departures, followed, self._signing, self._orders.tell)
         links: dict[str, Link | Sequence[Link]] = {
             **self._links,

@@ -11,7 +11,16 @@ from typing import Annotated
 
 import typer
 
-from outrider.commands.words import METHODS, PHYSICS, SENSORS, AsJson, RunDirectory, SigningKey, Wind
+from outrider.commands.words import (
+    METHODS,
+    PHYSICS,
+    RESPONSE,
+    SENSORS,
+    AsJson,
+    RunDirectory,
+    SigningKey,
+    Wind,
+)
 
 
 def swarm(
@@ -27,6 +36,11 @@ def swarm(
     wind: Wind = None,
     replan_hz: Annotated[float | None, typer.Option(help="Plans per second.")] = None,
     physics: Annotated[str | None, typer.Option(help=PHYSICS)] = None,
+    flavour: Annotated[
+        str | None,
+        typer.Option(help="ardupilot, px4, or several joined by commas: one vehicle after another."),
+    ] = None,
+    response: Annotated[str | None, typer.Option(help=RESPONSE)] = None,
     real_time: Annotated[
         bool, typer.Option("--real-time", help="Under the wall clock: a process per node, over UDP.")
     ] = False,
@@ -45,7 +59,18 @@ def swarm(
     from outrider.summary import exit_status
 
     options = flying.Options(
-        method, avoidance, planar, vehicles, loss, delay_ms, sensors, replan_hz, wind, physics
+        method,
+        avoidance,
+        planar,
+        vehicles,
+        loss,
+        delay_ms,
+        sensors,
+        replan_hz,
+        wind,
+        physics,
+        flavour,
+        response,
     )
     prepared = flying.prepare(scenario, options)
     with ExitStack() as open_:
@@ -95,9 +120,7 @@ def sitl(
     startup: Annotated[
         str, typer.Option(help="quick, or realistic: GPS and estimator take their time.")
     ] = "quick",
-    response: Annotated[
-        str, typer.Option(help="exact, or firmware: it lags behind set-points as the real one.")
-    ] = "exact",
+    response: Annotated[str, typer.Option(help=RESPONSE)] = "firmware",
     origin: Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE[,ALTITUDE].")] = None,
     wind: Wind = None,
     spacing: Annotated[float, typer.Option(min=0.0, max=1000.0, help="m between vehicles.")] = 3.0,

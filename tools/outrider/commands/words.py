@@ -10,6 +10,7 @@ import typer
 METHODS: Final = "baseline, swivel, approach_angle, tangential; joined by +."
 SENSORS: Final = "truth, rtk or gnss."
 PHYSICS: Final = "own or jsbsim."
+RESPONSE: Final = "exact: at its set-points; firmware: flown by the firmware's position controller."
 
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
 Begun = Annotated[Path | None, typer.Option(help="Directory; one begun is gone on with.")]

@@ -23,8 +23,8 @@ from sitl.backends.physics import PhysicsName
 from sitl.battery import BatteryConfig
 from sitl.config import VehicleConfig
 from sitl.node import Autopilot
+from sitl.position_control.gains import ResponseName
 from sitl.profiles import ProfileName
-from sitl.response import ResponseName
 from sitl.saved import Saved
 from sitl.weather import WeatherConfig
 
@@ -51,7 +51,7 @@ class Options:
     sensors: str = "truth"
     physics: str = "own"
     startup: str = "quick"
-    response: str = "exact"
+    response: str = "firmware"
     origin: str | None = None
     wind: str | None = None
     spacing: float = 3.0

@@ -1,0 +1,214 @@
+"""How the vehicle follows its set-points: the error, and what the autopilot lacks to make it vanish.
+
+An autopilot's position loop knows nothing of drag and wind but what its integral learns, within seconds.
+Meanwhile the vehicle is beside its plan: 1.8 m at 3 m/s for a PX4 whose simulated airframe has a drag of
+1 N per m/s and kg. A disturbance observer sees that error come: it predicts the velocity from what the
+autopilot is known to ask for,
+
+    a_model = a_r + c + k_v (ė + k_p e),   e = p_r − p,
+
+with the reference (p_r, v_r, a_r), the compensation c that was sent and the gains k_p, k_v of the firmware's
+own loops, delayed by the lag of its attitude loop. ArduPilot does not chase the set-point but a trajectory
+that itself chases the set-point with bounded jerk: there (p_r, v_r, a_r + c) are that trajectory's, which is
+predicted as well. What the measured velocity has less is the disturbance d =
+κ v + w: κ, the drag per speed, is learnt from how d changes with the velocity (a Kalman filter of one state),
+w is the rest. The compensation ρ (κ v_r + w) is added to the set-point's acceleration; position and velocity
+stay the plan's. ρ < 1 lets what a vehicle does not answer to decay.
+
+PX4's position loop is proportional. An estimated velocity that is off by b, as GNSS makes it for seconds,
+leaves the vehicle b/k_p beside its set-point for as long; there the velocity set-point is corrected by an
+integral of the error.
+"""
+
+from __future__ import annotations
+
+from math import exp, sqrt
+
+import numpy as np
+from pydantic import Field
+
+from companion.autopilots import Loop, Shaping
+from companion.horizon import Array, Motion
+from companion.settings import Positive, Settings
+
+_SHARE = 0.9
+"""ρ."""
+_SLOW = 3.0
+"""s: time constant of the means that velocity and disturbance are compared with to learn κ."""
+_DOUBT, _DRIFT, _NOISE = 1.0, 0.002, 0.2
+"""Of κ: variance at first (1/s²), its growth (1/s³), spectral density of the disturbance's noise (m²/s³)."""
+_MOST_BIAS = 0.5
+"""m/s."""
+_MOST_DRAG = 2.0
+"""1/s."""
+_LONGEST = 0.1
+"""s between two observations; after a longer pause it begins anew."""
+_CELL, _CELLS = 0.01, 501
+"""m, and how many cells there are; the last holds what is larger."""
+_FORGET = 10.0
+"""s, in which the envelope of the error falls to 1/e."""
+
+
+class TrackingConfig(Settings):
+    """What is done about the difference between set-points and vehicle."""
+
+    compensate: bool = Field(
+        False, description="add to the set-point's acceleration what drag and wind take from the vehicle"
+    )
+    bandwidth: float = Field(1.0, gt=0.0, le=20.0, description="1/s, of the disturbance observer")
+    lag: float = Field(0.18, ge=0.0, le=2.0, description="s, of the autopilot's attitude loop")
+    most: float = Field(4.0, ge=0.0, le=10.0, description="m/s², of the compensation")
+    usual: Positive | None = Field(
+        None,
+        description="m: what the error has lately had beyond it, all keep further away; null: not told",
+    )
+    alarm: Positive | None = Field(
+        None, description="m: a larger error is a concern, and the vehicle flies cautiously; null: none is"
+    )
+
+    @property
+    def largest(self) -> float:
+        """The largest compensation, m/s²."""
+        return self.most if self.compensate else 0.0
+
+
+class Errors:
+    """How large errors were, in little memory: cells of 1 cm up to 5 m."""
+
+    def __init__(self) -> None:
+        self._cells = np.zeros(_CELLS, dtype=np.int64)
+        self.worst = 0.0
+
+    def add(self, error: float) -> None:
+        """One more (m)."""
+        self._cells[min(int(error / _CELL), _CELLS - 1)] += 1
+        self.worst = max(self.worst, error)
+
+    def percentile(self, share: float) -> float | None:
+        """What ``share`` (0…1) of them do not exceed, m; None without any."""
+        count = int(self._cells.sum())
+        if not count:
+            return None
+        below = int(np.searchsorted(np.cumsum(self._cells), share * count))
+        return min((below + 1) * _CELL, self.worst)
+
+
+class Tracking:
+    """Of one vehicle. ``error`` (3,): measured less reference position, m; ``envelope``: its largest norm
+    lately, m; ``compensation`` (3,) m/s² and ``bias`` (3,) m/s: what is added to the acceleration and to the
+    velocity of set-points, fleet-local ENU, horizontal."""
+
+    def __init__(self, config: TrackingConfig) -> None:
+        self._config = config
+        self._drag, self._doubt = 0.0, _DOUBT
+        self.errors = Errors()
+        """Of all that was followed."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Nothing is followed. The drag stays known: it is the vehicle's."""
+        self._last: int | None = None
+        self.error: Array = np.zeros(3)
+        self.envelope = 0.0
+        self.compensation: Array = np.zeros(3)
+        self.bias: Array = np.zeros(3)
+        self._velocity: Array = np.zeros(2)
+        self._rest: Array = np.zeros(2)
+        self._asked: Array = np.zeros(2)
+        # The autopilot's own trajectory: how far it is ahead of the reference, and its acceleration.
+        self._ahead: Array = np.zeros((2, 2))
+        self._fed: Array = np.zeros(2)
+        self._means: Array = np.zeros((2, 2))
+
+    @property
+    def excess(self) -> float:
+        """By how much (m) the error has lately been larger than usual."""
+        usual = self._config.usual
+        return 0.0 if usual is None else max(self.envelope - usual, 0.0)
+
+    @property
+    def drag(self) -> float:
+        """κ, 1/s."""
+        return self._drag
+
+    def observe(self, now: int, reference: Motion, measured: Motion, loop: Loop) -> None:
+        """At ``now`` (µs) the set-points say ``reference``, and the vehicle is ``measured``; ``loop``: gains
+        of its autopilot."""
+        self.error = measured.position - reference.position
+        size = float(np.sqrt(self.error @ self.error))
+        last, self._last = self._last, now
+        dt = 0.0 if last is None else (now - last) * 1e-6
+        self.envelope = max(size, self.envelope * exp(-dt / _FORGET))
+        self.errors.add(size)
+        if not self._config.compensate:
+            return
+        if not 0.0 < dt <= _LONGEST:
+            self._velocity = measured.velocity[:2].copy()
+            self._asked = self._fed = reference.acceleration[:2] + self.compensation[:2]
+            self._means = np.stack([self._velocity, self._disturbance(self._velocity)])
+            return
+        if loop.bias:
+            bias = _limited(self.bias[:2] - loop.bias * dt * self.error[:2], _MOST_BIAS)
+            self.bias = np.append(bias, 0.0)
+        self._predict(dt, reference, measured, loop)
+        self._learn(dt, measured.velocity[:2])
+        self._compensate(dt, reference, loop.slew)
+
+    def _disturbance(self, velocity: Array) -> Array:
+        total: Array = self._drag * velocity + self._rest
+        return total
+
+    def _predict(self, dt: float, reference: Motion, measured: Motion, loop: Loop) -> None:
+        """One step of the observer: two poles at the bandwidth."""
+        config, velocity = self._config, measured.velocity[:2]
+        self._shape(dt, reference, loop.shaping)
+        place, speed = self._ahead
+        slip = (reference.velocity + self.bias - measured.velocity)[:2] + speed
+        slip += loop.position * (place - self.error[:2])
+        asked = self._fed + loop.velocity * slip
+        share = 1.0 - exp(-dt / config.lag) if config.lag > 0.0 else 1.0
+        self._asked = self._asked + share * (asked - self._asked)
+        pole = config.bandwidth
+        surprise = velocity - self._velocity
+        expected = self._asked - self._disturbance(velocity) + 2.0 * pole * surprise
+        self._velocity = self._velocity + dt * expected
+        self._rest = self._rest - dt * pole**2 * surprise
+
+    def _shape(self, dt: float, reference: Motion, shaping: Shaping | None) -> None:
+        """One step of the autopilot's own trajectory."""
+        told = reference.acceleration[:2] + self.compensation[:2]
+        if shaping is None:
+            self._fed = told
+            return
+        place, speed = self._ahead
+        wanted = told - shaping.velocity * (speed + shaping.position * place)
+        self._fed = self._fed + _limited(wanted - self._fed, shaping.jerk * dt)
+        speed = speed + dt * (self._fed - reference.acceleration[:2])
+        self._ahead = np.stack([place + dt * speed, speed])
+
+    def _learn(self, dt: float, velocity: Array) -> None:
+        """κ, from how disturbance and velocity differ from their means of the last seconds."""
+        now = np.stack([velocity, self._disturbance(velocity)])
+        self._means = self._means + dt / _SLOW * (now - self._means)
+        moved, pushed = now - self._means
+        self._doubt += _DRIFT * dt
+        square = float(moved @ moved)
+        gain = self._doubt / (_NOISE / dt + self._doubt * square)
+        drag = self._drag + gain * float(moved @ pushed - self._drag * square)
+        self._doubt *= 1.0 - gain * square
+        drag = min(max(drag, 0.0), _MOST_DRAG)
+        # What is ascribed to drag from now on is not in the rest any more.
+        self._rest = self._rest + (self._drag - drag) * velocity
+        self._drag = drag
+
+    def _compensate(self, dt: float, reference: Motion, slew: float) -> None:
+        config = self._config
+        ahead = reference.velocity[:2] + config.lag * reference.acceleration[:2]
+        wanted = _limited(_SHARE * self._disturbance(ahead), config.most)
+        change = _limited(wanted - self.compensation[:2], slew * dt)
+        self.compensation = np.append(self.compensation[:2] + change, 0.0)
+
+
+def _limited(vector: Array, most: float) -> Array:
+    size = sqrt(float(vector @ vector))
+    return vector if size <= most else vector * (most / size)

@@ -1,0 +1,106 @@
+"""The disturbance observer on a vehicle of the observer's own kind: drag and wind are found, and the error goes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from companion.autopilots import Loop, Shaping
+from companion.horizon import Motion
+from companion.tracking import Errors, Tracking, TrackingConfig
+
+LOOP = Loop(1.0, 2.0, 4.0)
+DT = 0.02
+
+
+def weave(t):
+    """A reference (position, velocity, acceleration) that speeds up and slows down eastwards."""
+    w, size = 0.5, 6.0
+    east = size * np.array([1.0 - np.cos(w * t), w * np.sin(w * t), w * w * np.cos(w * t)])
+    return Motion(*(np.array([part, 0.0, 5.0 * (k == 0)]) for k, part in enumerate(east)))
+
+
+def flown(config, drag=0.0, wind=0.0, loop=LOOP, bias=0.0, seconds=40.0):
+    """Errors (n,) m of a point mass under that loop, whose estimated velocity is off by ``bias``."""
+    tracking = Tracking(config)
+    x, v = weave(0.0).position.copy(), np.zeros(3)
+    off = []
+    for k in range(round(seconds / DT)):
+        r = weave(k * DT)
+        told = Motion(x, v + [bias, 0.0, 0.0], np.zeros(3))
+        tracking.observe(k * round(1e6 * DT), r, told, loop)
+        slip = r.velocity + tracking.bias - told.velocity + loop.position * (r.position - x)
+        a = r.acceleration + tracking.compensation + loop.velocity * slip
+        a = a - drag * (v - [wind, 0.0, 0.0])
+        x, v = x + DT * v + 0.5 * DT * DT * a, v + DT * a
+        off.append(np.linalg.norm(x - weave((k + 1) * DT).position))
+    return np.array(off), tracking
+
+
+ON = TrackingConfig(compensate=True, lag=0.0)
+OFF = TrackingConfig(lag=0.0)
+
+
+@pytest.mark.parametrize("drag", [0.3, 1.0])
+def test_drag_is_learnt_and_its_error_goes(drag):
+    plain, _ = flown(OFF, drag=drag)
+    found, tracking = flown(ON, drag=drag)
+    assert tracking.drag == pytest.approx(drag, rel=0.25)
+    assert np.percentile(found[1000:], 95) < 0.35 * np.percentile(plain[1000:], 95)
+
+
+def test_wind_is_found():
+    plain, _ = flown(OFF, drag=0.3, wind=4.0)
+    found, _ = flown(ON, drag=0.3, wind=4.0)
+    assert found[1000:].mean() < 0.35 * plain[1000:].mean()
+
+
+def test_a_vehicle_that_follows_exactly_is_left_alone():
+    found, tracking = flown(ON)
+    assert found.max() < 0.02
+    assert np.linalg.norm(tracking.compensation) < 0.1
+
+
+def test_a_velocity_that_is_off_is_made_up_for_where_the_autopilot_does_not():
+    plain, _ = flown(ON, bias=0.3)
+    found, tracking = flown(ON, bias=0.3, loop=LOOP._replace(bias=0.25))
+    assert found[1500:].mean() < 0.5 * plain[1500:].mean()
+    assert np.linalg.norm(tracking.bias) <= 0.5
+
+
+def test_an_autopilot_with_a_trajectory_of_its_own_is_predicted():
+    """What the shaping holds back is not taken for a disturbance."""
+    tracking = Tracking(ON)
+    loop = LOOP._replace(shaping=Shaping(5.0, 1.0, 2.0))
+    step = Motion(np.zeros(3), np.zeros(3), np.array([3.0, 0.0, 0.0]))
+    # The vehicle does as a trajectory of bounded jerk does: 5 m/s³ from rest.
+    for k in range(20):
+        t = k * DT
+        r = Motion(step.acceleration * 0.5 * t * t, step.acceleration * t, step.acceleration)
+        measured = Motion(np.array([5.0 * t**3 / 6.0, 0, 0]), np.array([2.5 * t * t, 0, 0]), np.zeros(3))
+        tracking.observe(k * round(1e6 * DT), r, measured, loop)
+    shaped = np.linalg.norm(tracking.compensation)
+    plain = Tracking(ON)
+    for k in range(20):
+        t = k * DT
+        r = Motion(step.acceleration * 0.5 * t * t, step.acceleration * t, step.acceleration)
+        measured = Motion(np.array([5.0 * t**3 / 6.0, 0, 0]), np.array([2.5 * t * t, 0, 0]), np.zeros(3))
+        plain.observe(k * round(1e6 * DT), r, measured, LOOP)
+    assert shaped < np.linalg.norm(plain.compensation)
+
+
+def test_a_pause_begins_anew():
+    _, tracking = flown(ON, drag=1.0, seconds=5.0)
+    tracking.reset()
+    assert not tracking.compensation.any()
+    assert not tracking.bias.any()
+    assert tracking.drag > 0.0
+
+
+def test_errors_are_counted():
+    errors = Errors()
+    assert errors.percentile(0.95) is None
+    for k in range(100):
+        errors.add(0.01 * k)
+    assert errors.percentile(0.95) == pytest.approx(0.95, abs=0.015)
+    assert errors.worst == pytest.approx(0.99)
