@@ -23,11 +23,12 @@ _CENTIDEGREE: Final = math.radians(0.01)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Horizontal limits of an autopilot that follows set-points.
+    """Limits of an autopilot that follows set-points, horizontal but for ``climb`` and ``sink``.
 
     ``jerk`` (m/s³), ``acceleration`` (m/s²), ``speed`` (m/s), ``tilt`` (rad). ``position_gain`` and
-    ``velocity_gain`` (1/s): of the loops that close on position and velocity. ``shaped``: jerk and
-    acceleration are enforced on set-points; otherwise only speed and tilt are.
+    ``velocity_gain`` (1/s): of the loops that close on position and velocity. ``climb`` and ``sink`` (m/s):
+    vertical speeds, both positive. ``shaped``: jerk and acceleration are enforced on set-points; otherwise
+    only speeds and tilt are.
     """
 
     jerk: float
@@ -36,6 +37,8 @@ class Limits:
     tilt: float
     position_gain: float
     velocity_gain: float
+    climb: float
+    sink: float
     shaped: bool
 
     @property
@@ -73,6 +76,8 @@ _STOCK: Final[Mapping[int, Mapping[str, float]]] = MappingProxyType(
                 "PSC_ANGLE_MAX": 0.0,
                 "PSC_POSXY_P": 1.0,
                 "PSC_VELXY_P": 2.0,
+                "WPNAV_SPEED_UP": 250.0,
+                "WPNAV_SPEED_DN": 150.0,
                 "ATC_ACCEL_R_MAX": 110000.0,
                 "ATC_ACCEL_P_MAX": 110000.0,
             }
@@ -85,6 +90,8 @@ _STOCK: Final[Mapping[int, Mapping[str, float]]] = MappingProxyType(
                 "MPC_TILTMAX_AIR": 45.0,
                 "MPC_XY_P": 0.95,
                 "MPC_XY_VEL_P_ACC": 1.8,
+                "MPC_Z_VEL_MAX_UP": 3.0,
+                "MPC_Z_VEL_MAX_DN": 1.5,
             }
         ),
     }
@@ -124,6 +131,8 @@ def _ardupilot(values: Mapping[str, float], stock: Mapping[str, float]) -> Limit
         _tilt(tilt),
         max(values["PSC_POSXY_P"], 0.0),
         max(values["PSC_VELXY_P"], 0.0),
+        max(0.01 * values["WPNAV_SPEED_UP"], 0.0),
+        max(0.01 * values["WPNAV_SPEED_DN"], 0.0),
         shaped=True,
     )
 
@@ -136,8 +145,54 @@ def _px4(values: Mapping[str, float]) -> Limits:
         _tilt(math.radians(values["MPC_TILTMAX_AIR"])),
         max(values["MPC_XY_P"], 0.0),
         max(values["MPC_XY_VEL_P_ACC"], 0.0),
+        max(values["MPC_Z_VEL_MAX_UP"], 0.0),
+        max(values["MPC_Z_VEL_MAX_DN"], 0.0),
         shaped=False,
     )
+
+
+_DECIDING: Final[Mapping[int, Mapping[str, tuple[str, ...]]]] = MappingProxyType(
+    {
+        ARDUPILOT.autopilot: MappingProxyType(
+            {
+                "jerk": ("PSC_JERK_XY", "ATC_ACCEL_R_MAX", "ATC_ACCEL_P_MAX"),
+                "acceleration": ("WPNAV_ACCEL",),
+                "speed": ("WPNAV_SPEED",),
+                "tilt": ("ANGLE_MAX", "PSC_ANGLE_MAX"),
+                "position_gain": ("PSC_POSXY_P",),
+                "velocity_gain": ("PSC_VELXY_P",),
+                "climb": ("WPNAV_SPEED_UP",),
+                "sink": ("WPNAV_SPEED_DN",),
+            }
+        ),
+        PX4.autopilot: MappingProxyType(
+            {
+                "jerk": ("MPC_JERK_MAX",),
+                "acceleration": ("MPC_ACC_HOR",),
+                "speed": ("MPC_XY_VEL_MAX",),
+                "tilt": ("MPC_TILTMAX_AIR",),
+                "position_gain": ("MPC_XY_P",),
+                "velocity_gain": ("MPC_XY_VEL_P_ACC",),
+                "climb": ("MPC_Z_VEL_MAX_UP",),
+                "sink": ("MPC_Z_VEL_MAX_DN",),
+            }
+        ),
+    }
+)
+
+
+def deciding(autopilot: int, parameters: Mapping[str, float], limit: str) -> tuple[str, float]:
+    """The parameter, with its value, that makes the field ``limit`` of ``limits_of`` what it is: of several
+    the one that alone comes nearest to it."""
+    actual = getattr(limits_of(autopilot, parameters), limit)
+    stock = _STOCK[autopilot]
+    values = {name: _finite(parameters.get(name), stock[name]) for name in _DECIDING[autopilot][limit]}
+
+    def off(name: str) -> float:
+        return abs(float(getattr(limits_of(autopilot, {name: values[name]}), limit)) - float(actual))
+
+    nearest = min(values, key=off)
+    return nearest, values[nearest]
 
 
 def _finite(value: float | None, usual: float) -> float:

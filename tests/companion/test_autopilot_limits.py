@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.autopilots.known import KNOWN
-from companion.autopilots.limits import STOCK, Limits, limits_of, stock_parameters
+from companion.autopilots.limits import STOCK, Limits, deciding, limits_of, stock_parameters
 
 ARDUPILOT, PX4 = 3, 12
 BOTH = (ARDUPILOT, PX4)
@@ -25,6 +25,7 @@ def test_stock_limits_in_si() -> None:
     assert (px4.jerk, px4.acceleration, px4.speed) == (8.0, 3.0, 12.0)
     assert math.degrees(px4.tilt) == pytest.approx(45.0)
     assert (px4.position_gain, px4.velocity_gain, px4.shaped) == (0.95, 1.8, False)
+    assert (ardupilot.climb, ardupilot.sink, px4.climb, px4.sink) == (2.5, 1.5, 3.0, 1.5)
     assert ardupilot.tilt_acceleration == pytest.approx(5.66, abs=0.01)
     assert px4.tilt_acceleration == pytest.approx(9.81, abs=0.01)
 
@@ -54,6 +55,10 @@ def test_an_autopilot_that_is_not_known() -> None:
         (ARDUPILOT, "PSC_ANGLE_MAX", 25.0, "tilt", math.radians(25.0)),
         (ARDUPILOT, "PSC_POSXY_P", 0.7, "position_gain", 0.7),
         (ARDUPILOT, "PSC_VELXY_P", 1.4, "velocity_gain", 1.4),
+        (ARDUPILOT, "WPNAV_SPEED_UP", 200.0, "climb", 2.0),
+        (ARDUPILOT, "WPNAV_SPEED_DN", 100.0, "sink", 1.0),
+        (PX4, "MPC_Z_VEL_MAX_UP", 2.0, "climb", 2.0),
+        (PX4, "MPC_Z_VEL_MAX_DN", 1.0, "sink", 1.0),
         (PX4, "MPC_JERK_MAX", 4.0, "jerk", 4.0),
         (PX4, "MPC_ACC_HOR", 2.0, "acceleration", 2.0),
         (PX4, "MPC_XY_VEL_MAX", 6.0, "speed", 6.0),
@@ -118,6 +123,28 @@ def test_stopping_of_the_stock_firmware() -> None:
     assert STOCK[PX4].stopping_distance(5.0) == pytest.approx(25.0 / 6.0 + 5.0 * 3.0 / 16.0)
     assert STOCK[PX4].stopping_distance(0.0) == 0.0
     assert limits_of(PX4, {"MPC_ACC_HOR": 0.0}).stopping_distance(1.0) == math.inf
+
+
+@pytest.mark.parametrize("autopilot", BOTH)
+def test_each_limit_names_the_parameter_that_decides_it(autopilot: int) -> None:
+    stock = stock_parameters(autopilot)
+    for field in fields(Limits):
+        if field.name == "shaped":
+            continue
+        name, value = deciding(autopilot, stock, field.name)
+        assert value == stock[name]
+        lower = {**stock, name: 0.4 * value}
+        assert getattr(limits_of(autopilot, lower), field.name) < getattr(STOCK[autopilot], field.name)
+        assert deciding(autopilot, lower, field.name) == (name, 0.4 * value)
+
+
+def test_of_two_parameters_that_bound_a_limit_the_one_that_does_is_named() -> None:
+    slow = {"PSC_JERK_XY": 4.0, "ATC_ACCEL_P_MAX": 5000.0}
+    assert deciding(ARDUPILOT, slow, "jerk") == ("ATC_ACCEL_P_MAX", 5000.0)
+    assert deciding(ARDUPILOT, {**slow, "PSC_JERK_XY": 1.0}, "jerk") == ("PSC_JERK_XY", 1.0)
+    # PSC_ANGLE_MAX counts in place of ANGLE_MAX.
+    tilts = {"ANGLE_MAX": 1500.0, "PSC_ANGLE_MAX": 20.0}
+    assert deciding(ARDUPILOT, tilts, "tilt") == ("PSC_ANGLE_MAX", 20.0)
 
 
 @pytest.mark.parametrize("autopilot", BOTH)

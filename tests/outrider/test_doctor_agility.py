@@ -51,6 +51,8 @@ def test_the_stock_vehicle_follows_what_the_stock_firmware_does(flavour: str) ->
         ("ardupilot", "ANGLE_MAX", 2000.0, "20° of tilt give 3.6 m/s²"),
         ("ardupilot", "PSC_POSXY_P", 0.5, "A distance from the set-point halves in 1.4 s, stock in 0.7 s"),
         ("ardupilot", "PSC_VELXY_P", 1.0, "A difference in velocity halves in 0.7 s, stock in 0.3 s"),
+        ("ardupilot", "WPNAV_SPEED_DN", 50.0, "climbs or sinks with 0.5 m/s at most, stock 1.5 m/s"),
+        ("px4", "MPC_Z_VEL_MAX_UP", 1.0, "climbs or sinks with 1 m/s at most, stock 1.5 m/s"),
         ("px4", "MPC_ACC_HOR", 2.0, "enforces it in its own modes"),
         ("px4", "MPC_JERK_MAX", 2.0, "enforces it in its own modes"),
         ("px4", "MPC_JERK_AUTO", 2.0, "change acceleration by 2 m/s³ at most"),

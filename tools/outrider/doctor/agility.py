@@ -122,6 +122,9 @@ def _costs(limits: Limits, stock: Limits) -> Iterator[str]:
         )
     if limits.speed < _LOWER * stock.speed:
         yield f"It corrects its way with {limits.speed:.3g} m/s at most, stock {stock.speed:.3g} m/s."
+    vertical, usual = min(limits.climb, limits.sink), min(stock.climb, stock.sink)
+    if vertical < _LOWER * usual:
+        yield f"It climbs or sinks with {vertical:.3g} m/s at most, stock {usual:.3g} m/s."
     if limits.position_gain < _LOWER * stock.position_gain:
         yield _slower("A distance from the set-point", limits.position_gain, stock.position_gain)
     if limits.velocity_gain < _LOWER * stock.velocity_gain:
