@@ -22,7 +22,7 @@ integral of the error.
 
 from __future__ import annotations
 
-from math import exp, sqrt
+from math import exp, inf, sqrt
 
 import numpy as np
 from pydantic import Field
@@ -100,7 +100,7 @@ class Tracking:
 
     def __init__(self, config: TrackingConfig) -> None:
         self._config = config
-        self._drag, self._doubt = 0.0, _DOUBT
+        self._drag, self._doubt, self._room = 0.0, _DOUBT, inf
         self.errors = Errors()
         """Of all that was followed."""
         self.reset()
@@ -119,6 +119,10 @@ class Tracking:
         self._ahead: Array = np.zeros((2, 2))
         self._fed: Array = np.zeros(2)
         self._means: Array = np.zeros((2, 2))
+
+    def keep(self, acceleration: float) -> None:
+        """Reference and compensation together ask for no more ``acceleration`` (m/s²) from now on."""
+        self._room = acceleration
 
     @property
     def excess(self) -> float:
@@ -206,7 +210,20 @@ class Tracking:
         ahead = reference.velocity[:2] + config.lag * reference.acceleration[:2]
         wanted = _limited(_SHARE * self._disturbance(ahead), config.most)
         change = _limited(wanted - self.compensation[:2], slew * dt)
-        self.compensation = np.append(self.compensation[:2] + change, 0.0)
+        added = _beside(reference.acceleration[:2], self.compensation[:2] + change, self._room)
+        self.compensation = np.append(added, 0.0)
+
+
+def _beside(asked: Array, added: Array, most: float) -> Array:
+    """As much of ``added`` (2,) as makes both together no larger than ``most``; nothing where ``asked`` (2,)
+    alone is larger."""
+    together = asked + added
+    if float(together @ together) <= most * most:
+        return added
+    square, along, room = float(added @ added), float(asked @ added), most * most - float(asked @ asked)
+    if room <= 0.0:
+        return np.zeros(2)
+    return added * ((sqrt(along * along + square * room) - along) / square)
 
 
 def _limited(vector: Array, most: float) -> Array:
