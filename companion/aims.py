@@ -56,7 +56,8 @@ class Aims:
         phase = self._pilot.phase
         if phase is not self._phase:
             self._phase, self._held = phase, None
-            self._settling = Settling(self._config)
+            limits = self._pilot.limits.lowered.limits
+            self._settling = Settling(self._config.model_copy(update={"limits": limits}))
             self._nearest = inf
         elif phase is Phase.ESCORT and self._config.task == "escort" and view.target is not None:
             self._held = None

@@ -348,6 +348,11 @@ class CompanionConfig(Settings):
     horizon: HorizonConfig = HorizonConfig()
     cost: CostConfig = CostConfig()
     limits: LimitsConfig = LimitsConfig()
+    limits_from_autopilot: bool = Field(
+        False,
+        description="read before the go, from the autopilot's parameters, what it can follow, and lower the"
+        " limits to it; with avoidance 'field'",
+    )
     field: FieldConfig = FieldConfig()
     tangential: TangentialConfig = TangentialConfig()
     swivel: SwivelConfig = SwivelConfig()

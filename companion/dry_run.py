@@ -1,7 +1,7 @@
 """An understudy on a live link: it asks for the messages that it needs, and orders nothing.
 
-What leaves it: heartbeats, requests for messages and for the time, and texts; not as the companion, which may
-be there as well. It answers no order.
+What leaves it: heartbeats, requests for messages, parameters and the time, and texts; not as the companion,
+which may be there as well. It answers no order.
 """
 
 from __future__ import annotations
@@ -11,7 +11,15 @@ from companion.node import Companion
 from companion.readiness import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
 from companion.understudy import Onlooker, Understudy
 from companion.world import View
-from mavlink_bridge.messages import CommandLong, Heartbeat, Message, Source, StatusText, Timesync
+from mavlink_bridge.messages import (
+    CommandLong,
+    Heartbeat,
+    Message,
+    ParamRequestRead,
+    Source,
+    StatusText,
+    Timesync,
+)
 from mavlink_bridge.node import Datagram
 
 ONLOOKER = 194
@@ -30,7 +38,7 @@ class _Asking(Onlooker):
         super().__init__(config, own._replace(component=ONLOOKER), origin_altitude)
 
     def step(self, now: int, view: View) -> list[Message]:
-        """Requests for messages alone."""
+        """Requests for messages and parameters alone."""
         super().step(now, view)
         self.lacking = self._readiness.missing(view, go=self._height is not None)
         wishes = self._readiness.wishes(now) if self._readiness.heard else []
@@ -56,4 +64,4 @@ class DryRun(Understudy):
 def _changes_nothing(message: Message) -> bool:
     if isinstance(message, CommandLong):
         return message.command in REQUESTS
-    return isinstance(message, Heartbeat | StatusText | Timesync)
+    return isinstance(message, Heartbeat | StatusText | Timesync | ParamRequestRead)

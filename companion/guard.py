@@ -8,7 +8,7 @@ from math import ceil
 
 import numpy as np
 
-from companion.config import CompanionConfig
+from companion.config import CompanionConfig, LimitsConfig
 from companion.horizon import Horizon, Motion, roll_out
 
 _STEP = 0.2
@@ -41,6 +41,10 @@ class Guard:
         self._anchored_at = 0
         self.failing: int | None = None
         """Since when (µs) the solver finds no plan; None while it does."""
+
+    def keep(self, limits: LimitsConfig) -> None:
+        """Brake within other ``limits`` from now on."""
+        self._config = self._config.model_copy(update={"limits": limits})
 
     def start(self, now: int, motion: Motion) -> None:
         """Fly from this state on: a hover there until the first plan."""

@@ -23,7 +23,7 @@ from companion.reception import LINKS, accepts
 from companion.round_trips import RoundTrips
 from companion.setpoint import is_finite, setpoint
 from companion.sharing import Sharing
-from companion.voice import Voice
+from companion.voice import Severity, Voice
 from companion.watch import Situation, Watch
 from companion.world import View, World
 from mavlink_bridge.codec import Codec, Counters
@@ -36,6 +36,8 @@ COMPONENT = 195
 """MAV_COMP_ID_PATHPLANNER."""
 _LOOK = 100_000
 """µs between two looks at what may be wrong."""
+_PLAIN = str.maketrans({"²": "2", "³": "3", "°": "deg"})
+"""STATUSTEXT is ASCII."""
 _NOTHING: dict[str, list[Message]] = {"autopilot": [], "ground": []}
 
 
@@ -75,7 +77,7 @@ class Companion:
         self.watch = Watch(config)
         self._reactions = Reactions()
         self._round_trips = RoundTrips(self._source)
-        self._next_look = self._looked_late = 0
+        self._next_look = self._looked_late = self._remarked = 0
         self._certified = (
             CertifiedFlight(config, self._source, fleet) if config.avoidance == "certified" else None
         )
@@ -260,6 +262,15 @@ class Companion:
                 self.voice.report(concern.severity, concern.text, begins=change.begins)
             self._reactions.note(change)
         self._reactions.follow(self.pilot)
+        self._tell_limits()
+
+    def _tell_limits(self) -> None:
+        """To the ground, what was found out of the autopilot's limits."""
+        limits = self.pilot.limits
+        new = min(limits.said - self._remarked, len(limits.remarks))
+        for text in list(limits.remarks)[len(limits.remarks) - new :]:
+            self.voice.say(Severity.WARNING, text.translate(_PLAIN))
+        self._remarked = limits.said
 
     def _setpoints(self, now: int, view: View) -> list[Message]:
         if now < self._next_setpoint:

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from enum import Enum
 
-from companion.autopilots import Profile, Step
+from companion.autopilot_limits import AutopilotLimits
+from companion.autopilots import Loop, Profile, Step
 from companion.calls import DO_SET_MODE, Calls
 from companion.config import CompanionConfig
 from companion.custody import Custody, Owner, Passage
@@ -20,7 +21,7 @@ from companion.readiness import Readiness
 from companion.takeoff import NAV_TAKEOFF, Takeoff
 from companion.vehicle import Vehicle
 from companion.world import View
-from mavlink_bridge.messages import CommandAck, Message, Source
+from mavlink_bridge.messages import CommandAck, Message, ParamValue, Source
 
 __all__ = ["NAV_LAND", "NAV_TAKEOFF", "Phase", "Pilot"]
 
@@ -82,6 +83,17 @@ class Pilot:
         return self.vehicle.profile
 
     @property
+    def limits(self) -> AutopilotLimits:
+        """What the autopilot can follow."""
+        return self._readiness.limits
+
+    @property
+    def loop(self) -> Loop | None:
+        """Its gains, None for an autopilot that is not known."""
+        profile = self.profile
+        return self.limits.lowered.loop or (None if profile is None else profile.loop)
+
+    @property
     def said(self) -> str:
         """The last warning of the autopilot."""
         return self.vehicle.said
@@ -120,12 +132,15 @@ class Pilot:
         if isinstance(message, CommandAck):
             self._calls.hear(message)
             self._readiness.hear(message)
+        elif isinstance(message, ParamValue):
+            self.limits.hear(message)
         else:
             self.vehicle.hear(message)
 
     def go(self, height: float) -> bool:
         """The operator's go: climb to ``height`` metres above the start, or take over where it flies already;
-        on the way back, or while it holds, go on with the escort. Whether it is taken."""
+        on the way back, or while it holds, go on with the escort. Whether it is taken: not from the ground by
+        a vehicle that cannot fly an escort as its parameters are."""
         if self.phase in (Phase.HOLD, Phase.RETURN, Phase.ESCORT):
             self.phase, self._returning = Phase.ESCORT, False
             return True
@@ -133,6 +148,8 @@ class Pilot:
             return False
         if self.phase is Phase.PREPARE and self._height not in (None, height):
             # The autopilot may have been told the other height already.
+            return False
+        if self.phase is Phase.CONNECT and self.limits.refuses:
             return False
         if self.phase is Phase.YIELDED:
             self._start_anew()

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.config import CompanionConfig, MethodName
+from companion.config import CompanionConfig, LimitsConfig, MethodName
 from companion.dqmpc import Dqmpc, Problem
 from companion.forces import Obstacles, limit, repulsion
 from companion.horizon import Array, Horizon, roll_out
@@ -65,7 +65,14 @@ class Planner:
 
     def use(self, methods: tuple[MethodName, ...]) -> None:
         """From the next plan on, with nothing latched."""
-        self._methods = build(self.config.model_copy(update={"methods": methods}))
+        self.config = self.config.model_copy(update={"methods": methods})
+        self._methods = build(self.config)
+
+    def keep(self, limits: LimitsConfig) -> None:
+        """Within other ``limits`` from the next plan on, with nothing latched."""
+        self.config = config = self.config.model_copy(update={"limits": limits})
+        self.dqmpc = Dqmpc(config.horizon, config.cost, limits.within(config.field.margin(1)))
+        self._methods = build(config)
 
     def plan(
         self,

@@ -19,6 +19,7 @@ from companion.formation import Spread
 from companion.guard import Guard
 from companion.heading import Heading, Yaw
 from companion.horizon import Array, Motion
+from companion.lowering import Lowered
 from companion.neighbours import fading
 from companion.pilot import Phase, Pilot
 from companion.plan_log import PlanLog
@@ -75,6 +76,7 @@ class Planning:
         self._obstacles = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
         self._frame: LocalFrame | None = None
         self._shares_surface = isinstance(config.formation, Spread)
+        self._lowered = pilot.limits.lowered
         self._fastest = hypot(*config.limits.v_max)
         self._fading = fading(config)
         self._flown = 0
@@ -127,6 +129,8 @@ class Planning:
         if view.local is not self._frame:
             # Where the vehicle was in the old frame must not be flown to in the new one.
             self._frame, self.guard.horizon = view.local, None
+        if self._pilot.limits.lowered is not self._lowered:
+            self._keep(self._pilot.limits.lowered)
         if self._certified is None and now - self._flown > self._config.guard.hold_us:
             # It hung, and the autopilot did as it saw fit: the old plan leads from where nobody is any more.
             self.guard.horizon = None
@@ -160,11 +164,19 @@ class Planning:
         self._observe(now, measured)
         self._plan(now, view, measured, cautious=cautious)
 
+    def _keep(self, lowered: Lowered) -> None:
+        """Plan, brake and compensate within what the autopilot can follow."""
+        self._lowered = lowered
+        self._fastest = hypot(*lowered.limits.v_max)
+        self.planner.keep(lowered.limits)
+        self.guard.keep(lowered.limits)
+        self.tracking.keep(lowered.acceleration)
+
     def _observe(self, now: int, measured: Motion) -> None:
         """See how the vehicle follows what it was sent."""
-        horizon, profile = self.guard.horizon, self._pilot.profile
-        if horizon is not None and profile is not None:
-            self.tracking.observe(now, horizon.at(now), measured, profile.loop)
+        horizon, loop = self.guard.horizon, self._pilot.loop
+        if horizon is not None and loop is not None:
+            self.tracking.observe(now, horizon.at(now), measured, loop)
 
     def _begin(self, now: int, yaw: float, measured: Motion) -> None:
         """To steer, from the ``measured`` state on."""

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from companion.autopilot_limits import AutopilotLimits
 from companion.autopilots import Params
 from companion.calls import DO_SET_MODE, Calls
 from companion.config import CompanionConfig
@@ -44,6 +45,7 @@ class Readiness:
         self._vehicle = vehicle
         self._calls = calls
         self._wishes = Calls(calls.own)
+        self.limits = AutopilotLimits(config, vehicle, calls.own)
 
     def hear(self, ack: CommandAck) -> None:
         """An answer of the autopilot."""
@@ -52,6 +54,7 @@ class Readiness:
     def forget(self) -> None:
         """Nothing was asked or answered."""
         self._wishes.forget()
+        self.limits.forget()
 
     @property
     def heard(self) -> bool:
@@ -99,6 +102,8 @@ class Readiness:
             return f"the autopilot's pre-arm checks{self._starving()}"
         if not self.heard:
             return "the autopilot's answers to SET_MESSAGE_INTERVAL"
+        if waiting := self.limits.waiting:
+            return waiting
         return "" if go else OPERATORS_GO
 
     def _starving(self) -> str:
@@ -125,8 +130,8 @@ class Readiness:
         return "" if left is None or left >= low else f"a battery above {100 * low:.0f} %"
 
     def requests(self, now: int) -> list[Message]:
-        """For the messages that are needed, which change nothing of what the vehicle does; and for the mode
-        in which a disarmed vehicle passes its checks."""
+        """For the messages and parameters that are needed, which change nothing of what the vehicle does; and
+        for the mode in which a disarmed vehicle passes its checks."""
         calls: list[Message] = []
         profile, vehicle = self._vehicle.profile, self._vehicle
         if profile is not None and vehicle.alive and vehicle.starved and not vehicle.healthy:
@@ -137,4 +142,4 @@ class Readiness:
                 calls += self._calls.call(now, command, params)
             # Again from time to time: an autopilot that began anew elsewhere has another origin.
             calls += self._calls.call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-        return calls
+        return calls + self.limits.step(now)

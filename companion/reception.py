@@ -11,6 +11,7 @@ AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1: other components of the vehicle have no say in where it is."""
 _DISTANCES, _TRAFFIC = 330, 246
 """Sensors of the own system may be on both links; traffic may be told by anybody on the swarm's."""
+_PARAMETER = 22
 _WHERE = {33, 385}
 """What a neighbour says of where it is and will be: not decoded while it is out of earshot."""
 _WANTED = {
@@ -33,6 +34,8 @@ def accepts(
     messages wanted there, from whom they may come. ``ignores``: what sender and component on the swarm link
     are out of earshot."""
     wanted = _WANTED.get(link, set())
+    if link == "autopilot" and config.limits_from_autopilot:
+        wanted = wanted | {_PARAMETER}
     source = config.target_source
     sensors = {_DISTANCES} if config.proximity is not None else set()
     sensors |= {_TRAFFIC} if config.traffic is not None else set()

@@ -54,6 +54,7 @@ class Profile(NamedTuple):
     missing for too long; ``loss_modes``: those of them that no pilot flies in. ``takeoff_modes`` and
     ``land_modes``: those into which NAV_TAKEOFF, where it changes the mode, and NAV_LAND lead.
     ``loop``: how it follows set-points.
+    ``bytewise``: PARAM_VALUE holds the bytes of an integer parameter, not its value as a float.
     """
 
     name: str
@@ -74,6 +75,7 @@ class Profile(NamedTuple):
     loss_modes: frozenset[int] = frozenset()
     takeoff_modes: frozenset[int] = frozenset()
     loop: Loop = Loop(1.0, 2.0, 1.0)
+    bytewise: bool = False
 
     @property
     def mode_call(self) -> Params:

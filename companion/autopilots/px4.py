@@ -29,4 +29,5 @@ PX4 = Profile(
     # MPC_XY_P and MPC_XY_VEL_P_ACC.
     # Its position loop has no integral: an estimated velocity that is off by 0.3 m/s stays 0.3 m beside.
     loop=Loop(0.95, 1.8, 4.0, bias=0.25),
+    bytewise=True,
 )

@@ -15,7 +15,15 @@ from companion.node import COMPONENT, Companion
 from companion.pilot import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import CommandLong, LocalPosition, Message, Source, StatusText, Timesync
+from mavlink_bridge.messages import (
+    CommandLong,
+    LocalPosition,
+    Message,
+    ParamRequestRead,
+    Source,
+    StatusText,
+    Timesync,
+)
 from mavlink_bridge.node import Datagram
 from sitl.autopilot_config import AutopilotConfig
 from sitl.node import Autopilot
@@ -51,6 +59,8 @@ class SingleVehicle:
         self._codec, self._reader, self._writer = Codec(), Codec(), Codec()
         self.timeless = False
         """Whether no question for the time reaches the autopilot."""
+        self.secretive = False
+        """Whether no request for a parameter reaches the autopilot."""
         self.mute = False
         """Whether nothing that it says of its place reaches the companion."""
         self.companion = self._companion()
@@ -83,6 +93,8 @@ class SingleVehicle:
         up = [datagram for datagram in self._down if datagram.link == "autopilot"]
         if self.timeless:
             up = [Datagram(link, self._without(Timesync, data)) for link, data in up]
+        if self.secretive:
+            up = [Datagram(link, self._without(ParamRequestRead, data)) for link, data in up]
         inbox = self.autopilot.step(BOOT + self._pace(self.now - BOOT), up)
         for datagram in inbox:
             self.heard += [(self.now, message) for message in self._codec.feed(datagram.data)]

@@ -11,13 +11,13 @@ from mavlink_bridge.links.link import Link, LinkCounters
 
 _COMMAND_LONG: Final = 76
 _COMMAND: Final = Struct("<28xH")
-_TELL: Final = frozenset((0, 111, 251, 253))
-"""HEARTBEAT, TIMESYNC, NAMED_VALUE_FLOAT, STATUSTEXT."""
+_TELL: Final = frozenset((0, 20, 111, 251, 253))
+"""HEARTBEAT, PARAM_REQUEST_READ, TIMESYNC, NAMED_VALUE_FLOAT, STATUSTEXT."""
 
 
 class HarmlessLink:
-    """``link``, outwards for what only tells, and for requests for messages and for the time. ``kept``:
-    datagrams kept back."""
+    """``link``, outwards for what only tells, and for requests for messages, parameters and the time.
+    ``kept``: datagrams kept back."""
 
     def __init__(self, link: Link) -> None:
         self._link = link

@@ -90,7 +90,7 @@ class News:
         self._phase: Phase | None = None
         self._states = 0
         self._plan_ms = (0.0, 0.0)
-        self._told = self._refused = self._steps = 0
+        self._told = self._refused = self._steps = self._remarked = 0
         self._judged = self._twin = False
         self._landing: Landing | None = None
         self._concerns: dict[str, Concern] = {}
@@ -173,6 +173,11 @@ class News:
             for text in list(vehicle.texts)[len(vehicle.texts) - new :]:
                 self._event(at, "autopilot", text.text)
             self._told = vehicle.told
+        if pilot.limits.said != self._remarked:
+            new = min(pilot.limits.said - self._remarked, len(pilot.limits.remarks))
+            for remark in list(pilot.limits.remarks)[len(pilot.limits.remarks) - new :]:
+                self._event(at, "limits", remark)
+            self._remarked = pilot.limits.said
         if pilot.refused != self._refused:
             for refusal in pilot.refusals[-(pilot.refused - self._refused) :]:
                 self._event(at, "refused", refusal)
