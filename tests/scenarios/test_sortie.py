@@ -1,0 +1,74 @@
+"""Vehicles whose autopilots follow set-points as their firmware does keep apart, and where they should be."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lockstep_flights import fly, setpoints
+
+from outrider.aboard.fly_config import FlyConfig
+from outrider.options import Options, apply
+from outrider.resources import find
+from outrider.scenario import Scenario
+from outrider.yaml_file import load
+
+SORTIE = load(find("scenarios", "sortie"), Scenario)
+
+
+def row(count: int) -> Scenario:
+    places = [[0.0, 5.0 * k, 5.0] for k in range(count)]
+    starts = {"kind": "points", "at": places}
+    return Scenario.model_validate({**SORTIE.model_dump(), "vehicles": count, "starts": starts})
+
+
+def of(count: int, **options: object) -> Scenario:
+    return apply(row(count), Options(**options))
+
+
+@pytest.mark.parametrize("name", ["ardupilot", "px4"])
+def test_its_companions_have_the_settings_of_the_shipped_files(name: str) -> None:
+    assert SORTIE.companion == load(find("companions", name), FlyConfig).companion
+
+
+CALM = [
+    pytest.param(of(5), 5, id="five ArduCopters"),
+    pytest.param(of(5, flavour="px4"), 6, id="five PX4s"),
+    pytest.param(of(8, flavour="ardupilot,px4"), 7, id="eight mixed"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scenario", "seed"), CALM)
+def test_in_calm_air_vehicles_keep_apart_and_follow(scenario: Scenario, seed: int, tmp_path: Path) -> None:
+    flown = fly(scenario, seed, tmp_path)
+    summary = flown.summary
+    assert summary["failure"] is None
+    assert summary["d_min_violations"] == 0
+    assert summary["min_separation_m"] >= 1.5
+    assert summary["tracking_error_m"]["p95"] <= 0.35
+    assert summary["anchored_anew"] == 0
+    assert summary["standoff_error_m"]["p95"] <= 0.6
+    assert largest_step(tmp_path) <= 0.3
+
+
+@pytest.mark.slow
+def test_in_wind_and_with_loss_no_two_come_too_near(tmp_path: Path) -> None:
+    flown = fly(of(8, flavour="ardupilot,px4", wind="4", loss=0.2), 8, tmp_path)
+    assert flown.summary["failure"] is None
+    assert flown.summary["d_min_violations"] == 0
+    assert flown.summary["anchored_anew"] == 0
+
+
+def largest_step(directory: Path) -> float:
+    """By how much (m) a set-point is beside what the one before leads to."""
+    most = 0.0
+    for log in directory.glob("*.tlog"):
+        for before, after in pairwise(setpoints(log)):
+            dt = 1e-6 * (after.time_boot - before.time_boot)
+            if dt < 0.1:
+                p, v, a = (np.array(part) for part in (before.position, before.velocity, before.acceleration))
+                most = max(most, float(np.linalg.norm(p + dt * v + 0.5 * dt * dt * a - after.position)))
+    return most
