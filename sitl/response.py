@@ -41,4 +41,4 @@ def response_of(config: AutopilotConfig) -> Response | None:
     """The response that the settings name; None for the exact one."""
     if config.response == "exact":
         return None
-    return ArduPilotResponse(config.ardupilot) if config.flavour == "ardupilot" else Px4Response(config.px4)
+    return ArduPilotResponse.of(config) if config.flavour == "ardupilot" else Px4Response(config.px4)

@@ -34,6 +34,7 @@ STREAMS: Final = {
 }
 """MAV_DATA_STREAM of the SR0_ parameters, which say how often its messages go out."""
 
+_DEGREE: Final = math.radians(1.0)
 _SWITCH: Final = ((0, "off"), (1, "on"))
 _ACTIONS: Final = ((0, "warn"), (1, "land"), (2, "return"))
 
@@ -48,6 +49,17 @@ BOUND: Final = {
     "WPNAV_RADIUS": Bound("acceptance_radius", 0.01),
     "RTL_ALT": Bound("return_height", 0.01),
     "RTL_LOIT_TIME": Bound("return_pause", 0.001),
+    "PSC_JERK_XY": Bound("ardupilot.jerk"),
+    "PSC_POSXY_P": Bound("ardupilot.position"),
+    "PSC_VELXY_P": Bound("ardupilot.velocity"),
+    "PSC_VELXY_I": Bound("ardupilot.integral"),
+    "PSC_VELXY_D": Bound("ardupilot.derivative"),
+    "PSC_JERK_Z": Bound("ardupilot.jerk_z"),
+    "PSC_POSZ_P": Bound("ardupilot.position_z"),
+    "PSC_VELZ_P": Bound("ardupilot.velocity_z"),
+    "WPNAV_ACCEL": Bound("ardupilot.acceleration", 0.01),
+    "WPNAV_ACCEL_Z": Bound("ardupilot.acceleration_z", 0.01),
+    "ANGLE_MAX": Bound("ardupilot.tilt", 0.01 * _DEGREE),
     "BATT_LOW_VOLT": Bound("battery_failsafe.low_voltage"),
     "BATT_CRT_VOLT": Bound("battery_failsafe.critical_voltage"),
     "BATT_FS_LOW_ACT": Bound("battery_failsafe.low_action", options=_ACTIONS),

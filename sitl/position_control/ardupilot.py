@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Self
 
 from mavlink_bridge.messages import Vector
 from sitl.autopilot_config import AutopilotConfig
 from sitl.position_control.airframe import ARDUPILOT, GRAVITY, Motion, PointMass
 from sitl.position_control.ardupilot_shaping import Shaping
-from sitl.position_control.gains import ArduPilotGains
+from sitl.position_control.gains import ArduPilotGains, Speeds
 from sitl.position_control.square_root import (
     Pair,
     cut,
@@ -26,16 +27,23 @@ class ArduPilotResponse:
     """Where an ArduCopter is that is sent set-points. ``motion`` is the vehicle's, ``desired`` that of the
     trajectory that it chases the set-points with; local NED."""
 
-    def __init__(self, gains: ArduPilotGains) -> None:
+    def __init__(self, gains: ArduPilotGains, speeds: Speeds) -> None:
         self._gains = gains
+        self._speeds = speeds
         self._mass = PointMass(ARDUPILOT)
-        self._shaping = Shaping(gains)
+        self._shaping = Shaping(gains, speeds)
         self.restart(ZERO)
+
+    @classmethod
+    def of(cls, config: AutopilotConfig) -> Self:
+        """That of an autopilot with these settings."""
+        return cls(config.ardupilot, _speeds(config))
 
     def configure(self, config: AutopilotConfig) -> None:
         """Other parameters from now on."""
         self._gains = config.ardupilot
-        self._shaping.configure(config.ardupilot)
+        self._speeds = _speeds(config)
+        self._shaping.configure(self._gains, self._speeds)
 
     @property
     def motion(self) -> Motion:
@@ -80,7 +88,7 @@ class ArduPilotResponse:
         x, y, z = shaping.position
         error = x - mass.position[0], y - mass.position[1]
         # The desired place never runs further ahead than corrections of the permitted speed close.
-        near = cut(error, inverse_square_root_law(gains.speed, gains.position, gains.acceleration))
+        near = cut(error, inverse_square_root_law(self._speeds.level, gains.position, gains.acceleration))
         if near != error:
             error = near
             place = mass.position[0] + near[0], mass.position[1] + near[1], z
@@ -138,9 +146,13 @@ class ArduPilotResponse:
         return joined(max(-room, min(room, along)), across, direction)
 
     def _vertical(self) -> float:
-        gains, mass, shaping = self._gains, self._mass, self._shaping
+        gains, speeds, mass, shaping = self._gains, self._speeds, self._mass, self._shaping
         error = shaping.position[2] - mass.position[2]
         closing = square_root_law(error, gains.position_z, gains.acceleration_z)
-        closing = max(-gains.speed_up, min(gains.speed_down, closing))
+        closing = max(-speeds.up, min(speeds.down, closing))
         slip = closing + shaping.velocity[2] - mass.velocity[2]
         return gains.velocity_z * slip + shaping.acceleration[2]
+
+
+def _speeds(config: AutopilotConfig) -> Speeds:
+    return Speeds(config.waypoint_speed, config.waypoint_climb, config.waypoint_sink)

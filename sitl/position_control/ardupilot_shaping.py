@@ -14,7 +14,7 @@ from typing import Final
 
 from mavlink_bridge.messages import Vector
 from sitl.position_control.airframe import Motion
-from sitl.position_control.gains import ArduPilotGains
+from sitl.position_control.gains import ArduPilotGains, Speeds
 from sitl.position_control.square_root import (
     Pair,
     cut,
@@ -36,13 +36,14 @@ _NONE: Final = (0.0, 0.0)
 class Shaping:
     """``position``, ``velocity``, ``acceleration``: the desired trajectory, local NED."""
 
-    def __init__(self, gains: ArduPilotGains) -> None:
-        self._gains = gains
+    def __init__(self, gains: ArduPilotGains, speeds: Speeds) -> None:
+        self.configure(gains, speeds)
         self.restart(ZERO, ZERO, ZERO)
 
-    def configure(self, gains: ArduPilotGains) -> None:
+    def configure(self, gains: ArduPilotGains, speeds: Speeds) -> None:
         """Other parameters from now on."""
         self._gains = gains
+        self._speeds = speeds
 
     def restart(self, position: Vector, velocity: Vector, acceleration: Vector) -> None:
         """Go on from this motion."""
@@ -77,7 +78,7 @@ class Shaping:
         gains = self._gains
         most, jerk = gains.acceleration, gains.jerk
         error = place[0] - self.position[0], place[1] - self.position[1]
-        closing = cut(directed(error, 0.5 * jerk / most, 0.5 * most, dt), gains.speed)
+        closing = cut(directed(error, 0.5 * jerk / most, 0.5 * most, dt), self._speeds.level)
         aim = closing[0] + velocity[0], closing[1] + velocity[1]
         slip = aim[0] - self.velocity[0], aim[1] - self.velocity[1]
         push = _corrected(directed(slip, jerk / most, jerk, dt), aim, most)
@@ -87,15 +88,15 @@ class Shaping:
         return now[0] + change[0], now[1] + change[1]
 
     def _vertical(self, place: float, velocity: float, acceleration: float, dt: float) -> float:
-        gains, fast = self._gains, self.velocity[2]
+        gains, speeds, fast = self._gains, self._speeds, self.velocity[2]
         gain = 1.0
-        if fast > gains.speed_down:
-            gain = _OVERSPEED * fast / gains.speed_down
-        elif fast < -gains.speed_up:
-            gain = -_OVERSPEED * fast / gains.speed_up
+        if fast > speeds.down:
+            gain = _OVERSPEED * fast / speeds.down
+        elif fast < -speeds.up:
+            gain = -_OVERSPEED * fast / speeds.up
         most, jerk = gains.acceleration_z * gain, gains.jerk_z * gain
         aim = square_root_law(place - self.position[2], 0.5 * jerk / most, 0.5 * most, dt)
-        aim = max(-gains.speed_up, min(gains.speed_down, aim)) + velocity
+        aim = max(-speeds.up, min(speeds.down, aim)) + velocity
         push = square_root_law(aim - fast, jerk / most, jerk, dt)
         push = max(-most, min(most, push)) + acceleration
         change = push - self.acceleration[2]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -11,7 +11,7 @@ ResponseName = Literal["exact", "firmware"]
 
 Positive = Annotated[float, Field(gt=0.0, le=1000.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0.0, le=1000.0, allow_inf_nan=False)]
-Tilt = Annotated[float, Field(gt=0.0, le=math.radians(80.0), allow_inf_nan=False)]
+Tilt = Annotated[float, Field(gt=0.0, le=math.radians(89.5), allow_inf_nan=False)]
 
 
 class ArduPilotGains(BaseModel):
@@ -21,7 +21,6 @@ class ArduPilotGains(BaseModel):
 
     jerk: Positive = Field(5.0, description="PSC_JERK_XY, m/s³")
     acceleration: Positive = Field(2.5, description="WPNAV_ACCEL, m/s²: of corrections")
-    speed: Positive = Field(10.0, description="WPNAV_SPEED, m/s: of corrections")
     position: Positive = Field(1.0, description="PSC_POSXY_P, 1/s")
     velocity: Positive = Field(2.0, description="PSC_VELXY_P, 1/s")
     integral: Share = Field(1.0, description="PSC_VELXY_I, 1/s²")
@@ -30,10 +29,17 @@ class ArduPilotGains(BaseModel):
     tilt: Tilt = Field(math.radians(30.0), description="ANGLE_MAX, rad")
     jerk_z: Positive = Field(5.0, description="PSC_JERK_Z, m/s³")
     acceleration_z: Positive = Field(1.0, description="WPNAV_ACCEL_Z, m/s²: of corrections")
-    speed_up: Positive = Field(2.5, description="WPNAV_SPEED_UP, m/s: of corrections")
-    speed_down: Positive = Field(1.5, description="WPNAV_SPEED_DN, m/s: of corrections")
     position_z: Positive = Field(1.0, description="PSC_POSZ_P, 1/s")
     velocity_z: Positive = Field(5.0, description="PSC_VELZ_P, 1/s")
+
+
+class Speeds(NamedTuple):
+    """Of ArduCopter's corrections (m/s): the same parameters as those of its missions, WPNAV_SPEED, _UP and
+    _DN."""
+
+    level: float = 10.0
+    up: float = 2.5
+    down: float = 1.5
 
 
 class Px4Gains(BaseModel):
@@ -41,7 +47,7 @@ class Px4Gains(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    speed: Positive = Field(12.0, description="MPC_XY_VEL_MAX, m/s")
+    speed: Share = Field(12.0, description="MPC_XY_VEL_MAX, m/s")
     position: Share = Field(0.95, description="MPC_XY_P, 1/s")
     velocity: Positive = Field(1.8, description="MPC_XY_VEL_P_ACC, 1/s")
     integral: Share = Field(0.4, description="MPC_XY_VEL_I_ACC, 1/s²")

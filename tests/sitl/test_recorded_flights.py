@@ -3,7 +3,7 @@ did."""
 
 from __future__ import annotations
 
-from itertools import groupby
+from itertools import combinations, groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,11 +13,12 @@ from autopilot_rig import FIREFLY
 
 from benchmarks.figure_eight import FIRST, FULL, PVY, SECOND, Part, distances, settings, trajectory, turns
 from benchmarks.recorded_flights import RecordedFlight, Told, fly, read_flight
-from benchmarks.response import off
+from benchmarks.recorded_swarms import SwarmVehicle, read_swarm
+from benchmarks.response import SWARMS
+from benchmarks.swarm_responses import Deviations, Followed, closest, follow
 from mavlink_bridge.messages import CommandLong, SetpointLocal
 from mavlink_bridge.tlog import TlogWriter, read_tlog
 from outrider.errors import InputError
-from sitl.response import RESPONSES
 
 FLIGHTS = Path(__file__).parents[1] / "data" / "flights"
 LOGS = ("copter-full", "copter-pvy", "px4-pvay")
@@ -26,6 +27,10 @@ BEAT = 1.2
 LANDING = {"ardupilot": 1.5, "px4": 8.5}
 """s, for what the ground brings about: ours counts as landed after 0.5 s and is disarmed at once. PX4's
 detector took 6 s from when it touched down (its height went on rising), and 2 s more to disarm."""
+NEAR = {FULL: 0.2, PVY: 0.2, FIRST: 0.65, SECOND: 0.45}
+"""m, p95 on the figure-eights. The logs tell the estimate only, and that of PX4 wanders."""
+D_MIN = 0.95
+"""m, that was to be kept in the recorded swarms."""
 
 
 class Pair(NamedTuple):
@@ -88,7 +93,7 @@ def test_it_is_where_the_real_one_was(pairs: dict[str, Pair], part: Part) -> Non
     flight, ours = pairs[part.log]
     errors = distances(flight, part, ours.track)
     assert len(errors) > 150
-    assert np.percentile(errors, 95.0) <= 1.0
+    assert np.percentile(errors, 95.0) <= NEAR[part]
     assert np.degrees(np.percentile(turns(flight, part, ours), 95.0)) <= 10.0
 
 
@@ -101,22 +106,74 @@ def test_it_comes_down_where_the_real_one_did(pairs: dict[str, Pair], log: str) 
     assert np.linalg.norm(ours.position(end) - flight.told.position(end)) < 1.0
 
 
-@pytest.mark.parametrize(("fitted", "held"), [(FULL, PVY), (FIRST, SECOND)], ids=str)
-def test_drag_and_lag_are_those_of_one_part_and_hold_on_the_other(
-    pairs: dict[str, Pair], fitted: Part, held: Part
+class Swarm(NamedTuple):
+    """The vehicles of a recorded swarm by id, and each emulated on its own set-points."""
+
+    vehicles: dict[int, SwarmVehicle]
+    followed: dict[int, Followed]
+
+
+@pytest.fixture(scope="module")
+def swarms() -> dict[str, Swarm]:
+    found = {}
+    for name in SWARMS:
+        vehicles = {vehicle.system: vehicle for vehicle in read_swarm(FLIGHTS / f"{name}.npz")}
+        found[name] = Swarm(vehicles, {k: follow(vehicle) for k, vehicle in vehicles.items()})
+    return found
+
+
+@pytest.mark.parametrize("system", range(1, 6))
+@pytest.mark.parametrize("name", SWARMS)
+def test_the_emulation_is_where_each_vehicle_of_a_swarm_was(
+    swarms: dict[str, Swarm], name: str, system: int
 ) -> None:
-    flight = pairs[fitted.log].flight
-    stages = RESPONSES[flight.flavour]
-    last = stages[-1]
+    """Over the whole flight against the truth, jumps of the set-points and near-collisions included."""
+    swarm = swarms[name]
+    found = Deviations.of(swarm.followed[system])
+    assert len(swarm.followed[system].times) > 6800
+    assert found.p50 <= 0.10
+    assert found.p95 <= 0.35
+    assert found.worst <= 0.75
 
-    def error(drag: float, lag: float) -> float:
-        moved = last._replace(drag=last.drag + drag, lag=last.lag + lag)
-        return float(np.mean(off(flight, fitted, (*stages[:-1], moved)) ** 2))
 
-    least = error(0.0, 0.0)
-    assert all(error(*way) > least for way in ((0.03, 0.0), (-0.03, 0.0), (0.0, 0.03), (0.0, -0.03)))
-    # Far below the bar of 1 m: a model that only just met it would have missed something.
-    assert np.percentile(off(pairs[held.log].flight, held, stages), 95.0) < 0.5
+@pytest.mark.parametrize("name", SWARMS)
+def test_pairs_come_as_near_as_they_did(swarms: dict[str, Swarm], name: str) -> None:
+    """Each flies its own recorded set-points alone, so the sum of two errors counts."""
+    followed = swarms[name].followed
+    for first, second in combinations(followed.values(), 2):
+        emulated, true = closest(first, second)
+        assert emulated == pytest.approx(true, abs=0.25)
+
+
+def test_the_emulation_shows_the_near_collision(swarms: dict[str, Swarm]) -> None:
+    """Vehicles 2 and 4 of five ArduCopters: nothing like it is seen at the others."""
+    followed = swarms["arducopter-5"].followed
+    near = {
+        (first, second): closest(followed[first], followed[second])
+        for first, second in combinations(followed, 2)
+    }
+    assert {pair for pair, (_, true) in near.items() if true < D_MIN} == {(2, 4)}
+    assert {pair for pair, (emulated, _) in near.items() if emulated < D_MIN} == {(2, 4)}
+    assert near[2, 4][1] < 0.15
+    assert near[2, 4][0] < 0.35
+
+
+def test_the_swarms_hold_what_was_recorded(swarms: dict[str, Swarm]) -> None:
+    flavours = {
+        name: [vehicle.flavour for vehicle in swarm.vehicles.values()] for name, swarm in swarms.items()
+    }
+    assert flavours == {"arducopter-5": ["ardupilot"] * 5, "mixed-3-2": ["ardupilot"] * 3 + ["px4"] * 2}
+    for swarm in swarms.values():
+        for vehicle in swarm.vehicles.values():
+            for rows in vehicle[2:]:
+                assert np.isfinite(rows).all()
+                assert np.all(np.diff(rows[:, 0]) >= 0.0)
+            first, last = vehicle.setpoints[[0, -1], 0]
+            for rows in (vehicle.estimate, vehicle.truth):
+                assert rows[0, 0] <= first
+                assert rows[-1, 0] >= last - 1.0
+            # 50 set-points a second.
+            assert len(vehicle.setpoints) == pytest.approx(50.0 * (last - first), rel=0.01)
 
 
 def test_without_the_response_it_is_where_it_is_told_to_be(pairs: dict[str, Pair]) -> None:
