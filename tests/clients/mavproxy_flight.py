@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from collections.abc import Callable
@@ -50,6 +51,19 @@ def place(now: State) -> Place:
 def still(now: State) -> bool:
     """Whether it has stopped."""
     return max(abs(now["vx"]), abs(now["vy"]), abs(now["vz"])) < 0.02
+
+
+def at_rest(proxy: MavProxy, kind: str = "LOCAL_POSITION_NED") -> State:
+    """As soon as it has been still for a second: a position controller that overshoots is still for a moment,
+    too."""
+    until, since, now = time.monotonic() + PATIENCE, math.inf, State()
+    while time.monotonic() < until:
+        now = state(proxy, kind)
+        since = min(since, time.monotonic()) if still(now) else math.inf
+        if time.monotonic() - since >= 1.0:
+            return now
+        time.sleep(0.1)
+    raise AssertionError(f"not at rest within {PATIENCE:.0f} s; the last state was {now}")
 
 
 def rise(proxy: MavProxy) -> Place:
@@ -108,14 +122,14 @@ class MavProxyFlight:
         moving = when(proxy, lambda now: now["vx"] > 0.9)
         self.velocity = moving["vx"], moving["vy"], moving["vz"]
         proxy.type("velocity 0 0 0")
-        self.before = place(when(proxy, still))
+        self.before = place(at_rest(proxy))
         proxy.type("position 3 2 -1")
         when(proxy, lambda now: not still(now))
-        self.after = place(when(proxy, still))
+        self.after = place(at_rest(proxy))
         latitude, longitude, height = GOAL
         proxy.ask(f"guided {latitude} {longitude} {height}", "DO_REPOSITION: ACCEPTED")
         when(proxy, lambda now: not still(now))
-        when(proxy, still)
+        at_rest(proxy)
         there = state(proxy, "GLOBAL_POSITION_INT")
         self.there = there["lat"] / 1e7, there["lon"] / 1e7, there["relative_alt"] / 1e3
 

@@ -27,9 +27,11 @@ USUAL = re.compile(
     r"|Loaded 3 waypoints (?:from|in) .*|Sent all 3 waypoints|Got MISSION_ACK: TYPE_MISSION: ACCEPTED"
     r"|Requesting \d+ (?:waypoints|fence items|rally items) t=.*|\d+ \d [-\d. ]+ p1=.* auto=1"
     r"|Saved (?:3 )?waypoints to .*|Got COMMAND_ACK: [A-Z_]+: ACCEPTED|AP: Armed|AP: Landed, disarmed"
-    r"|(?:DIS)?ARMED|Taking off to .* meters|x:.*, y:.*, z:.*|Guided \(.*\) .* frame 3|Unloading module \w+"
+    r"|AP: Set-points timed out|(?:DIS)?ARMED|Taking off to .* meters"
+    r"|x:.*, y:.*, z:.*|Guided \(.*\) .* frame 3|Unloading module \w+"
 )
-"""All that MAVProxy may say. Anything else is a warning, or news that someone has to look at."""
+"""All that MAVProxy may say. Anything else is a warning, or news that someone has to look at. It sends a
+velocity once, and the vehicle takes longer to come to rest than GUID_TIMEOUT."""
 
 
 @pytest.fixture(scope="module")
