@@ -13,6 +13,7 @@ from companion.config import CompanionConfig
 from companion.errors import CompanionError
 from companion.node import Companion
 from companion.pilot import Phase, Pilot
+from companion.tracking import TrackingConfig
 from companion.world import View
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, SetpointLocal
@@ -78,8 +79,10 @@ class Understudy(Companion):
     ) -> None:
         if config.avoidance == "certified":
             raise CompanionError("committed plans cannot be rehearsed; allowed: avoidance 'field'")
-        guard = config.guard.model_copy(update={"tube": _ALWAYS_ANEW})
-        config = config.model_copy(update={"guard": guard})
+        changes = {"tube": _ALWAYS_ANEW, "blend": None, "astray_us": 0}
+        guard = config.guard.model_copy(update=changes)
+        # The vehicle follows somebody else's set-points: nothing is learnt from how it does.
+        config = config.model_copy(update={"guard": guard, "tracking": TrackingConfig()})
         super().__init__(config, system, target_system, fleet, stopwatch, signing)
         self.would: list[SetpointLocal] = []
 

@@ -158,7 +158,7 @@ MUTANTS: dict[str, tuple[Callable[[SetpointLocal, int], SetpointLocal], str]] = 
     "half a second off": (late, "beside the vehicle"),
     "velocities the other way": (falling, "velocities that lead"),
     "too fast": (lambda m, n: m._replace(velocity=(9.0, 0.0, 0.0)) if n == 500 else m, "faster than"),
-    "too hard": (lambda m, n: m._replace(acceleration=(5.0, 5.0, 0.0)) if n == 500 else m, "more than 6.0"),
+    "too hard": (lambda m, n: m._replace(acceleration=(5.0, 5.0, 0.0)) if n == 500 else m, "more than 4.0"),
     "a jump": (jumping, "a jump of 0."),
     "the nose turned": (lambda m, n: m._replace(yaw=m.yaw + 0.5 * (n == 500)), "rad"),
     "spinning": (lambda m, n: m._replace(yaw_rate=9.0) if n == 500 else m, "turning faster"),

@@ -90,7 +90,7 @@ def _faults(asked: Request, found: Rehearsed, mask: int) -> list[str]:
     if not found.would:
         return ["no set-point at all"]
     settings = asked.config.settings
-    gauge = gauge_for(settings.limits, settings.heading, settings.tracking.largest)
+    gauge = gauge_for(settings.limits, settings.heading)
     for now, message in found.would:
         gauge.take(now, message)
     return gauge.faults(mask) + likeness(found).faults

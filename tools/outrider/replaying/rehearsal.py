@@ -30,6 +30,8 @@ from outrider.replaying.casting import GLOBAL, Cast, Part, Survey
 from outrider.replaying.timeline import IDLE, on_one_line
 from outrider.scenario_part import TARGET_SYSTEM
 
+_NEVER = 1 << 60
+"""µs, 36,000 years after 1970: damage."""
 STEP = 10_000
 """µs."""
 _RATE_HZ = 5.0
@@ -95,10 +97,10 @@ def rehearse(
 
 def steps(records: Iterable[Record]) -> Iterator[tuple[int, list[Record]]]:
     """Times (µs, multiples of 4) every 10 ms, each with the records since the last one, on one time line (see
-    ``timeline``); long silence is skipped."""
+    ``timeline``); long silence is skipped, and so are records with a time that no clock shows."""
     now: int | None = None
     batch: list[Record] = []
-    for record in on_one_line(records):
+    for record in on_one_line(one for one in records if one.time < _NEVER):
         if now is None:
             now = record.time
         if record.time > now + IDLE:
