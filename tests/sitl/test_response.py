@@ -363,6 +363,13 @@ def test_it_tilts_as_far_as_it_may_and_no_further(flavour: str, gains: dict[str,
     assert 14.5 < tilt.max() < 15.2
 
 
+def test_what_tilt_cannot_give_is_not_learnt() -> None:
+    """Else a PX4 would fly past its goal by half of a long way."""
+    flown, _ = led(made("px4", px4={"tilt": math.radians(15.0)}), step(40.0), 40.0)
+    assert flown[:, 0, 0].max() < 40.5
+    assert flown[-1, 0, 0] > 39.5
+
+
 NUMBERS = st.floats(-1e5, 1e5)
 FAST = st.floats(-1e3, 1e3)
 
