@@ -163,3 +163,34 @@ def sim_state(s: m.Source, f: Fields) -> m.SimState:
 def sim_state_fields(x: m.SimState) -> Fields:
     place = degrees_e7("latitude", x.latitude, 90), degrees_e7("longitude", x.longitude, 180)
     return x.roll, x.pitch, x.yaw, *x.specific_force, *x.body_rates, *place
+
+
+def simulation_state(s: m.Source, f: Fields) -> m.SimulationState | None:
+    latitude, longitude = f[21:]
+    # Float degrees are half a metre apart: they serve only where the extension fields are missing.
+    if not (latitude or longitude):
+        latitude, longitude = f[13] * 1e7, f[14] * 1e7
+    if not on_globe(latitude, longitude):
+        return None
+    return m.SimulationState(s, latitude / 1e7, longitude / 1e7, f[15], f[18:21])
+
+
+def simulation_state_fields(x: m.SimulationState) -> Fields:
+    place = degrees_e7("latitude", x.latitude, 90), degrees_e7("longitude", x.longitude, 180)
+    attitude = (1.0, *[0.0] * 12)
+    return *attitude, x.latitude, x.longitude, x.altitude, 0.0, 0.0, *x.velocity_ned, *place
+
+
+def hil_state(s: m.Source, f: Fields) -> m.HilState | None:
+    latitude, longitude, altitude, vx, vy, vz = f[8:14]
+    if not on_globe(latitude, longitude):
+        return None
+    velocity = (vx / 1e2, vy / 1e2, vz / 1e2)
+    return m.HilState(s, f[0], latitude / 1e7, longitude / 1e7, altitude / 1e3, velocity)
+
+
+def hil_state_fields(x: m.HilState) -> Fields:
+    place = degrees_e7("latitude", x.latitude, 90), degrees_e7("longitude", x.longitude, 180)
+    velocity = (round(v * 1e2) for v in x.velocity_ned)
+    attitude = (1.0, *[0.0] * 6)
+    return x.time, *attitude, *place, round(x.altitude * 1e3), *velocity, *[0] * 5

@@ -70,8 +70,10 @@ from mavlink_bridge.messages.status import (
     EstimatorStatus,
     GpsRaw,
     HighresImu,
+    HilState,
     RawImu,
     SimState,
+    SimulationState,
     VfrHud,
 )
 from mavlink_bridge.messages.surroundings import (
@@ -137,6 +139,8 @@ Message = (
     | RawImu
     | HighresImu
     | SimState
+    | SimulationState
+    | HilState
     | SetupSigning
     | AdsbVehicle
     | NamedValue
@@ -166,6 +170,7 @@ __all__ = [
     "GpsRaw",
     "Heartbeat",
     "HighresImu",
+    "HilState",
     "HomePosition",
     "LocalPosition",
     "Message",
@@ -200,6 +205,7 @@ __all__ = [
     "SetpointLocal",
     "SetupSigning",
     "SimState",
+    "SimulationState",
     "Source",
     "StatusText",
     "SysStatus",

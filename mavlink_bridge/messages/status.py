@@ -131,3 +131,26 @@ class SimState(NamedTuple):
     body_rates: Vector
     latitude: float
     longitude: float
+
+
+class SimulationState(NamedTuple):
+    """SIM_STATE (108): the truth of a simulation, which carries no time; ArduPilot's sends it when asked.
+    Degrees, altitude above mean sea level (m, float32), velocity (m/s)."""
+
+    source: Source
+    latitude: float
+    longitude: float
+    altitude: float
+    velocity_ned: Vector
+
+
+class HilState(NamedTuple):
+    """HIL_STATE_QUATERNION (115): the same of PX4's simulation in hardware (SIH), ``time`` µs since boot;
+    velocity in steps of 1 cm/s."""
+
+    source: Source
+    time: int
+    latitude: float
+    longitude: float
+    altitude: float
+    velocity_ned: Vector

@@ -140,6 +140,10 @@ STATUS: Kinds = {
     m.RawImu: st.builds(m.RawImu, source, u64, vector(milli_g), vector(milli), vector(milli)),
     m.HighresImu: st.builds(m.HighresImu, source, u64, vector(f32), vector(f32), vector(f32), f32, f32, f32),
     m.SimState: st.builds(m.SimState, source, f32, f32, f32, vector(f32), vector(f32), latitude, longitude),
+    m.SimulationState: st.builds(m.SimulationState, source, latitude, longitude, f32, vector(f32)),
+    m.HilState: st.builds(
+        m.HilState, source, u64, latitude, longitude, millimetres, vector(scaled(signed(16), 1e2))
+    ),
     m.EstimatorStatus: st.builds(m.EstimatorStatus, source, u64, *[f32] * 8, u16),
 }
 

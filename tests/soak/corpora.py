@@ -215,6 +215,8 @@ def services() -> tuple[Message, ...]:
         m.RawImu(AUTOPILOT, 7, (0.0, 0.0, -9.80665), (0.0, 0.1, 0.2), (0.2, 0.0, 0.4)),
         m.HighresImu(AUTOPILOT, 7, (0.0, 0.0, -9.8), (0.0, 0.1, 0.2), (0.2, 0.0, 0.4), 960.0, 450.0, 25.0),
         m.SimState(AUTOPILOT, 0.0, 0.1, 0.2, (0.0, 0.0, -9.8), (0.0, 0.1, 0.2), *place[:2]),
+        m.SimulationState(AUTOPILOT, *place, (1.0, -0.5, 0.1)),
+        m.HilState(AUTOPILOT, 7, *place, (1.0, -0.5, 0.1)),
         m.EstimatorStatus(AUTOPILOT, 7, 0.1, 0.1, 0.1, 0.1, NAN, NAN, 0.3, 0.3, 831),
         m.MissionCount(AUTOPILOT, 2, *ground, 0, 5),
     )
