@@ -182,6 +182,12 @@ def test_vehicles_stand_at_least_the_spacing_apart_and_close_together(count: int
     assert max(gaps, default=0.0) <= 4.0 * math.sqrt(2 * count)
 
 
+@pytest.mark.parametrize("count", [1, 5, 8])
+def test_as_many_columns_as_vehicles_are_a_row_towards_the_east(count: int) -> None:
+    request = asked(count=count, columns=count, spacing=5.0)
+    assert [request.place(index) for index in range(count)] == [(5.0 * k, 0.0, 0.0) for k in range(count)]
+
+
 def test_a_vehicle_is_what_was_asked_for() -> None:
     request = asked(
         count=3, first_id=7, flavour="px4", vehicle="hummingbird", sensors="rtk", startup="realistic"

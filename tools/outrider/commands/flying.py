@@ -124,6 +124,9 @@ def sitl(
     origin: Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE[,ALTITUDE].")] = None,
     wind: Wind = None,
     spacing: Annotated[float, typer.Option(min=0.0, max=1000.0, help="m between vehicles.")] = 3.0,
+    columns: Annotated[
+        int | None, typer.Option(min=1, max=254, help="Vehicles beside each other; if not said a square.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of sensors' noise.")] = 1,
     state: Annotated[
         Path | None,
@@ -152,6 +155,7 @@ def sitl(
         origin=origin,
         wind=wind,
         spacing=spacing,
+        columns=columns,
         speedup=speedup,
         seed=seed,
         signing_key=signing_key,

@@ -55,6 +55,7 @@ class Options:
     origin: str | None = None
     wind: str | None = None
     spacing: float = 3.0
+    columns: int | None = None
     speedup: float = 1.0
     seed: int = 1
     signing_key: Path | None = None
@@ -62,8 +63,8 @@ class Options:
 
 @dataclass(frozen=True)
 class Request:
-    """``speed``: simulated seconds per second of wall time. ``spacing`` (m) between vehicles, on a grid whose
-    first corner is the ``origin``. ``key``: only what is signed with it counts."""
+    """``speed``: simulated seconds per second of wall time. ``spacing`` (m) between vehicles, on a grid of
+    so many ``columns`` whose first corner is the ``origin``. ``key``: only what is signed with it counts."""
 
     count: int
     first_id: int
@@ -76,6 +77,7 @@ class Request:
     origin: Origin
     weather: WeatherConfig
     spacing: float
+    columns: int
     speed: float
     seed: int
     key: Key | None = None
@@ -92,8 +94,7 @@ class Request:
 
     def place(self, index: int) -> Vector:
         """Where a vehicle stands (m, ENU): rows towards the east, one north of the other."""
-        width = ceil(sqrt(self.count))
-        return self.spacing * (index % width), self.spacing * (index // width), 0.0
+        return self.spacing * (index % self.columns), self.spacing * (index // self.columns), 0.0
 
     def autopilot(self, index: int, epoch: int, saved: Saved) -> Autopilot:
         """A vehicle that boots at ``epoch`` (Unix µs) with what it ``saved`` before."""
@@ -177,6 +178,7 @@ def checked(options: Options) -> Request:
         origin,
         weather,
         options.spacing,
+        ceil(sqrt(options.count)) if options.columns is None else options.columns,
         options.speedup,
         options.seed,
         None if options.signing_key is None else key_of(options.signing_key),
