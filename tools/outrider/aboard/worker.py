@@ -165,6 +165,7 @@ class Worker:
             },
             solver_failures=node.tally.solver_failures,
             held_epochs=node.tally.held,
+            anchored_anew=node.tally.anchored_anew,
             not_finite=node.not_finite,
             limits_lowered=list(node.pilot.limits.lowered.changes),
             limits_lacking=node.pilot.limits.lowered.lacking,
