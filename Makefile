@@ -18,7 +18,7 @@ test: .venv/.made  ## all tests but the slow ones; one test with ARGS="-k name"
 slow: .venv/.made .venv/clients/.made  ## the slow tests: flights, browsers, other people's clients, wheels
 	@$(BIN)/pytest -m slow -n $(JOBS) --dist loadfile $(ARGS) </dev/null
 
-trial: .venv/.made  ## five companions on five vehicles through all that may happen; ARGS="--speed 1 --flavour px4"
+trial: .venv/.made  ## five companions on five vehicles through all that may happen; ARGS="--story sortie --flavour px4", docs/real-firmware.md
 	@$(BIN)/python -m trials $(ARGS)
 
 soak: .venv/.made  ## what is too long for CI, about an hour; part of it with ARGS="-k yaml"

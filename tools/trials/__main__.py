@@ -4,47 +4,101 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
-from outrider.errors import OutriderError
+from outrider.errors import InputError, OutriderError
 from outrider.run_directories import new_directory
 from outrider.saying import say
-from trials.plan import FLAVOURS, Plan
+from outrider.scenario_places import Origin
+from trials.autopilots import autopilots
+from trials.mishaps import ENDED, mishaps
+from trials.plan import FLAVOURS, MISHAPS, SORTIE, STORIES, Plan
 from trials.progress import Progress
+from trials.sortie import sortie
 from trials.stage import Stage
-from trials.story import play
 from trials.verdict import verdict
 
-SLOWEST, FASTEST = 0.2, 20.0
+SLOWEST, FASTEST, USUAL = 0.2, 20.0, 10.0
+_TELLERS = {MISHAPS: mishaps, SORTIE: sortie}
 
 
-def main() -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """The exit status."""
     parser = argparse.ArgumentParser(prog="make trial ARGS=…", description=__doc__)
-    parser.add_argument("--flavour", choices=FLAVOURS, default=FLAVOURS[0])
-    parser.add_argument("--speed", type=float, default=10.0, help="of time, 1 to 10")
+    parser.add_argument(
+        "--story",
+        choices=STORIES,
+        help="mishaps, or sortie: separation and tracking (with --autopilots)",
+    )
+    parser.add_argument("--flavour", choices=FLAVOURS, help="of the emulated vehicles; ardupilot if not said")
+    parser.add_argument(
+        "--speed", type=float, help="of emulated time; 10 if not said, for a sortie and real firmware 1"
+    )
+    parser.add_argument(
+        "--autopilots",
+        action="append",
+        default=[],
+        metavar="WHAT",
+        help="real firmware's simulations: arducopter:PATH ARGUMENTS, px4:PATH, 3*px4:PATH, or ENDPOINT,…",
+    )
+    parser.add_argument("--origin", help="LATITUDE,LONGITUDE,ALTITUDE of the first vehicle")
     parser.add_argument("--out", type=Path, help="a new directory for all files")
-    asked = parser.parse_args()
-    if not SLOWEST <= asked.speed <= FASTEST:
-        parser.error(f"--speed {asked.speed:g}: allowed is {SLOWEST:g} to {FASTEST:g}")
+    asked = parser.parse_args(words)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        directory = new_directory(asked.out, f"trial-{asked.flavour}")
-    except OutriderError as error:
-        parser.error(str(error))
-    try:
-        found = trial(Plan(asked.flavour, asked.speed), directory)
+        plan = planned(asked.story, asked.flavour, asked.speed, asked.autopilots, asked.origin)
+        directory = new_directory(asked.out, f"trial-{plan.story}")
+        found = trial(plan, directory)
     except KeyboardInterrupt:
         say("stopped")
         return 130
     except OutriderError as error:
         say(str(error))
-        return 3
+        return error.exit_status
     print(json.dumps(found, indent=1))  # noqa: T201
     return 1 if found["faults"] else 0
+
+
+def planned(
+    story: str | None,
+    flavour: str | None,
+    speed: float | None,
+    texts: Sequence[str],
+    origin: str | None,
+) -> Plan:
+    """What the options ask for. InputError for what does not go together."""
+    flown = autopilots(texts) if texts else ()
+    story = story or (SORTIE if flown else MISHAPS)
+    if flown and flavour is not None:
+        raise InputError("--flavour is of emulated vehicles: with --autopilots each says what it is")
+    if flown and speed not in (None, 1.0):
+        raise InputError(f"--speed {speed:g}: real firmware is flown at 1, the speed of the wall")
+    if speed is None:
+        speed = USUAL if story == MISHAPS and not flown else 1.0
+    if not SLOWEST <= speed <= FASTEST:
+        raise InputError(f"--speed {speed:g}: allowed is {SLOWEST:g} to {FASTEST:g}")
+    plan = Plan(flavour or FLAVOURS[0], speed, story, flown, None if origin is None else _origin(origin))
+    if story == MISHAPS and ENDED not in plan.systems:
+        raise InputError(f"--story {MISHAPS} happens to vehicles up to {ENDED}: name at least so many")
+    return plan
+
+
+def _origin(text: str) -> Origin:
+    names = ("latitude", "longitude", "altitude")
+    try:
+        numbers = [float(part) for part in text.split(",")]
+        return Origin.model_validate(dict(zip(names, numbers, strict=True)))
+    except (ValueError, ValidationError):
+        raise InputError(
+            f"--origin {text}: allowed is LATITUDE,LONGITUDE,ALTITUDE, ±89 and ±180 degrees, −500 to 9000 m"
+        ) from None
 
 
 def trial(plan: Plan, directory: Path) -> dict[str, Any]:
@@ -53,7 +107,7 @@ def trial(plan: Plan, directory: Path) -> dict[str, Any]:
     with Progress(plan) as progress:
         stage = Stage(plan, directory, progress)
         try:
-            play(stage)
+            _TELLERS[plan.story](stage)
         except OutriderError as error:
             trouble = str(error)
         finally:
@@ -70,7 +124,7 @@ def _keep(stage: Stage, directory: Path) -> None:
     if stage.observer.ready:
         ways = {
             f"{name}_{system}": values
-            for system, track in stage.tracks().items()
+            for system, track in stage.observer.tracks().items()
             for name, values in track._asdict().items()
         }
         np.savez_compressed(directory / "tracks.npz", allow_pickle=False, **ways)

@@ -1,14 +1,15 @@
-"""Where the vehicles truly are, by what the SITL tells of them on a port of its own, in the one time that
-they all have."""
+"""Where the vehicles truly are, in one time that they all have: what every observer tells, and the one of the
+emulation, which hears it on a port of its own."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink_bridge.clock import WallClock
+from mavlink_bridge.clock import Clock, WallClock
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame, LocalFrame
@@ -21,13 +22,57 @@ from mavlink_bridge.messages import (
     Source,
     SystemTime,
 )
+from trials.separation import Track
 
-_OWN = Source(254, 190)
+Array = NDArray[np.float64]
+OWN = Source(254, 190)
+ARMED = 0x80
 _HEARTBEAT, _TIME, _LOCAL, _ORIGIN = 0, 2, 32, 49
 _REQUEST = 512
-_ARMED = 0x80
-_AGAIN = 500_000
+AGAIN = 500_000
 """µs of the wall between two askings for what is missing."""
+
+
+class Observer(Protocol):
+    """``clock``: the trial's time, µs; ``seconds`` makes one of its times s since the trial's beginning."""
+
+    @property
+    def clock(self) -> Clock:
+        """What it follows."""
+        ...
+
+    @property
+    def ready(self) -> bool:
+        """Whether all vehicles are known."""
+        ...
+
+    @property
+    def wanted(self) -> str:
+        """What it takes to be ready."""
+        ...
+
+    @property
+    def latest(self) -> float:
+        """s since the beginning; 0 before they are known."""
+        ...
+
+    @property
+    def grounded(self) -> bool:
+        """Whether no motors run."""
+        ...
+
+    def seconds(self, clock: Array) -> Array:
+        """s since the beginning (n,), when the clock showed ``clock`` (n,), µs. Before the first message and
+        after the last it stands."""
+        ...
+
+    def turn(self) -> None:
+        """Hear what has come."""
+        ...
+
+    def tracks(self) -> dict[int, Track]:
+        """Of all vehicles."""
+        ...
 
 
 class Seen:
@@ -36,7 +81,6 @@ class Seen:
 
     def __init__(self) -> None:
         self.armed: bool | None = None
-        self.mode = 0
         self.boot: int | None = None
         self.frame: LocalFrame | None = None
         self.rows: list[tuple[int, tuple[float, float, float], bool]] = []
@@ -46,26 +90,29 @@ class Seen:
         """Whether its clock and its origin have been heard."""
         return self.boot is not None and self.frame is not None
 
-    def track(self, begin: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-        """Times (n,) s since ``begin`` (Unix µs), positions (n, 3) m fleet-local ENU, armed (n,)."""
+    def track(self, begin: int) -> Track:
+        """Times are s since ``begin`` (Unix µs)."""
         if self.boot is None or self.frame is None:
             raise ValueError("its clock and its origin have not been heard")
         times = 1e-6 * (np.array([row[0] for row in self.rows]) + (self.boot - begin))
         places = self.frame.position_to_fleet(np.array([row[1] for row in self.rows]).reshape(-1, 3))
-        return times, places, np.array([row[2] for row in self.rows], dtype=bool)
+        return Track(times, places, np.array([row[2] for row in self.rows], dtype=bool))
 
 
-class Observer:
-    """Hears ``systems`` on ``link``. ``clock`` shows simulated time (µs) as their stamps do, all the same."""
+class SitlObserver:
+    """Hears ``systems`` of ``outrider sitl`` on ``link``. Its clock shows simulated time as their stamps do,
+    all the same."""
 
     def __init__(self, link: Link, systems: Sequence[int], fleet: FleetFrame) -> None:
         self.link = link
         self.seen = {system: Seen() for system in systems}
         self._fleet = fleet
         self._wall = WallClock()
-        self.clock = FollowedClock(self._wall)
+        self._clock = FollowedClock(self._wall)
         self._first = systems[0]
         self._next = 0
+        self._ties: list[tuple[int, int]] = []
+        """What the clock showed, and the stamp of the message that came then."""
         self._codec = Codec(
             lambda identifier, system, component: (
                 identifier in (_HEARTBEAT, _TIME, _LOCAL, _ORIGIN) and system in self.seen and component == 1
@@ -73,12 +120,27 @@ class Observer:
         )
 
     @property
+    def clock(self) -> FollowedClock:
+        """That of the first of them."""
+        return self._clock
+
+    @property
     def ready(self) -> bool:
         """Whether all are known."""
         return all(one.known for one in self.seen.values())
 
     @property
-    def begin(self) -> int:
+    def wanted(self) -> str:
+        """Both are asked for."""
+        return "the vehicles' clocks and origins"
+
+    @property
+    def grounded(self) -> bool:
+        """Whether no motors run."""
+        return all(one.armed is False for one in self.seen.values())
+
+    @property
+    def _begin(self) -> int:
         """Unix time (µs) at which the first of them booted."""
         return min(one.boot for one in self.seen.values() if one.boot is not None)
 
@@ -86,9 +148,22 @@ class Observer:
     def latest(self) -> float:
         """s since then, as told last; 0 before they are known."""
         one = self.seen[self._first]
-        if not self.ready or not one.rows or one.boot is None:
-            return 0.0
-        return (one.rows[-1][0] + one.boot - self.begin) * 1e-6
+        return float(self._since(np.array(one.rows[-1][0]))) if self.ready and one.rows else 0.0
+
+    def seconds(self, clock: Array) -> Array:
+        """s since then, when the clock showed that: it goes on where the simulation stands for a moment."""
+        shown, stamps = np.array(self._ties, dtype=np.float64).T
+        return np.interp(clock, shown, self._since(stamps))
+
+    def _since(self, stamps: Array) -> Array:
+        """s since the beginning, of stamps (n,) of the first vehicle, µs."""
+        boot = self.seen[self._first].boot
+        since: Array = (stamps + (0 if boot is None else boot - self._begin)) * 1e-6
+        return since
+
+    def tracks(self) -> dict[int, Track]:
+        """Of all."""
+        return {system: one.track(self._begin) for system, one in self.seen.items()}
 
     def turn(self) -> None:
         """Hear what has come."""
@@ -98,9 +173,10 @@ class Observer:
                 if isinstance(message, LocalPosition):
                     one.rows.append((message.time_boot, message.position_ned, bool(one.armed)))
                     if message.source.system == self._first:
-                        self.clock.observe(self._wall.now(), message.time_boot)
+                        self._clock.observe(self._wall.now(), message.time_boot)
+                        self._ties.append((self._clock.now(), message.time_boot))
                 elif isinstance(message, Heartbeat):
-                    one.armed, one.mode = bool(message.base_mode & _ARMED), message.custom_mode
+                    one.armed = bool(message.base_mode & ARMED)
                 elif isinstance(message, SystemTime):
                     one.boot = message.unix_time - message.time_boot
                 elif isinstance(message, GpsGlobalOrigin):
@@ -111,9 +187,9 @@ class Observer:
         now = self._wall.now()
         if now < self._next:
             return
-        self._next = now + _AGAIN
+        self._next = now + AGAIN
         for system, one in self.seen.items():
             for wanted, missing in ((_ORIGIN, one.frame is None), (_TIME, one.boot is None)):
                 if missing:
                     params = (float(wanted), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-                    self.link.send(self._codec.encode(CommandLong(_OWN, system, 1, _REQUEST, 0, params)))
+                    self.link.send(self._codec.encode(CommandLong(OWN, system, 1, _REQUEST, 0, params)))

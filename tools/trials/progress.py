@@ -15,7 +15,7 @@ class Progress:
     """Of a trial of ``plan``; a context."""
 
     def __init__(self, plan: Plan) -> None:
-        self._name = f"{plan.flavour} ×{plan.speed:g}"
+        self._name = plan.name
         self._act = "vehicles and companions start"
         console = Console(stderr=True)
         self._status: Status | None = console.status(self._act) if console.is_terminal else None

@@ -41,6 +41,11 @@ class Track(NamedTuple):
         found[unknown | grounded | outside] = np.nan
         return found
 
+    def beside(self, other: Track) -> Array:
+        """Distances (n,) m of the points of another track of the same vehicle; NaN where nothing is known."""
+        off: Array = np.linalg.norm(self.at(other.times) - other.places, axis=1)
+        return off
+
 
 def nearest(tracks: Mapping[int, Track], target: tuple[int, Callable[[Array], Array]]) -> list[Nearest]:
     """Each pair of ``tracks``, and each with the ``target``: its id, and its places (m, 3) at times (m,)."""

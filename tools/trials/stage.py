@@ -6,6 +6,7 @@ import select
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +14,18 @@ from numpy.typing import NDArray
 
 from mavlink_bridge.frames import FleetFrame
 from outrider.errors import OutriderError
+from trials.flown import Flown, flown
 from trials.hub import Hub
 from trials.observer import Observer
-from trials.plan import TARGET, Plan
+from trials.plan import SORTIE, TARGET, Plan
 from trials.progress import Progress
-from trials.separation import Nearest, Track, longest_gap, nearest
-from trials.station import Station, listener
-from trials.vehicles import Vehicles
-from trials.walker import Walker
+from trials.separation import Nearest, longest_gap, nearest
+from trials.station import Station
+from trials.vehicles import vehicles
+from trials.walker import Circle, Walker, sortie_way
 from trials.wingman import Wingman
+
+Array = NDArray[np.float64]
 
 _TURN = 0.002
 """s at most between two looks at the target."""
@@ -38,23 +42,25 @@ class Stage:
         self.plan, self.directory = plan, directory
         self._progress = progress
         self._began = time.monotonic()
+        self.ended = 0.0
+        """When it was closed, s."""
         self._looked = 0.0
         self._target: list[tuple[float, float, float, float]] = []
-        origin = plan.settings()["origin"]
-        self._fleet = FleetFrame(origin["latitude"], origin["longitude"], origin["altitude"])
+        self.marks: dict[str, float] = {}
+        """When what happened, s."""
+        origin = plan.settings(plan.flavour_of(1))["origin"]
+        self.fleet = FleetFrame(origin["latitude"], origin["longitude"], origin["altitude"])
         with ExitStack() as files:
-            ear, told = listener()
-            files.callback(ear.close)
-            self.vehicles = Vehicles(plan, told, directory)
+            self.vehicles = vehicles(plan, self.fleet, directory)
             files.callback(self.vehicles.close)
-            self.observer = Observer(ear, plan.systems, self._fleet)
+            self.observer: Observer = self.vehicles.observer
             self.station = Station(plan.systems)
             files.callback(self.station.link.close)
             self.swarm = Hub(plan.systems)
             files.callback(self.swarm.close)
-            self.walker = Walker(self._fleet)
+            self.walker = Walker(self.fleet, sortie_way() if plan.story == SORTIE else Circle())
             files.callback(self.walker.close)
-            config = plan.write(directory)
+            configs = plan.write(directory)
             self.wingmen: dict[int, Wingman] = {}
             for system in plan.systems:
                 options = {
@@ -62,7 +68,7 @@ class Stage:
                     "swarm": self.swarm.endpoint(system),
                     "target": self.walker.endpoint,
                     "ground": self.station.endpoint,
-                    "config": str(config),
+                    "config": str(configs[plan.flavour_of(system)]),
                 }
                 words = [f"--{name}={value}" for name, value in options.items()]
                 wingman = Wingman(system, directory / f"vehicle-{system}", *words)
@@ -72,19 +78,27 @@ class Stage:
 
     @property
     def now(self) -> float:
-        """s of the simulation, since the first vehicle booted."""
+        """s since the first vehicle booted, or since it is observed: of the simulation where that is the
+        emulation's, else of the wall."""
         return self.observer.latest
+
+    def mark(self, name: str) -> None:
+        """It happens now."""
+        self.marks[name] = self.now
 
     def tell(self, act: str) -> None:
         """An act begins."""
         self._progress.tell(self.now, act)
 
-    def until(self, is_so: Callable[[], object], what: str) -> None:
+    def until(
+        self, is_so: Callable[[], object], what: str | Callable[[], str], patience: float = PATIENCE
+    ) -> None:
         """Turn until then. OutriderError if it does not come."""
-        end, last = time.monotonic() + PATIENCE, self.now + PATIENCE
+        end, last = time.monotonic() + patience, self.now + patience
         while not is_so():
+            self.vehicles.check()
             if time.monotonic() > end and self.now > last:
-                raise OutriderError(f"it has not come: {what}")
+                raise OutriderError(f"it has not come: {what if isinstance(what, str) else what()}")
             self.turn()
 
     def wait(self, seconds: float) -> None:
@@ -116,19 +130,35 @@ class Stage:
         if not self._target or self.now > self._target[-1][0]:
             self._target.append((self.now, *self.walker.motion(clock).position.tolist()))
 
-    def tracks(self) -> dict[int, Track]:
-        """Of the vehicles, s since the first of them booted."""
-        begin = self.observer.begin
-        return {system: Track(*one.track(begin)) for system, one in self.observer.seen.items()}
+    def target(self, times: Array) -> Array:
+        """Where the target was (n, 3) at ``times`` (n,)."""
+        rows = np.array(self._target)
+        return np.stack([np.interp(times, rows[:, 0], rows[:, k]) for k in (1, 2, 3)], axis=1)
 
     def nearest(self) -> tuple[list[Nearest], float]:
         """Who came how near to whom; and the longest gap (s) of what is known of a flying vehicle."""
-        tracks, rows = self.tracks(), np.array(self._target)
+        tracks = self.observer.tracks()
+        return nearest(tracks, (TARGET, self.target)), max(map(longest_gap, tracks.values()))
 
-        def target(times: NDArray[np.float64]) -> NDArray[np.float64]:
-            return np.stack([np.interp(times, rows[:, 0], rows[:, k]) for k in (1, 2, 3)], axis=1)
+    def steered(self, system: int) -> tuple[float, float]:
+        """From when on, and until when, that vehicle's companion steered it, s."""
+        phases = {
+            event["text"]: event["trial_s"]
+            for event in self.wingmen[system].events
+            if event["what"] == "phase"
+        }
+        return phases.get("escort", inf), phases.get("land", inf)
 
-        return nearest(tracks, (TARGET, target)), max(map(longest_gap, tracks.values()))
+    def flown(self, system: int) -> list[Flown]:
+        """What each log of that vehicle's companion tells."""
+        boot = self.walker.boot
+
+        def seconds(since_boot: Array) -> Array:
+            return self.observer.seconds(boot + since_boot)
+
+        logs = sorted((self.directory / f"vehicle-{system}").rglob(f"vehicle-{system}.tlog"))
+        found = (flown(log, system, self.fleet, seconds) for log in logs)
+        return [one for one in found if one is not None]
 
     @property
     def wall_s(self) -> float:
@@ -137,4 +167,5 @@ class Stage:
 
     def close(self) -> None:
         """End all of it."""
+        self.ended = self.now
         self._files.close()

@@ -1,70 +1,119 @@
-"""A running ``outrider sitl``."""
+"""The vehicles of a trial, and who observes them: the emulation's, or those of real firmware."""
 
 from __future__ import annotations
 
-import json
-import random
-import signal
-import socket
-import subprocess
-import sys
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from outrider.errors import OutriderError
-from trials.plan import HOST, VEHICLES, Plan
+from mavlink_bridge.frames import FleetFrame
+from trials.autopilots import Program, Running
+from trials.ears import open_ears
+from trials.emulation import Emulation
+from trials.firmware import Firmware
+from trials.observer import Observer, SitlObserver
+from trials.plan import Plan
+from trials.station import listener
+from trials.truth import TruthObserver
 
-_OFFSETS = {"ardupilot": (0, 2, 3), "px4": (0, 10, 40, 4030)}
-_STEPS = {"ardupilot": 10, "px4": 1}
-_FAREWELL = 20.0
 
+class Vehicles(Protocol):
+    """Some that fly, and their ``observer``."""
 
-class Vehicles:
-    """Those of ``plan``, which also tell everything to ``ear``, an endpoint. OutriderError if they do not
-    come up."""
+    observer: Observer
 
-    def __init__(self, plan: Plan, ear: str, directory: Path) -> None:
-        base = _free_base(plan.flavour)
-        command = [sys.executable, "-m", "outrider", "sitl", "--json", f"--count={VEHICLES}"]
-        command += [f"--flavour={plan.flavour}", f"--speedup={plan.speed}", f"--port-base={base}"]
-        with (directory / "sitl.log").open("wb") as err:
-            self._process = subprocess.Popen(
-                [*command, f"--to={ear}"], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=err
-            )
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            raise OutriderError(f"outrider sitl ended: see {directory / 'sitl.log'}")
-        self._ready: dict[str, Any] = json.loads(line)
-        self.summary: dict[str, Any] = {}
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What they said of themselves in the end."""
+        ...
 
     def endpoint(self, system: int) -> str:
         """For that vehicle's companion."""
-        return next(str(one["pymavlink"]) for one in self._ready["vehicles"] if one["system_id"] == system)
+        ...
+
+    def check(self) -> None:
+        """OutriderError if one has ended."""
+        ...
 
     def close(self) -> None:
-        """End them; ``summary`` is what they said."""
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGTERM)
-        try:
-            out, _ = self._process.communicate(timeout=_FAREWELL)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            out, _ = self._process.communicate()
-        if out.strip():
-            self.summary = json.loads(out)
+        """End those that the trial has started."""
+        ...
 
 
-def _free_base(flavour: str) -> int:
-    """A port from which on the SITL's are free."""
-    kind = socket.SOCK_STREAM if flavour == "ardupilot" else socket.SOCK_DGRAM
-    ports = [offset + _STEPS[flavour] * k for offset in _OFFSETS[flavour] for k in range(VEHICLES)]
-    while True:
-        base = random.randrange(16_000, 28_000)
-        try:
-            for port in set(ports):
-                with socket.socket(socket.AF_INET, kind) as probe:
-                    probe.bind((HOST, base + port))
-        except OSError:
-            continue
-        return base
+class Emulated:
+    """Those of ``outrider sitl``."""
+
+    def __init__(self, plan: Plan, fleet: FleetFrame, directory: Path) -> None:
+        with ExitStack() as files:
+            ear, told = listener()
+            files.callback(ear.close)
+            self._emulation = Emulation(plan, told, directory)
+            files.callback(self._emulation.close)
+            self.observer: Observer = SitlObserver(ear, plan.systems, fleet)
+            self._files = files.pop_all()
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What they said."""
+        return self._emulation.summary
+
+    def endpoint(self, system: int) -> str:
+        """For that vehicle's companion."""
+        return self._emulation.endpoint(system)
+
+    def check(self) -> None:
+        """OutriderError if they have ended."""
+        self._emulation.check()
+
+    def close(self) -> None:
+        """End them."""
+        self._files.close()
+
+
+class Real:
+    """Those of simulations of real firmware, started here or running already."""
+
+    def __init__(self, plan: Plan, fleet: FleetFrame, directory: Path) -> None:
+        flown = dict(zip(plan.systems, plan.autopilots, strict=True))
+        programs = {system: one for system, one in flown.items() if isinstance(one, Program)}
+        running = {system: one for system, one in flown.items() if isinstance(one, Running)}
+        with ExitStack() as files:
+            self._firmware = Firmware(programs, fleet, directory)
+            files.callback(self._firmware.close)
+            launches = self._firmware.launches
+            self._endpoints = {
+                **{system: one.endpoint for system, one in launches.items()},
+                **{system: one.endpoint for system, one in running.items()},
+            }
+            told = {
+                **{system: one.told for system, one in launches.items()},
+                **{system: one.told for system, one in running.items()},
+            }
+            ears = open_ears(told)
+            for ear in ears.values():
+                files.callback(ear.close)
+            flavours = {system: one.flavour for system, one in flown.items()}
+            self.observer: Observer = TruthObserver(ears, flavours, fleet)
+            self._files = files.pop_all()
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """They say nothing."""
+        return {}
+
+    def endpoint(self, system: int) -> str:
+        """For that vehicle's companion."""
+        return self._endpoints[system]
+
+    def check(self) -> None:
+        """OutriderError if one that was started here has ended."""
+        self._firmware.check()
+
+    def close(self) -> None:
+        """End those that were started here."""
+        self._files.close()
+
+
+def vehicles(plan: Plan, fleet: FleetFrame, directory: Path) -> Vehicles:
+    """Those of ``plan``, with files in ``directory``."""
+    return Real(plan, fleet, directory) if plan.autopilots else Emulated(plan, fleet, directory)

@@ -1,8 +1,9 @@
-"""The target: it circles, tells so, and can fall silent, or stop."""
+"""The target: it goes its way, tells so, and can fall silent, or stop."""
 
 from __future__ import annotations
 
 import random
+from typing import Protocol
 
 import numpy as np
 
@@ -10,8 +11,12 @@ from mavlink_bridge.clock import WallClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.opening import open_link
 from outrider.beacon import Beacon
-from outrider.paths import Motion
-from trials.plan import HOST, TARGET
+from outrider.paths import ClosedPath, Motion, Walk
+from outrider.resources import find
+from outrider.scenario import Scenario
+from outrider.scenario_places import PathTarget
+from outrider.yaml_file import load
+from trials.plan import HOST, SORTIE, TARGET
 
 _RADIUS, _TURN, _RATE = 8.0, 0.1, 5.0
 """m, rad/s, Hz: 0.8 m/s, a walk."""
@@ -19,32 +24,76 @@ _MIDDLE = np.array([3.0, 1.5, 0.0])
 """m, of the grid on which the vehicles start: it never walks among them."""
 
 
+class Way(Protocol):
+    """Where a target is at a time (µs)."""
+
+    def begin(self, now: int) -> None:
+        """It sets out."""
+        ...
+
+    def motion(self, now: int) -> Motion:
+        """At ``now``."""
+        ...
+
+
+class Circle:
+    """Round and round, from the beginning."""
+
+    def begin(self, now: int) -> None:
+        """It is on its way."""
+
+    def motion(self, now: int) -> Motion:
+        """At ``now``."""
+        angle = _TURN * 1e-6 * now
+        place = _MIDDLE + _RADIUS * np.array([np.sin(angle), np.cos(angle), 0.0])
+        return Motion(place, _RADIUS * _TURN * np.array([np.cos(angle), -np.sin(angle), 0.0]))
+
+
+def sortie_target() -> PathTarget:
+    """The target of the scenario ``sortie``."""
+    target = load(find("scenarios", SORTIE), Scenario).target
+    if not isinstance(target, PathTarget):
+        raise TypeError(f"the target of {SORTIE} has no path")
+    return target
+
+
+def sortie_way() -> Walk:
+    """Its way: it stands, walks, and runs."""
+    target = sortie_target()
+    paces = [(pace.after_s, pace.speed) for pace in target.paces]
+    return Walk(ClosedPath(np.array(target.through)), target.speed, target.setting_out, paces)
+
+
 class Walker:
     """Asked where it is at a time (µs), and to say so then, to all who listen at ``endpoint``."""
 
-    def __init__(self, fleet: FleetFrame) -> None:
+    def __init__(self, fleet: FleetFrame, way: Way) -> None:
         self.silent = False
         # A group of its own: several trials may go on at a time.
         group = f"239.255.{random.randrange(1, 250)}.{random.randrange(1, 250)}"
         self.endpoint = f"mcast:{group}:{random.randrange(16_000, 28_000)},{HOST}"
         self._link = open_link(self.endpoint, WallClock())
-        self._stopped: int | None = None
+        self._way = way
+        self._stopped: Motion | None = None
+        self.boot = 0
+        """When it first spoke: its messages count from then."""
         self._beacon = Beacon(TARGET, "target", _RATE, fleet)
+
+    def begin(self, now: int) -> None:
+        """Set out."""
+        self._way.begin(now)
 
     def stop(self, now: int) -> None:
         """Stand still from then on."""
-        self._stopped = now
+        self._stopped = Motion(self._way.motion(now).position, np.zeros(3))
 
     def motion(self, now: int) -> Motion:
         """At ``now``."""
-        walks = self._stopped is None or now < self._stopped
-        angle = _TURN * 1e-6 * (now if walks or self._stopped is None else self._stopped)
-        place = _MIDDLE + _RADIUS * np.array([np.sin(angle), np.cos(angle), 0.0])
-        velocity = _RADIUS * _TURN * np.array([np.cos(angle), -np.sin(angle), 0.0])
-        return Motion(place, velocity if walks else np.zeros(3))
+        return self._way.motion(now) if self._stopped is None else self._stopped
 
     def turn(self, now: int) -> None:
         """Say what is due at ``now``."""
+        self.boot = self.boot or now
         if self._beacon.due(now) and not self.silent:
             for datagram in self._beacon.say(now, self.motion(now)):
                 self._link.send(datagram.data)

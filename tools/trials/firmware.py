@@ -1,0 +1,162 @@
+"""Simulations of real firmware that a trial starts: ArduPilot's SITL and PX4's SIH, each in a directory of
+its own, where its parameters and logs begin anew."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from mavlink_bridge.frames import FleetFrame
+from outrider.errors import InputError, OutriderError
+from trials.autopilots import Program
+from trials.plan import HOST, ROW
+
+_TCP: Final = {"ardupilot": (5760, 5762, 5763), "px4": ()}
+_UDP: Final = {"ardupilot": (), "px4": (14540, 14580, 18570)}
+_STEP: Final = {"ardupilot": 10, "px4": 1}
+_FAREWELL: Final = 6.0
+"""s after which who does not end is killed."""
+_LAST: Final = 300
+"""Characters of what it wrote last."""
+
+
+@dataclass(frozen=True)
+class Launch:
+    """How a program is started: ``command`` with ``environment`` on top of the own. The companion's
+    ``endpoint``, and another at which the truth is ``told``."""
+
+    command: tuple[str, ...]
+    environment: dict[str, str]
+    endpoint: str
+    told: str
+
+
+def launch(program: Program, system: int, fleet: FleetFrame) -> Launch:
+    """Of vehicle ``system``, which stands in the row. The instance is one less: PX4's system ids count so."""
+    instance = system - 1
+    latitude, longitude, altitude = fleet.to_geodetic((ROW * instance, 0.0, 0.0))
+    if program.flavour == "ardupilot":
+        words = [f"-I{instance}", "--sysid", str(system), "-S", "--speedup", "1"]
+        home = f"{latitude:.9f},{longitude:.9f},{altitude:.3f},0"
+        first, told = (port + _STEP["ardupilot"] * instance for port in _TCP["ardupilot"][:2])
+        return Launch(
+            (str(_program(program.path)), *words, "--home", home, *program.words),
+            {},
+            f"tcp:{HOST}:{first}",
+            f"tcp:{HOST}:{told}",
+        )
+    binary, data = _px4(program.path)
+    settings = dict(word.split("=", 1) for word in program.words if "=" in word)
+    more = [word for word in program.words if "=" not in word]
+    place = {"PX4_HOME_LAT": latitude, "PX4_HOME_LON": longitude, "PX4_HOME_ALT": altitude}
+    return Launch(
+        (str(binary), "-i", str(instance), "-d", str(data), *more),
+        {
+            "PX4_SIM_MODEL": "sihsim_quadx",
+            "PX4_SIMULATOR": "sihsim",
+            **{name: f"{value:.9f}" for name, value in place.items()},
+            **settings,
+        },
+        f"udpin:{HOST}:{_UDP['px4'][0] + instance}",
+        f"udpin:{HOST}:14550",
+    )
+
+
+def _program(text: str) -> Path:
+    path = Path(text).expanduser().resolve()
+    if not path.is_file() or not os.access(path, os.X_OK):
+        raise InputError(
+            f"--autopilots: {text} is no program; name build/sitl/bin/arducopter of an ArduPilot"
+        )
+    return path
+
+
+def _px4(text: str) -> tuple[Path, Path]:
+    """The binary and its start scripts: ``text`` is the folder of a build for SITL, or the binary in it."""
+    path = Path(text).expanduser().resolve()
+    build = path if path.is_dir() else path.parent.parent
+    binary, data = build / "bin" / "px4", build / "etc"
+    if not (binary.is_file() and os.access(binary, os.X_OK) and data.is_dir()):
+        raise InputError(
+            f"--autopilots: {text} is no build of PX4 for SITL: it has no bin/px4 and etc; name"
+            " build/px4_sitl_default"
+        )
+    return binary, data
+
+
+class Firmware:
+    """The running ``programs``, by system id. InputError if a port is in use."""
+
+    def __init__(self, programs: dict[int, Program], fleet: FleetFrame, directory: Path) -> None:
+        self.launches = {system: launch(program, system, fleet) for system, program in programs.items()}
+        for system, program in programs.items():
+            _free(program.flavour, system)
+        self._directory = directory
+        self.processes: dict[int, subprocess.Popen[bytes]] = {}
+        with ExitStack() as files:
+            files.callback(self.close)
+            for system, started in self.launches.items():
+                place = self._place(system)
+                place.mkdir(parents=True)
+                with (place / "out.log").open("wb") as out:
+                    self.processes[system] = subprocess.Popen(
+                        started.command,
+                        cwd=place,
+                        env={**os.environ, **started.environment},
+                        stdin=subprocess.DEVNULL,
+                        stdout=out,
+                        stderr=subprocess.STDOUT,
+                        start_new_session=True,
+                    )
+            files.pop_all()
+
+    def check(self) -> None:
+        """OutriderError if one has ended."""
+        for system, process in self.processes.items():
+            if process.poll() is not None:
+                log = self._place(system) / "out.log"
+                last = log.read_text(encoding="utf-8", errors="replace")[-_LAST:].strip()
+                raise OutriderError(
+                    f"the firmware of vehicle {system} ended, status {process.returncode}: see {log}\n{last}"
+                )
+
+    def close(self) -> None:
+        """End them."""
+        for process in self.processes.values():
+            if process.poll() is None:
+                process.terminate()
+        for process in self.processes.values():
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(_FAREWELL)
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+
+    def _place(self, system: int) -> Path:
+        return self._directory / f"firmware-{system}"
+
+
+def _free(flavour: str, system: int) -> None:
+    """InputError if a port that the firmware or its companion would open is not free."""
+    kinds: Sequence[tuple[tuple[int, ...], int, str]] = (
+        (_TCP[flavour], socket.SOCK_STREAM, "TCP"),
+        (_UDP[flavour], socket.SOCK_DGRAM, "UDP"),
+    )
+    for ports, kind, name in kinds:
+        for base in ports:
+            port = base + _STEP[flavour] * (system - 1)
+            with socket.socket(socket.AF_INET, kind) as probe:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, int(kind == socket.SOCK_STREAM))
+                try:
+                    probe.bind((HOST, port))
+                except OSError as error:
+                    raise InputError(
+                        f"{name} port {port} of vehicle {system}: {error.strerror}. End the simulation that"
+                        " has it, or fly that one: --autopilots ENDPOINT,…"
+                    ) from None

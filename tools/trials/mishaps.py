@@ -1,0 +1,80 @@
+"""The story of mishaps: an escort that loses its target, companions and links, act by act."""
+
+from __future__ import annotations
+
+from trials.reports import Reports, come_back, go, send, wait_for_the_go
+from trials.stage import Stage
+
+KILLED, ENDED = 3, 4
+"""Of the one the process that flies is killed; of the other all processes."""
+TARGET_LOST = "Target lost: holding"
+
+
+def mishaps(stage: Stage) -> None:
+    """All acts. OutriderError if what has to follow does not."""
+    plan, everyone = stage.plan, stage.plan.systems
+    wait_for_the_go(stage)
+    go(stage, everyone)
+    stage.tell(f"{plan.escort_s:g} s of escort")
+    stage.wait(plan.escort_s)
+    _lose_the_target(stage)
+    stage.wait(plan.pause_s)
+    _kill_the_pilot(stage)
+    stage.wait(plan.pause_s)
+    _end_a_companion(stage)
+    stage.wait(plan.pause_s)
+    _cut_the_swarm(stage)
+    stage.wait(plan.pause_s)
+    come_back(stage)
+
+
+def _lose_the_target(stage: Stage) -> None:
+    everyone = stage.plan.systems
+    stage.tell(f"the target is silent for {stage.plan.blind_s:g} s")
+    reports = Reports(stage)
+    stage.walker.silent = True
+    stage.wait(stage.plan.blind_s)
+    reports.of(everyone, "concern", TARGET_LOST)
+    stage.walker.silent = False
+    reports.of(everyone, "over", TARGET_LOST)
+
+
+def _kill_the_pilot(stage: Stage) -> None:
+    wingman = stage.wingmen[KILLED]
+    stage.tell(f"SIGKILL to the process that flies vehicle {KILLED}")
+    reports = Reports(stage)
+    wingman.kill_pilot()
+    reports.of([KILLED], "lost", "the companion is gone")
+    # It holds, or its own time-out was quicker on a machine that is busy.
+    reports.of([KILLED], "last word", "the vehicle")
+    reports.of([KILLED], "waiting", "the operator's go")
+    stage.wait(stage.plan.pause_s)
+    send(reports, [KILLED])
+
+
+def _end_a_companion(stage: Stage) -> None:
+    wingman = stage.wingmen[ENDED]
+    others = [system for system in stage.plan.systems if system != ENDED]
+    silent = f"Neighbour {ENDED} is not heard"
+    stage.tell(f"SIGKILL to all of the companion of vehicle {ENDED}")
+    reports = Reports(stage)
+    wingman.kill()
+    reports.of(others, "concern", silent)
+    stage.tell("it is started anew")
+    wingman.start()
+    reports.of([ENDED], "waiting", "the operator's go")
+    reports.of(others, "over", silent)
+    send(reports, [ENDED])
+
+
+def _cut_the_swarm(stage: Stage) -> None:
+    everyone = stage.plan.systems
+    stage.tell(f"the swarm link is cut for {stage.plan.cut_s:g} s")
+    reports = Reports(stage)
+    stage.swarm.cut = True
+    stage.wait(stage.plan.cut_s)
+    stage.swarm.cut = False
+    for what in ("concern", "over"):
+        for other in everyone:
+            heard = [system for system in everyone if system != other]
+            reports.of(heard, what, f"Neighbour {other} is not heard")

@@ -1,0 +1,149 @@
+"""The figures of a sortie from its tracks and logs, and the bars that it has to pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trials.flown import Flown
+from trials.measures import (
+    Spread,
+    converged_after,
+    joined,
+    largest_step,
+    looks,
+    spread,
+    surface_errors,
+    tracking_errors,
+)
+from trials.separation import Track
+from trials.sortie import ESCORT, GO, RETURN, RUN, WALK
+from trials.stage import Stage
+
+Array = NDArray[np.float64]
+CLOSEST: Final = 1.5
+"""m between any two: there is neither wind nor loss in a trial."""
+TRACKING: Final = 0.35
+"""m from set-point to vehicle, as it told of itself, 95 %."""
+STEP: Final = 0.3
+"""m of a set-point beyond where the one before led."""
+CONVERGED: Final = 15.0
+"""s from the go until all are at their places."""
+STANDOFF: Final = 0.6
+"""m from the surface while the target walks, as the vehicles told of themselves, 95 %."""
+
+
+class Score(NamedTuple):
+    """``tracking``: from set-points to where the vehicles told to be; ``true_tracking``: to where they were;
+    ``estimate``: between the two; ``step``: the largest of a set-point (m). ``standoff``, ``true_standoff``:
+    from the surface, by the target's pace, as told and in truth. ``converged``, ``truly_converged``: s after
+    the go; ``anchored``: how often plans began anew where the vehicle was. None: not known."""
+
+    tracking: Spread | None
+    true_tracking: Spread | None
+    estimate: Spread | None
+    step: float
+    standoff: Mapping[str, Spread | None]
+    true_standoff: Mapping[str, Spread | None]
+    converged: float | None
+    truly_converged: float | None
+    anchored: int | None
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """For the verdict."""
+        return {
+            "tracking_error_m": _rounded(self.tracking),
+            "true_tracking_error_m": _rounded(self.true_tracking),
+            "estimate_error_m": _rounded(self.estimate),
+            "setpoint_step_m": round(self.step, 3),
+            "standoff_error_m": {name: _rounded(value) for name, value in self.standoff.items()},
+            "true_standoff_error_m": {name: _rounded(value) for name, value in self.true_standoff.items()},
+            "converged_s": None if self.converged is None else round(self.converged, 1),
+            "truly_converged_s": None if self.truly_converged is None else round(self.truly_converged, 1),
+            "anchored_anew": self.anchored,
+        }
+
+    def faults(self, closest: float | None) -> list[str]:
+        """Which bars it does not pass; ``closest``: the least distance of two vehicles, m."""
+        wrong = []
+        if closest is None or closest < CLOSEST:
+            wrong.append(f"two vehicles were {_said(closest)} m apart; a sortie allows {CLOSEST} m")
+        if self.tracking is None or self.tracking.p95 > TRACKING:
+            p95 = None if self.tracking is None else self.tracking.p95
+            wrong.append(f"vehicles were {_said(p95)} m off their set-points (95 %); allowed: {TRACKING} m")
+        if self.step > STEP:
+            wrong.append(f"a set-point was {self.step:.2f} m beside where the last led; allowed: {STEP} m")
+        if self.anchored is None or self.anchored:
+            wrong.append(f"{_count(self.anchored)} plans began anew where the vehicle was; allowed: none")
+        if self.converged is None or self.converged > CONVERGED:
+            wrong.append(f"all were there {_said(self.converged)} s after the go; allowed: {CONVERGED} s")
+        walking = self.standoff.get(WALK)
+        if walking is None or walking.p95 > STANDOFF:
+            p95 = None if walking is None else walking.p95
+            wrong.append(f"stand-off from a walking target {_said(p95)} m (95 %); allowed: {STANDOFF} m")
+        return wrong
+
+
+def score(
+    logs: Mapping[int, Sequence[Flown]],
+    tracks: Mapping[int, Track],
+    stage: Stage,
+    nearest: Callable[[Array], Array],
+    anchored: int | None,
+) -> Score:
+    """Of a sortie that came as far as its marks say. ``tracks``: the truth; ``nearest``: the point of the
+    surface that is nearest to an offset from the target."""
+    marks = stage.marks
+    own = {system: _joined(parts) for system, parts in logs.items() if parts}
+    steered = {
+        system: [part.setpoints.between(*stage.steered(system)) for part in parts]
+        for system, parts in logs.items()
+    }
+    acts = [(name, marks[name], marks[end]) for name, end in ((WALK, RUN), (RUN, RETURN)) if end in marks]
+
+    def beside(flown: Mapping[int, Track]) -> dict[str, Spread | None]:
+        if len(flown) < len(tracks):
+            return {}
+        return {
+            name: spread(surface_errors(flown, stage.target, nearest, looks(begin, end)))
+            for name, begin, end in acts
+        }
+
+    def converged(flown: Mapping[int, Track]) -> float | None:
+        if ESCORT not in marks or len(flown) < len(tracks):
+            return None
+        times = looks(marks[GO], marks.get(RETURN, stage.ended))
+        return converged_after(surface_errors(flown, stage.target, nearest, times), times)
+
+    return Score(
+        spread(joined([tracking_errors(one, own[k]) for k, parts in steered.items() for one in parts])),
+        spread(joined([tracking_errors(one, tracks[k]) for k, parts in steered.items() for one in parts])),
+        spread(joined([tracks[k].beside(track) for k, track in own.items()])),
+        max((largest_step(one) for parts in steered.values() for one in parts), default=0.0),
+        beside(own),
+        beside(tracks),
+        converged(own),
+        converged(tracks),
+        anchored,
+    )
+
+
+def _joined(parts: Sequence[Flown]) -> Track:
+    tracks = [part.reported for part in parts]
+    return Track(*(np.concatenate(column) for column in zip(*tracks, strict=True)))
+
+
+def _rounded(value: Spread | None) -> dict[str, float] | None:
+    return None if value is None else {name: round(part, 3) for name, part in value._asdict().items()}
+
+
+def _said(value: float | None) -> str:
+    return "no known number of" if value is None else f"{value:.2f}"
+
+
+def _count(value: int | None) -> str:
+    return "nobody knows how many" if value is None else str(value)

@@ -1,0 +1,27 @@
+"""The story of a sortie: the flight by which separation and tracking are measured, act by act."""
+
+from __future__ import annotations
+
+from trials.reports import come_back, go, wait_for_the_go
+from trials.stage import Stage
+from trials.walker import sortie_target
+
+GO, ESCORT, WALK, RUN, RETURN = "go", "escort", "walk", "run", "return"
+"""When it was said, when all escorted, and when the target began to walk and to run."""
+
+
+def sortie(stage: Stage) -> None:
+    """All acts. OutriderError if what has to follow does not."""
+    wait_for_the_go(stage)
+    stage.mark(GO)
+    go(stage, stage.plan.systems)
+    stage.mark(ESCORT)
+    stage.walker.begin(stage.observer.clock.now())
+    stage.tell("the target stands")
+    for name, pace in zip((WALK, RUN), sortie_target().paces, strict=True):
+        stage.wait(stage.marks[ESCORT] + pace.after_s - stage.now)
+        stage.mark(name)
+        stage.tell(f"the target goes at {pace.speed:g} m/s")
+    stage.wait(stage.plan.run_s)
+    stage.mark(RETURN)
+    come_back(stage)
