@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import takewhile
-from math import degrees, radians, remainder, tau
+from math import degrees, isfinite, radians, remainder, tau
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
@@ -155,7 +155,9 @@ def highres_imu_fields(x: m.HighresImu) -> Fields:
     return x.time_boot, *motion, x.pressure, 0.0, x.pressure_altitude, x.temperature, _ALL_UPDATED, 0
 
 
-def sim_state(s: m.Source, f: Fields) -> m.SimState:
+def sim_state(s: m.Source, f: Fields) -> m.SimState | None:
+    if not on_globe(f[9], f[10]):
+        return None
     roll, pitch, yaw = f[:3]
     return m.SimState(s, roll, pitch, yaw, f[3:6], f[6:9], f[9] / 1e7, f[10] / 1e7)
 
@@ -169,7 +171,9 @@ def simulation_state(s: m.Source, f: Fields) -> m.SimulationState | None:
     latitude, longitude = f[21:]
     # Float degrees are half a metre apart: they serve only where the extension fields are missing.
     if not (latitude or longitude):
-        latitude, longitude = f[13] * 1e7, f[14] * 1e7
+        if not (isfinite(f[13]) and isfinite(f[14])):
+            return None
+        latitude, longitude = round(f[13] * 1e7), round(f[14] * 1e7)
     if not on_globe(latitude, longitude):
         return None
     return m.SimulationState(s, latitude / 1e7, longitude / 1e7, f[15], f[18:21])

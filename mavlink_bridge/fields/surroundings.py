@@ -43,7 +43,7 @@ def adsb(s: m.Source, f: Fields) -> m.AdsbVehicle | None:
         remainder(radians(heading / 100), tau) if flags & _HEADING and heading <= FULL_CIRCLE_CDEG else None,
         speed / 1e2 if flags & _VELOCITY else None,
         climb / 1e2 if flags & _CLIMB else None,
-        _text(name) if flags & _CALLED else "",
+        _text(name[:_CALLSIGN]) if flags & _CALLED else "",
         emitter,
         age * _SECOND,
     )

@@ -119,7 +119,7 @@ class MavProxyFlight:
         """``velocity`` and ``position`` go along the vehicle's own axes, which still lie north and east."""
         proxy = self.proxy
         proxy.type("velocity 1 0 0")
-        moving = when(proxy, lambda now: now["vx"] > 0.9)
+        moving = when(proxy, lambda now: abs(now["vx"] - 1.0) < 0.1)
         self.velocity = moving["vx"], moving["vy"], moving["vz"]
         proxy.type("velocity 0 0 0")
         self.before = place(at_rest(proxy))
