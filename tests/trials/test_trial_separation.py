@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from trials.separation import Track, longest_gap, nearest
+from trials.separation import GAP, Track, blind, longest_gap, nearest
 
 NUMBERS = st.floats(-5.0, 5.0)
 VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array)
@@ -46,3 +46,9 @@ def test_a_silence_is_no_straight_way():
     (pair,) = [one for one in nearest({1: way, 2: crossing}, (100, far)) if one.pair == (1, 2)]
     assert pair.distance > 1.3
     assert longest_gap(way) == pytest.approx(2.9)
+
+
+def test_a_flight_of_which_too_little_is_known_is_not_passed():
+    assert blind(0.9 * GAP) == []
+    (fault,) = blind(2.9)
+    assert "for 2.9 s" in fault

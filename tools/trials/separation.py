@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 _STEP = 0.005
 """s between two looks; at 5 m/s that is 2.5 cm of way, and millimetres of distance at the nearest point."""
-_GAP = 1.0
+GAP = 1.0
 """s: over a longer silence nothing is known."""
 
 
@@ -35,7 +35,7 @@ class Track(NamedTuple):
         """Positions (m, 3) at ``times`` (m,); NaN while its motors do not run, and where nothing is known."""
         found = np.stack([np.interp(times, self.times, self.places[:, k]) for k in range(3)], axis=1)
         after = np.clip(np.searchsorted(self.times, times), 1, len(self.times) - 1)
-        unknown = self.times[after] - self.times[after - 1] > _GAP
+        unknown = self.times[after] - self.times[after - 1] > GAP
         grounded = ~(self.armed[after] | self.armed[after - 1])
         outside = (times < self.times[0]) | (times > self.times[-1])
         found[unknown | grounded | outside] = np.nan
@@ -61,6 +61,13 @@ def nearest(tracks: Mapping[int, Track], target: tuple[int, Callable[[Array], Ar
             k = int(np.nanargmin(off))
             found.append(Nearest((pair[0], pair[1]), float(off[k]), float(times[k])))
     return found
+
+
+def blind(gap: float) -> list[str]:
+    """A fault where the longest gap (s) is too long: then nobody knows how near who came meanwhile."""
+    if gap <= GAP:
+        return []
+    return [f"nothing is known of a flying vehicle for {gap:.1f} s, and the machine may have stood still"]
 
 
 def longest_gap(track: Track) -> float:

@@ -8,7 +8,7 @@ from companion.config import CompanionConfig
 from trials.mishaps import ENDED, KILLED
 from trials.plan import MISHAPS, SORTIE, TARGET
 from trials.score import Score, score
-from trials.separation import Nearest
+from trials.separation import Nearest, blind
 from trials.stage import Stage
 
 _SAID = ("Target lost", "Target is back")
@@ -26,7 +26,7 @@ def verdict(stage: Stage, trouble: str | None) -> dict[str, Any]:
     found, gap = stage.nearest() if stage.observer.ready else ([], 0.0)
     mates = [one for one in found if TARGET not in one.pair]
     guarded = [one for one in found if TARGET in one.pair]
-    faults += _near(found, d_min, target_d_min)
+    faults += _near(found, d_min, target_d_min) + blind(gap)
     summaries: Said = {system: wingman.summary for system, wingman in stage.wingmen.items()}
     if trouble is None:
         killed = KILLED if plan.story == MISHAPS else None
