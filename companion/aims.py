@@ -9,7 +9,7 @@ import numpy as np
 from companion.bearings import turned
 from companion.config import CompanionConfig
 from companion.forces import Obstacles
-from companion.formation import Spread, even_turn, outside, taking_part
+from companion.formation import Spread, even_turn, outside, spacing, taking_part
 from companion.horizon import Array, Motion
 from companion.pilot import Phase, Pilot
 from companion.planner import Aim, standing
@@ -44,6 +44,8 @@ class Aims:
         self._lane = 0.0
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
+        self.spacing = inf
+        """How far (m) from each other those that share the surface are to be; ∞ where it is not shared."""
         self.goal: Array | None = None
         """(3,) m, fleet-local ENU: as ordered, of the task ``goto``; None for where it began to steer."""
 
@@ -78,6 +80,7 @@ class Aims:
         surface; ``below``: how many of the others have a smaller id. SurfaceError where the surface has no
         nearest point."""
         self._lane = self._config.guard.return_step * below
+        self.spacing = inf
         aim = self._destination(now, view, measured, obstacles, mates)
         speed = self._config.guard.cautious_speed
         return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
@@ -97,7 +100,7 @@ class Aims:
         if phase is Phase.RETURN:
             place = self._way_back(now, measured)
         elif phase is Phase.SETTLE:
-            place = self._settling.rest(measured, obstacles)
+            place = self._settling.rest(now, measured, obstacles)
             if self._settling.clear:
                 self._pilot.settled()
         elif phase is not Phase.HOLD and task == "goto":
@@ -132,6 +135,7 @@ class Aims:
             return 0.0
         here = self._surface.nearest(offset)
         others = taking_part(formation, mates, float(np.linalg.norm(here)))
+        self.spacing = spacing(hypot(here[0], here[1]), len(others))
         return max(-formation.turn, min(formation.turn, even_turn(offset, others)))
 
     def _place_to_hold(self, measured: Motion) -> Array:

@@ -4,11 +4,11 @@ Settled against the text. The variable is the total acceleration a = u + f, beca
 nothing else: f only shifts the bounds, a ∈ [f + u_min, f + u_max]. Gravity is absent: u is relative to hover,
 and the vehicle's controller carries the weight (with g in the dynamics and |u| ≤ 2 the problem has no
 solution). The vehicle's own bound, ‖u + f‖ ≤ a_total, holds for every solution: the box is shrunk from
-outside until its far corner lies in that ball. The box comes before the field: where the bounds that f has
-shifted leave no input that keeps it, these bounds are opened again towards what the vehicle has, as little as
-is enough; with bounded jerk the speed limits come before the field, too. Only a limit that even this cannot
-keep is widened to what is reachable, so that every QP has a solution. With ``j_max`` the jerk is bounded, too
-(``jerk``).
+outside until its far corner lies in that ball. Box and speed limits come before the field: where the bounds
+that f has shifted leave no input that keeps them, these bounds are opened again towards what the vehicle has,
+as late in the horizon as may be, so that a vehicle still evades with all its force until it is fast enough
+(``_late``), and then as little as is enough. Only a limit that even this cannot keep is widened to what is
+reachable, so that every QP has a solution. With ``j_max`` the jerk is bounded, too (``jerk``).
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ from companion.solver import QpSolver
 
 _TOLERANCE = 1e-7
 """m and m/s by which a state limit may be passed: far below what anything can measure."""
+_SPARE, _SLOWER, _INSIDE = 0.5, 0.02, 0.05
+"""Share of the braking that is counted on, m/s below v_max and m inside the box, where bounds give way to
+limits."""
 _WIDEN = 0.01
 """Share of the reach by which an unreachable bound is widened: an interior keeps the interior-point method
 happy."""
@@ -153,6 +156,16 @@ class Dqmpc:
             x_l, x_u = np.minimum(np.maximum(x_l, a_l), a_u), np.maximum(np.minimum(x_u, a_u), a_l)
             least, most = np.minimum(np.maximum(least, a_l), a_u), np.maximum(np.minimum(most, a_u), a_l)
         least, most = np.minimum(least, x_l), np.maximum(most, x_u)
+        # The state that the plan begins with, as the drift in the rows has it.
+        v = self._low[:, 0] - h_l[:, 0]
+        x = self._low[:, -1] - h_l[:, -1] - self.seconds * v
+        down = np.any(h_l > x_u @ self._G_T + _TOLERANCE, axis=1, keepdims=True)
+        if down.any():
+            late = -self._late(-x_u, -most, x - self._low[:, -1], -v)
+            x_u = np.where(down, np.maximum(x_u, late), x_u)
+        up = np.any(x_l @ self._G_T > h_u + _TOLERANCE, axis=1, keepdims=True)
+        if up.any():
+            x_l = np.where(up, np.minimum(x_l, self._late(x_l, least, self._high[:, -1] - x, v)), x_l)
         margin = _WIDEN * ((most - least) @ self._G_T)
         x_u = x_u + self._opened(h_l - x_u @ self._G_T, most - x_u, margin)
         x_l = x_l - self._opened(x_l @ self._G_T - h_u, x_l - least, margin)
@@ -165,19 +178,31 @@ class Dqmpc:
             h_u=np.maximum(h_u, low + margin),
         )
 
+    def _late(self, pushed: Array, least: Array, room: Array, v: Array) -> Array:
+        """The accelerations (3, n) towards a side that is ``room`` (3,) m away, at ``v`` (3,) m/s: as
+        ``pushed`` (3, n), until speed or braking distance allow no more. Not less than ``least`` (3, n)."""
+        dt, found, room = self.dt, np.empty_like(pushed), room - _INSIDE
+        strong = -_SPARE * np.minimum(least.max(axis=1), 0.0)
+        fastest = self._high[:, 0] - _SLOWER
+        for n in range(self.n):
+            stop = np.sqrt(2.0 * strong * np.maximum(room - dt * np.maximum(v, 0.0), 0.0))
+            rest = np.minimum(fastest, stop) - v
+            # A vehicle that is too fast away from that side has to be slowed down first.
+            a = np.minimum(np.maximum(pushed[:, n], (-fastest - v) / dt), rest / dt)
+            if self.limits.j_max is not None:
+                a = np.minimum(a, np.sqrt(2.0 * np.array(self.limits.j_max) * np.maximum(rest, 0.0)))
+            found[:, n] = a = np.maximum(a, least[:, n])
+            room = room - dt * (v + 0.5 * dt * a)
+            v = v + dt * a
+        return found
+
     def _opened(self, missing: Array, room: Array, margin: Array) -> Array:
         """What bounds (3, n) on a have to give way by, of the ``room`` (3, n) that they have, so that rows
         (3, 2n) gain what is ``missing`` there, and a ``margin``: the same share of it at every n."""
-        if self._jerk is None:
-            # The paper's field may make a vehicle faster than v_max; nothing takes it out of the box.
-            missing = missing[:, self.n :]
-            gains, margin = self._G_T[:, self.n :], margin[:, self.n :]
-        else:
-            gains = self._G_T
-        if (missing <= 0.0).all():
+        if (missing <= _TOLERANCE).all():
             return np.zeros_like(room)
-        gain = np.maximum(room @ gains, _TOLERANCE)
-        share = np.where(missing > 0.0, (missing + margin) / gain, 0.0).max(axis=1)
+        gain = np.maximum(room @ self._G_T, _TOLERANCE)
+        share = np.where(missing > _TOLERANCE, (missing + margin) / gain, 0.0).max(axis=1)
         opened: Array = np.minimum(share, 1.0)[:, None] * room
         return opened
 

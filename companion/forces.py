@@ -17,6 +17,7 @@ on the way in flings vehicles out of every encounter. ``braking=None`` is the pa
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import pi
 from typing import NamedTuple
 
@@ -57,6 +58,18 @@ class Obstacles(NamedTuple):
             np.concatenate([self.d_safe, others.d_safe]),
             np.concatenate([np.broadcast_to(part.radius, len(part.ids)) for part in (self, others)]),
         )
+
+    def shared(self, systems: Collection[int], spacing: float) -> Obstacles:
+        """The same, where those of ``systems`` have places ``spacing`` m apart: there they push no more."""
+        if not any(id_ in systems for id_ in self.ids):
+            return self
+        theirs = np.array([id_ in systems for id_ in self.ids])
+        nearest = np.maximum(self.d_min + _WIDTH, spacing)
+        return self._replace(d_safe=np.where(theirs, np.minimum(self.d_safe, nearest), self.d_safe))
+
+
+_WIDTH = 1.0
+"""m, at least, between d_min and d_safe."""
 
 
 def magnitude(distance: Array, d_min: Array, d_safe: Array, gain: float, clamp: float) -> Array:

@@ -10,7 +10,7 @@ outside of the surface.
 
 from __future__ import annotations
 
-from math import pi
+from math import pi, sin
 from typing import Annotated, Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ from pydantic import Field
 from companion.horizon import Array
 from companion.settings import Settings
 
-_ROUND, _OUTSIDE = 0.25, 4.0
+_ROUND, _OUTSIDE = 0.25, 2.5
 """rad and m: a vehicle that has to go round by more than the first stays outside, by the second at one radian
 more."""
 
@@ -78,3 +78,8 @@ def taking_part(config: Spread, offsets: Array, radius: float) -> Array:
     from it."""
     near: Array = offsets[np.sqrt(np.vecdot(offsets, offsets)) < config.reach * radius]
     return near
+
+
+def spacing(radius: float, others: int) -> float:
+    """How far (m) even places on a circle of that ``radius`` (m) are apart, with so many ``others``."""
+    return 2.0 * radius * sin(pi / (others + 1))

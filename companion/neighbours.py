@@ -314,12 +314,22 @@ class Neighbours:
         self._put_down()
         if not self._ids:
             return np.empty((0, 3))
-        _, fresh = self._table.positions(self._ids, now, now - self._config.guard.plan_stale_us)
-        for system in self._things & self._rows.keys():
-            fresh[self._rows[system]] = False
+        fresh = self._planning(now)
         age = np.minimum(np.maximum(now - self._times[fresh], 0), self._config.neighbour.extrapolate_us)
         states = self._states[fresh]
         return np.asarray(states[:, 0:3] + 1e-6 * age[:, None] * states[:, 3:6])
+
+    def mate_ids(self, now: int) -> frozenset[int]:
+        """Their system ids."""
+        self._put_down()
+        return frozenset(compress(self._ids, self._planning(now).tolist())) if self._ids else frozenset()
+
+    def _planning(self, now: int) -> NDArray[np.bool_]:
+        """Of each neighbour, whether it flies by plans of its own."""
+        _, fresh = self._table.positions(self._ids, now, now - self._config.guard.plan_stale_us)
+        for system in self._things & self._rows.keys():
+            fresh[self._rows[system]] = False
+        return fresh
 
     def last_heard(self) -> list[tuple[int, int, Array, Array]]:
         """System id, time (µs), position (3,) and velocity (3,) of everybody's last known state."""

@@ -9,6 +9,7 @@ vehicle over by its mode, on the way up and down too, keeps it until a new go is
 from __future__ import annotations
 
 from enum import Enum
+from math import inf
 
 from companion.autopilot_limits import AutopilotLimits
 from companion.autopilots import Loop, Profile, Step
@@ -136,6 +137,14 @@ class Pilot:
             self.limits.hear(message)
         else:
             self.vehicle.hear(message)
+
+    def _floor(self, view: View) -> float:
+        """Above which height (m, fleet-local) an escort may begin on the way up; ∞ without a target, where it
+        would stay there, and where plans are committed, which begin at rest."""
+        config = self._config
+        if config.task != "escort" or config.avoidance == "certified" or view.target is None:
+            return inf
+        return config.limits.within(config.field.margin(1)).box_min[2]
 
     def go(self, height: float) -> bool:
         """The operator's go: climb to ``height`` metres above the start, or take over where it flies already;
@@ -365,7 +374,7 @@ class Pilot:
         if self.phase is not Phase.PREPARE or view.own is None:
             return []
         step = takeoff.step(profile)
-        sent = takeoff.advance(now, profile, view.own, height)
+        sent = takeoff.advance(now, profile, view.own, height, self._floor(view))
         if takeoff.step(profile) is None:
             self.phase = Phase.ESCORT
             self._custody.begin()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Sequence
-from math import hypot
+from math import hypot, inf
 from typing import NamedTuple
 
 import numpy as np
@@ -233,7 +233,10 @@ class Planning:
             if self._fading is not None and horizon is not None:
                 # The others avoid the vehicle, not its plan.
                 prediction = prediction + self._fading * self.tracking.error
-            self._obstacles = obstacles = self._world.obstacles(now, view, prediction)
+            obstacles = self._world.obstacles(now, view, prediction)
+            if self._aims.spacing < inf:
+                obstacles = obstacles.shared(self._world.neighbours.mate_ids(now), self._aims.spacing)
+            self._obstacles = obstacles
             self.plan = self.planner.plan(
                 now, state.position, state.velocity, prediction, aim, obstacles, state.acceleration
             )

@@ -10,6 +10,8 @@ from companion.horizon import Array, Motion
 
 _ASIDE = 0.5
 """m further than the clearance, when moving aside to land."""
+_PASSES, _WAITS = 1.0, 5_000_000
+"""m in a horizon: what moves further is passing, and for so long (µs) it is waited for."""
 _NEAR = 1e-3
 _EAST = np.array([1.0, 0.0])
 
@@ -21,11 +23,13 @@ class Settling:
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
         self._rest: Array | None = None
+        self._waiting_since: int | None = None
         self.clear = False
 
-    def rest(self, measured: Motion, obstacles: Obstacles) -> Array:
-        """The place (3,) to go to: where braking from the first call on ends, or beside an obstacle that is
-        in the way, since a landed vehicle will not go away."""
+    def rest(self, now: int, measured: Motion, obstacles: Obstacles) -> Array:
+        """The place (3,) to go to at ``now`` (µs): where braking from the first call on ends, or beside an
+        obstacle that is in the way, since a landed vehicle will not go away. One that passes is waited for.
+        """
         config, here = self._config, measured.position
         speed = float(np.linalg.norm(measured.velocity))
         if self._rest is None:
@@ -35,8 +39,19 @@ class Settling:
         if speed < config.guard.landing_speed:
             beside = self._beside(here, obstacles)
             self.clear = beside is None
-            self._rest = self._rest if beside is None else beside
+            if beside is not None and not self._waits(now, here, obstacles):
+                self._rest = beside
         return self._rest
+
+    def _waits(self, now: int, here: Array, obstacles: Obstacles) -> bool:
+        """Whether the nearest obstacle passes, and not for too long."""
+        apart = here[:2] - obstacles.positions[:, 0, :2]
+        nearest = int(np.argmin(np.sqrt(np.vecdot(apart, apart)) - obstacles.radius))
+        way = obstacles.positions[nearest, -1, :2] - obstacles.positions[nearest, 0, :2]
+        if float(np.hypot(way[0], way[1])) < _PASSES:
+            return False
+        self._waiting_since = now if self._waiting_since is None else self._waiting_since
+        return now - self._waiting_since < _WAITS
 
     def _beside(self, here: Array, obstacles: Obstacles) -> Array | None:
         """A place (3,) clear of the nearest obstacle; None if it is far enough."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from companion.autopilots import Profile, Step
 from companion.calls import DO_SET_MODE, Calls
 from companion.horizon import Array
@@ -14,6 +16,10 @@ _STILL, _CALM = 0.3, 2_000_000
 """m/s and µs: slower than this for so long in the air, a take-off is over."""
 _NEARLY = 0.7
 """Share of the height asked for."""
+_ENOUGH, _ROOM, _THERE, _FAST = 0.6, 0.2, 0.3, 3.0
+"""Share of the height asked for, m above the floor of plans, m above that height and m/s: from there to
+there, and no faster, an escort may take over a vehicle that still climbs. An autopilot takes the rest slowly,
+in up to 3 s."""
 _NAN = float("nan")
 
 
@@ -54,8 +60,11 @@ class Takeoff:
         climbed = float(own.position[2]) - self._ground
         return not self._flying_already and climbed > _NEARLY * height
 
-    def advance(self, now: int, profile: Profile, own: State, height: float) -> list[Message]:
-        """Commands to send now on the way to ``height`` (m above the ground)."""
+    def advance(
+        self, now: int, profile: Profile, own: State, height: float, floor: float = inf
+    ) -> list[Message]:
+        """Commands to send now on the way to ``height`` (m above the ground). ``floor``: the lowest height
+        (m, fleet-local) of plans that can go on with the way up; ∞ where they cannot."""
         vehicle = self._vehicle
         step = profile.steps[self._step]
         if step is Step.MODE:
@@ -68,7 +77,7 @@ class Takeoff:
                 self.asked_to_arm = now
         else:
             climbed = float(own.position[2]) - self._ground
-            done = self._flying_already or self._is_up(now, own, climbed, height)
+            done = self._flying_already or self._is_up(now, own, climbed, height, floor)
             above_sea = self._origin_altitude + self._ground + height
             altitude = above_sea if profile.takeoff_absolute else height
             up = self._flying_already or vehicle.landed_state not in (UNDEFINED, ON_GROUND)
@@ -81,13 +90,17 @@ class Takeoff:
             return []
         return call
 
-    def _is_up(self, now: int, own: State, climbed: float, height: float) -> bool:
-        """Still at the height asked for; or still for a while in the air, for an estimate of height that
-        drifts by more than one may ask: the autopilot measures its height from its own origin."""
-        still = float(abs(own.velocity).max()) < _STILL
+    def _is_up(self, now: int, own: State, climbed: float, height: float, floor: float) -> bool:
+        """High enough for plans to go on from there; still at the height asked for; or still for a while in
+        the air, for an estimate of height that drifts by more than one may ask: the autopilot measures its
+        height from its own origin."""
+        speed = float(abs(own.velocity).max())
+        still = speed < _STILL
         if self._vehicle.landed_state == ON_GROUND:
             self._calm_since = None
             return False
+        if own.position[2] > floor + _ROOM and _ENOUGH * height < climbed < height + _THERE and speed < _FAST:
+            return True
         if not still or self._vehicle.landed_state != IN_AIR or climbed < 0.5 * height:
             self._calm_since = None
         elif self._calm_since is None:

@@ -12,12 +12,13 @@ own loops, delayed by the lag of its attitude loop. ArduPilot does not chase the
 that itself chases the set-point with bounded jerk: there (p_r, v_r, a_r + c) are that trajectory's, which is
 predicted as well. What the measured velocity has less is the disturbance d =
 κ v + w: κ, the drag per speed, is learnt from how d changes with the velocity (a Kalman filter of one state),
-w is the rest. The compensation ρ (κ v_r + w) is added to the set-point's acceleration; position and velocity
-stay the plan's. ρ < 1 lets what a vehicle does not answer to decay.
+w is the rest. The compensation κ v_r + ρ w is added to the set-point's acceleration; position and velocity
+stay the plan's. ρ < 1 lets what a vehicle does not answer to decay; κ v_r is no feedback and needs none.
 
 PX4's position loop is proportional. An estimated velocity that is off by b, as GNSS makes it for seconds,
-leaves the vehicle b/k_p beside its set-point for as long; there the velocity set-point is corrected by an
-integral of the error.
+leaves the vehicle b/k_p beside its set-point for as long. b is how much faster the estimated velocity is than
+the estimated position moves; it is added to the velocity set-point. (An integral of the error was tried: b
+changes within three seconds, and an integral so fast is not stable.)
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ _SLOW = 3.0
 """s: time constant of the means that velocity and disturbance are compared with to learn κ."""
 _DOUBT, _DRIFT, _NOISE = 1.0, 0.002, 0.2
 """Of κ: variance at first (1/s²), its growth (1/s³), spectral density of the disturbance's noise (m²/s³)."""
-_MOST_BIAS = 0.5
-"""m/s."""
+_MOST_BIAS, _MOST_SURPRISE = 1.0, 2.0
+"""m/s: of the velocity's offset, and of what one observation may say of it: a position that jumps is no
+velocity."""
 _MOST_DRAG = 2.0
 """1/s."""
 _LONGEST = 0.1
@@ -55,7 +57,7 @@ class TrackingConfig(Settings):
     compensate: bool = Field(
         False, description="add to the set-point's acceleration what drag and wind take from the vehicle"
     )
-    bandwidth: float = Field(1.0, gt=0.0, le=20.0, description="1/s, of the disturbance observer")
+    bandwidth: float = Field(2.5, gt=0.0, le=20.0, description="1/s, of the disturbance observer")
     lag: float = Field(0.18, ge=0.0, le=2.0, description="s, of the autopilot's attitude loop")
     most: float = Field(4.0, ge=0.0, le=10.0, description="m/s², of the compensation")
     usual: Positive | None = Field(
@@ -95,8 +97,8 @@ class Errors:
 
 class Tracking:
     """Of one vehicle. ``error`` (3,): measured less reference position, m; ``envelope``: its largest norm
-    lately, m; ``compensation`` (3,) m/s² and ``bias`` (3,) m/s: what is added to the acceleration and to the
-    velocity of set-points, fleet-local ENU, horizontal."""
+    lately, m; ``compensation`` (3,) m/s², horizontal, and ``bias`` (3,) m/s: what is added to the
+    acceleration and to the velocity of set-points, fleet-local ENU."""
 
     def __init__(self, config: TrackingConfig) -> None:
         self._config = config
@@ -113,6 +115,7 @@ class Tracking:
         self.compensation: Array = np.zeros(3)
         self.bias: Array = np.zeros(3)
         self._velocity: Array = np.zeros(2)
+        self._place: Array = np.zeros(3)
         self._rest: Array = np.zeros(2)
         self._asked: Array = np.zeros(2)
         # The autopilot's own trajectory: how far it is ahead of the reference, and its acceleration.
@@ -147,16 +150,22 @@ class Tracking:
         if not self._config.compensate:
             return
         if not 0.0 < dt <= _LONGEST:
-            self._velocity = measured.velocity[:2].copy()
+            self._velocity, self._place = measured.velocity[:2].copy(), measured.position.copy()
             self._asked = self._fed = reference.acceleration[:2] + self.compensation[:2]
             self._means = np.stack([self._velocity, self._disturbance(self._velocity)])
             return
-        if loop.bias:
-            bias = _limited(self.bias[:2] - loop.bias * dt * self.error[:2], _MOST_BIAS)
-            self.bias = np.append(bias, 0.0)
+        if loop.offset_s > 0.0:
+            self._offset(dt, measured, loop.offset_s)
         self._predict(dt, reference, measured, loop)
         self._learn(dt, measured.velocity[:2])
         self._compensate(dt, reference, loop.slew)
+
+    def _offset(self, dt: float, measured: Motion, seconds: float) -> None:
+        """By how much the estimated velocity is off, of the last ``seconds``."""
+        moved, self._place = measured.position - self._place, measured.position.copy()
+        surprise = _limited(measured.velocity - moved / dt, _MOST_SURPRISE)
+        bias = self.bias + (1.0 - exp(-dt / seconds)) * (surprise - self.bias)
+        self.bias = _limited(bias, _MOST_BIAS)
 
     def _disturbance(self, velocity: Array) -> Array:
         total: Array = self._drag * velocity + self._rest
@@ -207,8 +216,10 @@ class Tracking:
 
     def _compensate(self, dt: float, reference: Motion, slew: float) -> None:
         config = self._config
-        ahead = reference.velocity[:2] + config.lag * reference.acceleration[:2]
-        wanted = _limited(_SHARE * self._disturbance(ahead), config.most)
+        # So fast the autopilot is asked to be, and the drag is of that speed.
+        speed = reference.velocity + self.bias
+        ahead = speed[:2] + config.lag * reference.acceleration[:2]
+        wanted = _limited(self._drag * ahead + _SHARE * self._rest, config.most)
         change = _limited(wanted - self.compensation[:2], slew * dt)
         added = _beside(reference.acceleration[:2], self.compensation[:2] + change, self._room)
         self.compensation = np.append(added, 0.0)

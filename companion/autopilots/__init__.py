@@ -32,14 +32,14 @@ class Loop(NamedTuple):
     """Gains of an autopilot's horizontal position loop, its defaults: it asks for the velocity v_r +
     ``position`` · error (1/s), and for the acceleration a_r + ``velocity`` · its error (1/s). ``slew``: how
     fast (m/s³) what is added to a_r may change beside what plans ask for. ``shaping``: of an autopilot that
-    chases set-points with a trajectory of its own. ``bias``: rate (1/s²) at which the velocity
-    set-point corrects for an estimated velocity that is off, where no integral of the autopilot's does."""
+    chases set-points with a trajectory of its own. ``offset_s``: over so many seconds it is seen by how much
+    the estimated velocity is off, for the velocity set-point to make up for it; 0: it does not."""
 
     position: float
     velocity: float
     slew: float
     shaping: Shaping | None = None
-    bias: float = 0.0
+    offset_s: float = 0.0
 
 
 class Profile(NamedTuple):

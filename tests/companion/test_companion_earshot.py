@@ -198,11 +198,22 @@ def test_who_is_straight_below_is_landed_on_from_no_height():
     obstacles = world.neighbours.obstacles(END, ZERO[None])
     assert obstacles.ids == (OTHER,)
     settling = Settling(CONFIG)
-    settling.rest(Motion(ZERO, ZERO, ZERO), obstacles)
+    settling.rest(0, Motion(ZERO, ZERO, ZERO), obstacles)
     assert not settling.clear
     aside = np.array([30.0, 0.0, -150.0])
     obstacles = after_seconds(aside, ZERO).world.neighbours.obstacles(END, ZERO[None])
     assert obstacles.ids == ()
+
+
+@pytest.mark.parametrize(("speed", "waits"), [(3.0, True), (0.0, False)])
+def test_one_that_passes_is_waited_for_and_one_that_stays_is_left(speed, waits):
+    """For five seconds; the place to land is the own one, if it can be."""
+    place, velocity = np.array([0.3, 0.0, -5.0]), np.array([speed, 0.0, 0.0])
+    obstacles = after_seconds(place, velocity).world.neighbours.obstacles(END, ZERO[None])
+    settling, here = Settling(CONFIG), Motion(ZERO, ZERO, ZERO)
+    stays = [np.array_equal(settling.rest(k * 1_000_000, here, obstacles), ZERO) for k in range(7)]
+    assert stays == [waits] * 5 + [False] * 2
+    assert not settling.clear
 
 
 def test_a_place_that_the_plan_does_not_begin_at_counts_too():

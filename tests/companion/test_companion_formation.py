@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.bearings import turned
-from companion.formation import Spread, even_turn, outside, taking_part
+from companion.forces import Obstacles
+from companion.formation import Spread, even_turn, outside, spacing, taking_part
 
 ANGLES = st.lists(st.floats(0.0, 6.28), min_size=2, max_size=8, unique=True).filter(
     lambda angles: np.diff(np.sort([*angles, min(angles) + 2.0 * np.pi])).min() > 1e-3
@@ -62,3 +63,17 @@ def test_a_vehicle_that_goes_round_does_so_outside(bearing, turn):
 def test_only_those_near_the_surface_take_part():
     near, far = np.array([12.0, 0.0, 3.0]), np.array([400.0, 0.0, 3.0])
     np.testing.assert_array_equal(taking_part(Spread(kind="spread"), np.stack([near, far]), 5.8), near[None])
+
+
+@given(st.integers(1, 8))
+def test_even_places_are_so_far_apart_and_push_no_more_there(others):
+    angles = 2.0 * np.pi * np.arange(others + 1) / (others + 1)
+    places = offsets(angles)
+    apart = np.linalg.norm(places[1:] - places[0], axis=1)
+    assert apart.min() == pytest.approx(spacing(5.0, others))
+    field = Obstacles(
+        tuple(range(others)), places[1:, None], np.full(others, 0.95), np.full(others, 4.85)
+    ).shared(frozenset(range(1, others)), spacing(5.0, others))
+    assert (apart[1:] >= field.d_safe[1:] - 1e-9).all()
+    assert field.d_safe[0] == 4.85
+    assert (field.d_safe > field.d_min).all()

@@ -423,3 +423,16 @@ def test_an_answer_to_somebody_else_settles_nothing(system, component):
     # MAVLink 1 does not say whom it answers.
     rig.tick(ack(MODE)._replace(target_system=0, target_component=0))
     assert MODE not in {command for command, _ in rig.run(2.0, beat("ardupilot"), HEALTHY)}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("seen", [True, False])
+def test_an_escort_begins_on_the_way_up_where_its_target_is_known(flavour, seen):
+    rig = Rig(flavour).prepared()
+    armed = beat(flavour, armed=True, guided=flavour == "ardupilot")
+    rig.run(1.0, armed, landed(1), acks=True)
+    climbing = state(0.7 * HEIGHT)._replace(velocity=np.array([0.0, 0.0, 1.2]))
+    rig.view = READY._replace(own=climbing, target=state(0.0) if seen else None)
+    rig.run(0.5, armed, landed(3), acks=True)
+    rig.run(0.5, beat(flavour, armed=True, guided=True), landed(3), acks=True)
+    assert (rig.pilot.phase is Phase.ESCORT) is seen

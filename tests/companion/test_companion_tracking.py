@@ -63,9 +63,17 @@ def test_a_vehicle_that_follows_exactly_is_left_alone():
 
 def test_a_velocity_that_is_off_is_made_up_for_where_the_autopilot_does_not():
     plain, _ = flown(ON, bias=0.3)
-    found, tracking = flown(ON, bias=0.3, loop=LOOP._replace(bias=0.25))
-    assert found[1500:].mean() < 0.5 * plain[1500:].mean()
-    assert np.linalg.norm(tracking.bias) <= 0.5
+    found, tracking = flown(ON, bias=0.3, loop=LOOP._replace(offset_s=0.5))
+    assert found[1500:].mean() < 0.3 * plain[1500:].mean()
+    assert tracking.bias == pytest.approx([0.3, 0.0, 0.0], abs=0.02)
+
+
+def test_a_position_that_jumps_is_no_velocity():
+    tracking, loop = Tracking(ON), LOOP._replace(offset_s=0.5)
+    still = Motion(*np.zeros((3, 3)))
+    tracking.observe(0, still, still, loop)
+    tracking.observe(20_000, still, Motion(np.array([5.0, 0.0, 0.0]), np.zeros(3), np.zeros(3)), loop)
+    assert np.linalg.norm(tracking.bias) < 0.1
 
 
 def lag_of_shaping(loop):

@@ -63,6 +63,8 @@ class SingleVehicle:
         """Whether no request for a parameter reaches the autopilot."""
         self.mute = False
         """Whether nothing that it says of its place reaches the companion."""
+        self.besides: list[Datagram] = []
+        """What else reaches the companion at its next step."""
         self.companion = self._companion()
         self._down: list[Datagram] = []
 
@@ -102,7 +104,8 @@ class SingleVehicle:
             inbox = [Datagram(link, self._without(LocalPosition, data)) for link, data in inbox]
         if orders:
             inbox = [*inbox, Datagram("ground", b"".join(map(self._writer.encode, orders)))]
-        self._down = self.companion.step(self.now, inbox)
+        self._down = self.companion.step(self.now, [*inbox, *self.besides])
+        self.besides = []
         for link, data in self._down:
             self.sent += [(self.now, link, message) for message in self._codec.feed(data)]
         self.now += TICK

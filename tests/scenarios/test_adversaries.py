@@ -1,0 +1,68 @@
+"""A neighbour, forged or innocent, presses no vehicle out of its box and makes none faster than v_max: limits
+come before the field."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from adversary import ADVERSARIES, Pressed, descending, press, shipped
+from single_vehicle import SingleVehicle
+
+PLAIN: dict[str, Any] = {"rates": {"replan_us": 50_000}}
+SETTINGS: dict[str, dict[str, Any]] = {
+    "plain": PLAIN,
+    "slow": {**PLAIN, "limits": {"v_max": [2.0, 2.0, 1.0]}},
+    **{
+        flavour: {**shipped(flavour), "task": "goto", "formation": {"kind": "nearest"}}
+        for flavour in ("ardupilot", "px4")
+    },
+}
+FLIGHTS = [
+    ("plain", "ardupilot", "exact"),
+    ("slow", "ardupilot", "exact"),
+    *[(flavour, flavour, response) for flavour in ("ardupilot", "px4") for response in ("exact", "firmware")],
+]
+SEEDS = [pytest.param(seed, marks=pytest.mark.slow if seed > 2 else ()) for seed in range(1, 21)]
+
+
+def flown(settings: str, flavour: str, response: str, floor: float) -> SingleVehicle:
+    limits = {**SETTINGS[settings].get("limits", {}), "box_min": [-20.0, -20.0, floor]}
+    vehicle = SingleVehicle(flavour, {**SETTINGS[settings], "limits": limits}, response=response)
+    vehicle.fly(8.0)
+    return vehicle
+
+
+def check(vehicle: SingleVehicle, pressed: Pressed) -> None:
+    """No set-point leaves the box or is faster than v_max on any axis, and no vehicle sinks below the floor.
+    The other walls it may pass by a decimetre: it follows its set-points no better."""
+    limits = vehicle.config.limits
+    low, high = np.array(limits.box_min), np.array(limits.box_max)
+    assert len(pressed.asked) > 400
+    assert (pressed.asked >= low).all()
+    assert (pressed.asked <= high).all()
+    assert (np.abs(pressed.speeds) <= np.array(limits.v_max) + 1e-6).all()
+    assert pressed.places[:, 2].min() >= low[2]
+    assert (pressed.places >= low - 0.1).all()
+    assert (pressed.places <= high + 0.1).all()
+
+
+@pytest.mark.parametrize(("settings", "flavour", "response"), FLIGHTS)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_neighbour_presses_it_out_of_its_box(settings, flavour, response, seed):
+    vehicle = flown(settings, flavour, response, 6.0)
+    names = list(ADVERSARIES)
+    name = names[(seed + FLIGHTS.index((settings, flavour, response))) % len(names)]
+    pressed = press(vehicle, ADVERSARIES[name], 10.0, seed)
+    check(vehicle, pressed)
+    if name == "above":
+        # It was pressed as far as that goes: the test would notice a floor that gives way.
+        assert pressed.places[:, 2].min() < vehicle.config.limits.box_min[2] + 1.0
+
+
+@pytest.mark.parametrize(("settings", "flavour", "response"), FLIGHTS)
+def test_one_that_comes_down_on_it_presses_it_not_through_the_floor(settings, flavour, response):
+    """It ends 0.6 m above the floor, where there is no room below it: the way out is sideways."""
+    vehicle = flown(settings, flavour, response, 3.0)
+    check(vehicle, press(vehicle, descending, 15.0, 1))
