@@ -135,8 +135,9 @@ class Aims:
             return 0.0
         here = self._surface.nearest(offset)
         others = taking_part(formation, mates, float(np.linalg.norm(here)))
-        self.spacing = spacing(hypot(here[0], here[1]), len(others))
-        return max(-formation.turn, min(formation.turn, even_turn(offset, others)))
+        turn = even_turn(offset, others)
+        self.spacing = spacing(hypot(here[0], here[1]), len(others), turn)
+        return max(-formation.turn, min(formation.turn, turn))
 
     def _place_to_hold(self, measured: Motion) -> Array:
         """Where it was when it was told to stay or to come back, or when the target was lost."""

@@ -22,6 +22,8 @@ from companion.settings import Settings
 _ROUND, _OUTSIDE = 0.25, 2.5
 """rad and m: a vehicle that has to go round by more than the first stays outside, by the second at one radian
 more."""
+_FURTHER = 2.0
+"""1/rad: by how much further a vehicle keeps away that has to go round by more than ``_ROUND``."""
 
 
 class Nearest(Settings):
@@ -80,6 +82,7 @@ def taking_part(config: Spread, offsets: Array, radius: float) -> Array:
     return near
 
 
-def spacing(radius: float, others: int) -> float:
-    """How far (m) even places on a circle of that ``radius`` (m) are apart, with so many ``others``."""
-    return 2.0 * radius * sin(pi / (others + 1))
+def spacing(radius: float, others: int, turn: float = 0.0) -> float:
+    """How far (m) even places on a circle of that ``radius`` (m) are apart, with so many ``others``; more for
+    a vehicle that still has to go round by ``turn`` (rad): it does not press in."""
+    return 2.0 * radius * sin(pi / (others + 1)) * (1.0 + _FURTHER * max(abs(turn) - _ROUND, 0.0))

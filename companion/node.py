@@ -177,9 +177,7 @@ class Companion:
         self._planning.fly(now, view, cautious=self.watch.blinkered)
         setpoints = self._setpoints(now, view)
         certified = self._certified
-        shared = self._sharing.due(
-            now, view, self.guard.horizon if certified is None else None, self.world.doubt
-        )
+        shared = self._sharing.due(now, view, self._planning.told(now, view), self.world.doubt)
         leaving = self.pilot.phase in (Phase.LAND, Phase.DONE)
         told = [] if certified is None else certified.messages(now, farewell=leaving)
         said = self._said(now)

@@ -18,7 +18,7 @@ from companion.forces import Obstacles
 from companion.formation import Spread
 from companion.guard import Guard
 from companion.heading import Heading, Yaw
-from companion.horizon import Array, Motion
+from companion.horizon import Array, Horizon, Motion, roll_out
 from companion.lowering import Lowered
 from companion.neighbours import fading
 from companion.pilot import Phase, Pilot
@@ -122,6 +122,21 @@ class Planning:
     def yaw(self, time: int) -> Yaw:
         """As planned, at ``time`` (µs)."""
         return self._heading.at(time)
+
+    def told(self, now: int, view: View) -> Horizon | None:
+        """What the others are told of the way ahead; None where plans are committed, or nothing is flown. One
+        of those that share a surface takes part from the way up on, as fast as it is: with the others' places
+        chosen without it, they would have to turn round."""
+        if self._certified is not None:
+            return None
+        if self.guard.horizon is not None:
+            return self.guard.horizon
+        rises = self._pilot.phase is Phase.PREPARE and self._pilot.vehicle.armed
+        if not self._shares_surface or not rises or view.own is None:
+            return None
+        n = self._config.horizon.steps + 1
+        own, dt = view.own, self._config.horizon.dt_us
+        return roll_out(now, dt, own.position, self._bounded(own.velocity), np.zeros((n, 3)))
 
     def fly(self, now: int, view: View, *, cautious: bool) -> None:
         """Plan when due; start from the measured state each time the vehicle becomes ours. ``cautious``: no

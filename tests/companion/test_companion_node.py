@@ -46,7 +46,7 @@ from mavlink_bridge.messages import (
     Source,
     Tunnel,
 )
-from mavlink_bridge.plan_wire import unpack
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
 
 FLAVOURS = tuple(PROFILES)
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
@@ -498,3 +498,17 @@ def test_it_holds_where_it_is_told_and_comes_back_to_where_it_started(flying):
     flying.fly(8.0)
     assert flying.phase in (Phase.SETTLE, Phase.LAND, Phase.DONE)
     assert np.linalg.norm(flying.autopilot.position[:2] - start[:2]) < 0.6
+
+
+@pytest.mark.parametrize("kind", ["spread", "nearest"])
+def test_those_that_share_a_surface_tell_their_way_from_the_take_off_on(kind):
+    """So that the others' places count with them; the rest tell no way that they do not plan."""
+    bench = Bench(task="escort", formation={"kind": kind})
+    bench.order(TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5.0)
+    told = []
+    while bench.phase is not Phase.ESCORT:
+        told += [m for m in only(Tunnel, bench.step(), "swarm") if m.payload_type == PAYLOAD_TYPE]
+    assert bool(told) is (kind == "spread")
+    # The last may be the first plan that it flies.
+    for message in told[:-1]:
+        assert not np.array(unpack(message.payload).accelerations).any()

@@ -38,6 +38,14 @@ def test_every_row_flies_what_it_says() -> None:
         assert flown.links.swarm.delay_ms == 20.0
 
 
+def test_a_response_is_all_that_differs() -> None:
+    for exact, real in zip(cells_of(THREE), cells_of(THREE, "firmware"), strict=True):
+        one, other = scenario_of(task(exact, 1)), scenario_of(task(real, 1))
+        assert (one.autopilot.response, other.autopilot.response) == ("exact", "firmware")
+        assert one.model_copy(update={"autopilot": other.autopilot}) == other
+        assert exact.key != real.key
+
+
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -39,11 +39,17 @@ def paper(
     jobs: Jobs = None,
     out: Begun = None,
     as_json: AsJson = False,
+    response: Annotated[
+        Literal["exact", "firmware"],
+        typer.Option(
+            help="How autopilots follow set-points: exactly, as in the paper, or as their firmware."
+        ),
+    ] = "exact",
 ) -> None:
     """Fly the paper's methods and scenarios, and put its table beside ours."""
     from outrider.paper.command import paper as comparing
 
-    raise typer.Exit(comparing(seeds, jobs, out, as_json))
+    raise typer.Exit(comparing(seeds, jobs, out, as_json, response=response))
 
 
 def gallery(

@@ -11,7 +11,7 @@ from outrider import whole_file
 from outrider.paper import figures
 from outrider.paper.flying import RUN, TRACED
 from outrider.paper.results import Result, result_of
-from outrider.paper.rows import ROWS, Row, cells_of
+from outrider.paper.rows import ROWS, Response, Row, cells_of
 from outrider.paper.table import markdown, show
 from outrider.sweeps import directory as places
 from outrider.sweeps.cells import Cell
@@ -29,17 +29,19 @@ def paper(
     as_json: bool = False,
     rows: tuple[Row, ...] = ROWS,
     run: str = RUN,
+    response: Response = "exact",
 ) -> int:
-    """Fly the paper's table; the exit status.
+    """Fly the paper's table, on autopilots of that ``response``; the exit status.
 
     0 flown; 1 a violation of d_min somewhere, or a run that came to nothing; 3 interrupted. That a row gets
     stuck is a result. Writes ``paper.json``, ``paper.md`` and figures beside the journal in ``out``
-    (``runs/sweep-paper``).
+    (``runs/sweep-paper``, ``runs/sweep-paper-firmware``).
     """
-    found = cells_of(rows)
-    folder = places.prepare(out, "paper")
+    found = cells_of(rows, response)
+    name = "paper" if response == "exact" else f"paper-{response}"
+    folder = places.prepare(out, name)
     numbers = range(TRACED, TRACED + seeds)
-    entries = flown(header("paper", found), found, numbers, folder, run, jobs)
+    entries = flown(header(name, found), found, numbers, folder, run, jobs)
     if entries is None:
         return INTERRUPTED
     results = [
@@ -47,7 +49,7 @@ def paper(
         for row, cell in zip(rows, found, strict=True)
     ]
     traces = _traces(rows, found, entries)
-    document = {"rows": [result.document() for result in results]}
+    document = {"response": response, "rows": [result.document() for result in results]}
     whole_file.write(folder / "paper.json", json.dumps(document, indent=2) + "\n")
     whole_file.write(folder / "paper.md", markdown(rows, results))
     figures.draw(rows, results, traces, folder)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from outrider.sweeps.cells import Cell, cells
 from outrider.sweeps.grid import Sweep
 
+Response = Literal["exact", "firmware"]
 SENSORS = "rtk"
 """Times are compared with vehicles that know where they are to 2 cm."""
 
@@ -38,15 +39,16 @@ ROWS = (
 )
 
 
-def cells_of(rows: tuple[Row, ...]) -> list[Cell]:
-    """What each row flies: the shipped scenario with its method; it begins in the air, since the clock does
-    so too."""
+def cells_of(rows: tuple[Row, ...], response: Response = "exact") -> list[Cell]:
+    """What each row flies: the shipped scenario with its method, on autopilots of that ``response``; it
+    begins in the air, since the clock does so too."""
     found = []
+    followed = {} if response == "exact" else {"autopilot.response": response}
     for number, row in enumerate(rows, 1):
         spec = Sweep(
             name="paper",
             scenarios=(row.scenario,),
-            set={"airborne": True, "sensors": SENSORS, "companion.methods": [row.method]},
+            set={"airborne": True, "sensors": SENSORS, "companion.methods": [row.method], **followed},
         )
         (cell,) = cells(spec, f"{row.scenario} by {row.method}")
         slug = f"{number:03d}-{row.scenario}-{row.method}"
