@@ -292,6 +292,7 @@ class Companion:
             self._planning.tracking.compensation,
             self._planning.tracking.bias,
             self._v_max,
+            self._planning.tracking.lead(self.pilot.loop),
         )
         if not is_finite(message):
             # Nothing of it may leave: the plan begins anew where the vehicle is measured to be.

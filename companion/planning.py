@@ -191,7 +191,9 @@ class Planning:
         """See how the vehicle follows what it was sent."""
         horizon, loop = self.guard.horizon, self._pilot.loop
         if horizon is not None and loop is not None:
-            self.tracking.observe(now, horizon.at(now), measured, loop)
+            later = horizon.at(now + self.tracking.lead(loop)).acceleration
+            sent = horizon.at(now)._replace(acceleration=later)
+            self.tracking.observe(now, sent, measured, loop)
 
     def _begin(self, now: int, yaw: float, measured: Motion) -> None:
         """To steer, from the ``measured`` state on."""

@@ -36,11 +36,14 @@ def setpoint(
     compensation: Array = NONE,
     bias: Array = NONE,
     v_max: Array = UNBOUNDED,
+    lead: int = 0,
 ) -> SetpointLocal:
     """SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame, frame 1: the horizon and ``yaw`` at
     ``time`` (µs). ``compensation`` (3,), m/s²: what is added to the acceleration, ``bias``
-    (3,), m/s, to the velocity (``tracking``), which ``v_max`` (3,) bounds."""
+    (3,), m/s, to the velocity (``tracking``), which ``v_max`` (3,) bounds. The acceleration is that of
+    ``lead`` (µs) later."""
     motion = horizon.at(time)
+    acceleration = horizon.at(time + lead).acceleration if lead else motion.acceleration
     velocity = motion.velocity
     if bias is not NONE:
         most = np.maximum(np.abs(velocity), v_max)
@@ -54,7 +57,7 @@ def setpoint(
         mask,
         _vector(local.position_to_local(motion.position)),
         _vector(local.velocity_to_local(velocity)),
-        _vector(local.velocity_to_local(motion.acceleration + compensation)),
+        _vector(local.velocity_to_local(acceleration + compensation)),
         local.yaw_to_local(yaw.yaw),
         # NED yaw turns clockwise: the rate changes sign with the frame.
         -yaw.rate,

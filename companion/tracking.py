@@ -57,7 +57,7 @@ class TrackingConfig(Settings):
     compensate: bool = Field(
         False, description="add to the set-point's acceleration what drag and wind take from the vehicle"
     )
-    bandwidth: float = Field(2.5, gt=0.0, le=20.0, description="1/s, of the disturbance observer")
+    bandwidth: float = Field(3.5, gt=0.0, le=20.0, description="1/s, of the disturbance observer")
     lag: float = Field(0.18, ge=0.0, le=2.0, description="s, of the autopilot's attitude loop")
     most: float = Field(4.0, ge=0.0, le=10.0, description="m/s², of the compensation")
     usual: Positive | None = Field(
@@ -126,6 +126,10 @@ class Tracking:
     def keep(self, acceleration: float) -> None:
         """Reference and compensation together ask for no more ``acceleration`` (m/s²) from now on."""
         self._room = acceleration
+
+    def lead(self, loop: Loop | None) -> int:
+        """How far (µs) the acceleration of set-points is ahead of their position and velocity."""
+        return loop.lead_us if loop is not None and self._config.compensate else 0
 
     @property
     def excess(self) -> float:

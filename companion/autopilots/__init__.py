@@ -33,13 +33,15 @@ class Loop(NamedTuple):
     ``position`` · error (1/s), and for the acceleration a_r + ``velocity`` · its error (1/s). ``slew``: how
     fast (m/s³) what is added to a_r may change beside what plans ask for. ``shaping``: of an autopilot that
     chases set-points with a trajectory of its own. ``offset_s``: over so many seconds it is seen by how much
-    the estimated velocity is off, for the velocity set-point to make up for it; 0: it does not."""
+    the estimated velocity is off, for the velocity set-point to make up for it; 0: it does not. ``lead_us``:
+    by so much (µs) the attitude is late, and the acceleration of set-points early."""
 
     position: float
     velocity: float
     slew: float
     shaping: Shaping | None = None
     offset_s: float = 0.0
+    lead_us: int = 0
 
 
 class Profile(NamedTuple):
