@@ -61,7 +61,9 @@ class AutopilotConfig(BaseModel):
     streams: Literal["quiet", "normal"] = Field(
         "quiet", description="quiet: ``rates``, what companions need; normal: what ground stations expect"
     )
-    sensors: ProfileName = Field("truth", description="how good its estimate is: truth, rtk or gnss")
+    sensors: ProfileName = Field(
+        "truth", description="how good its estimate is: truth, rtk, gnss or sih (PX4's own simulation)"
+    )
     physics: PhysicsName = Field("own", description="what moves the vehicle: our own integrator, or JSBSim")
     response: ResponseName = Field(
         "exact",

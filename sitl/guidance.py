@@ -205,8 +205,9 @@ class Guidance:
         if self._response is not None:
             self._response.relocate(position, velocity)
 
-    def advance(self, now: int, step: int, wind: Vector = ZERO) -> None:
-        """Move the reference from ``now`` to ``now + step`` (µs), in air that moves with ``wind`` (m/s)."""
+    def advance(self, now: int, step: int, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
+        """Move the reference from ``now`` to ``now + step`` (µs), in air that moves with ``wind`` (m/s); the
+        estimated position moves by ``drift`` (m/s) more than the estimated velocity says."""
         activity = self.activity
         if activity is Activity.IDLE:
             return
@@ -224,13 +225,13 @@ class Guidance:
         shaper, response = self._shaper, self._response
         if response is not None and self._chased:
             self._asked = wanted.position, wanted.velocity, wanted.acceleration
-            response.advance(self._asked, dt, wind)
+            response.advance(self._asked, dt, wind, drift)
             # What comes after the stream begins where the firmware has got to.
             shaper.position, shaper.velocity, shaper.acceleration = response.desired
             return
         shaper.advance(wanted, self._limits[self.activity], dt)
         if response is not None:
-            response.advance((shaper.position, shaper.velocity, shaper.acceleration), dt, wind)
+            response.advance((shaper.position, shaper.velocity, shaper.acceleration), dt, wind, drift)
 
     def _expire(self, last: Setpoint) -> None:
         """Set-points come no more: brake and hold. ArduPilot forgets what velocity it was told, but not the

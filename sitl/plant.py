@@ -85,7 +85,7 @@ class Plant:
                 reference = self._believed(reference)
             idle = armed and reference is None
             self._trace.append(vehicle.advance(count, reference, wind, idle=idle))
-            guidance.advance(begin, step, self._local(wind))
+            guidance.advance(begin, step, self._local(wind), self.sensors.drift)
             self._steps += count
             self._truth = self._belief = None
             if not self.sensors.exact:

@@ -32,9 +32,9 @@ class Response(Protocol):
     def relocate(self, position: Vector, velocity: Vector) -> None:
         """The estimate has jumped: the vehicle is here, and goes on from here."""
 
-    def advance(self, wanted: Motion, dt: float, wind: Vector = ...) -> None:
+    def advance(self, wanted: Motion, dt: float, wind: Vector = ..., drift: Vector = ...) -> None:
         """Move by ``dt`` seconds after ``wanted``, which is valid at the end of them, in air that moves with
-        ``wind`` (m/s)."""
+        ``wind`` (m/s). The estimated position moves by ``drift`` (m/s) more than the velocity says."""
 
 
 def response_of(config: AutopilotConfig) -> Response | None:

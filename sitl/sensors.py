@@ -83,6 +83,11 @@ class Sensors:
         """Whether what is believed is so."""
         return self._flawless and self.gps.nominal
 
+    @property
+    def drift(self) -> Vector:
+        """How fast (m/s, local NED) the position wanders that the estimated velocity does not tell."""
+        return self._errors.drift
+
     def silent(self, now: int) -> bool:
         """Whether position messages fail to come at ``now`` (µs, never decreasing)."""
         return self._gaps.holds(now)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from mavlink_bridge.messages import Vector
 from sitl.noise import one_pole, two_poles
 from sitl.profiles import SensorProfile
+from sitl.setpoints import ZERO
 
 PERIOD: Final = 10_000
 """µs between samples: both filters run at 100 Hz."""
@@ -28,7 +29,7 @@ Array = npt.NDArray[np.float64]
 
 class Errors(NamedTuple):
     """Estimate minus truth: position (m) and velocity (m/s) in local NED, roll, pitch and yaw (rad), body
-    rates (rad/s, FRD)."""
+    rates (rad/s, FRD). ``drift``: how fast (m/s) the position wanders that the velocity does not tell."""
 
     position: Vector
     velocity: Vector
@@ -36,6 +37,7 @@ class Errors(NamedTuple):
     pitch: float
     yaw: float
     body_rates: Vector
+    drift: Vector = ZERO
 
 
 class Wandering:
@@ -53,7 +55,9 @@ class Wandering:
         self._gain = np.array([step.gain for step in steps])
         drift = np.array([p.horizontal_drift, p.horizontal_drift, p.vertical_drift])
         self._drift = drift
-        self._drift_speed = drift / np.sqrt(p.drift_time * p.drift_onset)
+        speed = drift / np.sqrt(p.drift_time * p.drift_onset)
+        self._told: Array = speed if p.drift_told else np.zeros(3)
+        self._untold: Array = speed - self._told
         self._sizes = np.array([p.velocity] * 3 + [p.tilt] * 2 + [p.yaw] + [p.rate_bias] * 3)
         self._white = np.array([p.position_white] * 3 + [p.rate_white] * 3)
         self._random = random
@@ -73,11 +77,11 @@ class Wandering:
     @property
     def errors(self) -> Errors:
         """Those of the present sample."""
-        x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r = self._rows[self._sample].tolist()
-        return Errors((x, y, z), (vx, vy, vz), roll, pitch, yaw, (p, q, r))
+        x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, *drift = self._rows[self._sample].tolist()
+        return Errors((x, y, z), (vx, vy, vz), roll, pitch, yaw, (p, q, r), (drift[0], drift[1], drift[2]))
 
     def _block(self) -> Array:
-        """The next rows (_BLOCK, 12) of errors."""
+        """The next rows (_BLOCK, 15) of errors."""
         draws = self._random.standard_normal((_BLOCK, _DRAWS))
         kicks = self._kick @ draws[:, :6].reshape(_BLOCK, 2, 3)
         nudges = self._gain * draws[:, 6 : 6 + _ONE_POLES]
@@ -91,8 +95,9 @@ class Wandering:
         return np.hstack(
             [
                 self._drift * walks[:, 0] + white[:, :3],
-                self._drift_speed * walks[:, 1] + biases[:, :3],
+                self._told * walks[:, 1] + biases[:, :3],
                 biases[:, 3:6],
                 biases[:, 6:] + white[:, 3:],
+                self._untold * walks[:, 1],
             ]
         )

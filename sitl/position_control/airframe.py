@@ -74,9 +74,10 @@ class PointMass:
         self._tilt = [0.0, 0.0]
         self._lift = 0.0
 
-    def advance(self, wanted: Vector, wind: Vector, dt: float) -> None:
+    def advance(self, wanted: Vector, wind: Vector, dt: float, drift: Vector = (0.0, 0.0, 0.0)) -> None:
         """Move by ``dt`` seconds in air that moves with ``wind`` (m/s), asked for the acceleration ``wanted``
-        (m/s²) without drag."""
+        (m/s²) without drag. The position is the estimated one, which moves by ``drift`` (m/s) more than the
+        velocity says."""
         frame = self._airframe
         share = -math.expm1(-dt / frame.angle_lag)
         most = frame.angle_acceleration * dt
@@ -97,6 +98,8 @@ class PointMass:
             ),
             dt,
         )
+        x, y, z = self.position
+        self.position = (x + drift[0] * dt, y + drift[1] * dt, z + drift[2] * dt)
 
     def _integrate(self, acceleration: Vector, dt: float) -> None:
         half = 0.5 * dt * dt

@@ -74,10 +74,10 @@ class ArduPilotResponse:
         shaping.restart((x, y, z), shaping.velocity, shaping.acceleration)
         mass.position, mass.velocity = position, velocity
 
-    def advance(self, wanted: Motion, dt: float, wind: Vector = ZERO) -> None:
+    def advance(self, wanted: Motion, dt: float, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
         """Move by ``dt`` seconds after ``wanted``, which is valid at the end of them, in air that moves with
         ``wind`` (m/s)."""
-        self._mass.advance(self._asked, wind, dt)
+        self._mass.advance(self._asked, wind, dt, drift)
         slip = (0.0, 0.0) if self._slip is None else self._slip
         self._shaping.advance(wanted, dt, self._limited, self._error, slip)
         north, east = self._level(dt)

@@ -52,9 +52,9 @@ class Px4Response:
         self._mass.position, self._mass.velocity = position, velocity
         self._speed = velocity
 
-    def advance(self, wanted: Motion, dt: float, wind: Vector = ZERO) -> None:
+    def advance(self, wanted: Motion, dt: float, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
         """Move by ``dt`` seconds after ``wanted``, in air that moves with ``wind`` (m/s)."""
-        self._mass.advance(self._asked, wind, dt)
+        self._mass.advance(self._asked, wind, dt, drift)
         gains, mass = self._gains, self._mass
         self._differentiate(dt)
         place, velocity, acceleration = wanted

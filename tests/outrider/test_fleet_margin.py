@@ -30,4 +30,5 @@ def test_the_margins_of_the_profiles() -> None:
         "truth": 0.0,
         "rtk": 0.08,
         "gnss": 1.70,
+        "sih": 1.13,
     }

@@ -100,6 +100,21 @@ def test_the_velocity_says_where_the_position_goes():
     assert np.std(change - walked) < 0.7 * np.std(change)
 
 
+def test_a_simulations_velocity_says_nothing_of_where_the_position_wanders():
+    """And what it does not say is told to the position controller."""
+    wandering, rows = Wandering(PROFILES["sih"], np.random.default_rng(3)), []
+    for sample in range(60 * SECOND):
+        wandering.advance(sample)
+        e = wandering.errors
+        rows.append((*e.position, *e.velocity, *e.drift))
+    place, velocity, drift = np.split(np.array(rows), 3, axis=1)
+    moved = np.diff(place[::SECOND], axis=0)
+    walked = np.add.reduceat(drift, np.arange(0, len(drift), SECOND), axis=0)[:-1] / SECOND
+    assert np.corrcoef(moved.ravel(), walked.ravel())[0, 1] > 0.95
+    assert abs(np.corrcoef(velocity.ravel(), drift.ravel())[0, 1]) < 0.2
+    assert np.std(drift[:, :2]) == pytest.approx(0.4 / math.sqrt(3.0), rel=0.25)
+
+
 @given(stops=st.lists(st.integers(0, 700), min_size=1, max_size=10))
 def test_the_errors_do_not_depend_on_which_samples_are_looked_at(stops):
     profile = PROFILES["gnss"]

@@ -23,7 +23,7 @@ _SIGMAS = 2.0
 less than ``NEAR``."""
 HOVERING = 0.1
 """m/s; the clock starts when every vehicle is slower. With noisy sensors a hover is not that still."""
-_RESTLESS = {"truth": HOVERING, "rtk": 0.2, "gnss": 0.4}
+_RESTLESS = {"truth": HOVERING, "rtk": 0.2, "gnss": 0.4, "sih": 0.4}
 _TOSSED = 0.8
 """The same in turbulent air."""
 PREPARE_CAP = 90_000_000

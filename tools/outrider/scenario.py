@@ -98,7 +98,7 @@ class Scenario(Part):
     moving: tuple[MovingPart, ...] = Field(
         (), max_length=50, description="obstacles that move; their system ids are 190 and so on"
     )
-    sensors: Literal["truth", "rtk", "gnss"] = "truth"
+    sensors: Literal["truth", "rtk", "gnss", "sih"] = "truth"
     weather: WeatherConfig = WeatherConfig()
     d_min: Length = Field(0.5, description="m between centres of vehicles; below it is a violation")
     d_min_target: Length | None = Field(None, description="m to the target; null: the target is no obstacle")

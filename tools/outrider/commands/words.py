@@ -8,7 +8,7 @@ from typing import Annotated, Final
 import typer
 
 METHODS: Final = "baseline, swivel, approach_angle, tangential; joined by +."
-SENSORS: Final = "truth, rtk or gnss."
+SENSORS: Final = "truth, rtk, gnss, or sih: as PX4's own simulation."
 PHYSICS: Final = "own or jsbsim."
 RESPONSE: Final = "exact: at its set-points; firmware: flown by the firmware's position controller."
 

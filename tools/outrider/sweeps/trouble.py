@@ -24,7 +24,9 @@ Few = Annotated[int, Field(ge=0, le=20)]
 class Trouble(Part):
     """Bounds: least and most of what the swarm's links, the air, the clocks and the companions may suffer."""
 
-    sensors: tuple[Literal["truth", "rtk", "gnss"], ...] = Field(("rtk",), min_length=1, description="one of")
+    sensors: tuple[Literal["truth", "rtk", "gnss", "sih"], ...] = Field(
+        ("rtk",), min_length=1, description="one of"
+    )
     loss: tuple[Share, Share] = (0.0, 0.0)
     delay_ms: tuple[Milliseconds, Milliseconds] = (20.0, 20.0)
     jitter_ms: tuple[Milliseconds, Milliseconds] = (0.0, 0.0)
