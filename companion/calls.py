@@ -57,6 +57,11 @@ class Calls:
         """Whether the autopilot has taken or refused it."""
         return _key(command, params) in self._answered
 
+    def taken(self, now: int, command: int, params: tuple[float, ...], within: int) -> bool:
+        """Whether the autopilot has taken it, and it was sent no more than ``within`` (µs) ago."""
+        key = _key(command, params)
+        return key in self._acknowledged and now - self._sent.get(key, now) <= within
+
     def forget(self) -> None:
         """Nothing was asked or answered."""
         self._sent.clear()

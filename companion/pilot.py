@@ -30,6 +30,8 @@ NAV_LAND = 21
 _NAN = float("nan")
 _ARMS = 2_000_000
 """µs after the last asking to arm in which a heartbeat may still say that it is not."""
+_BEATS = 1_500_000
+"""µs from an order of the mode until a heartbeat has to show it."""
 _LEAVES = 5_000_000
 """µs after landing for which another mode is asked for."""
 
@@ -113,6 +115,14 @@ class Pilot:
     def guided(self) -> bool:
         """Whether the autopilot follows our set-points now."""
         return self.vehicle.guided
+
+    def steers(self, now: int) -> bool:
+        """Whether the autopilot follows our set-points, or has just taken the mode in which it does: PX4's
+        next heartbeat, up to a second later, says so."""
+        profile = self.profile
+        if self.guided or profile is None or self.phase is not Phase.PREPARE or not self.streaming:
+            return self.guided
+        return self._calls.taken(now, DO_SET_MODE, profile.mode_call, _BEATS)
 
     @property
     def streaming(self) -> bool:

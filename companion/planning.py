@@ -171,7 +171,7 @@ class Planning:
         if stale:
             self.guard.hold(now, solver=False)
             return
-        if not self._pilot.guided:
+        if not self._pilot.steers(now):
             # Set-points flow before they steer: a plan would run away from the vehicle.
             self.guard.start(now, measured)
             self.tracking.reset()

@@ -17,8 +17,9 @@ stay the plan's. ρ < 1 lets what a vehicle does not answer to decay; κ v_r is 
 
 PX4's position loop is proportional. An estimated velocity that is off by b, as GNSS makes it for seconds,
 leaves the vehicle b/k_p beside its set-point for as long. b is how much faster the estimated velocity is than
-the estimated position moves; it is added to the velocity set-point. (An integral of the error was tried: b
-changes within three seconds, and an integral so fast is not stable.)
+the estimated position moves; it is added to the velocity set-point, and so is a part of the error, since that
+loop is slow. (An integral of the error was tried: b changes within three seconds, and an integral so fast is
+not stable.)
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ _DOUBT, _DRIFT, _NOISE = 1.0, 0.002, 0.2
 _MOST_BIAS, _MOST_SURPRISE = 1.0, 2.0
 """m/s: of the velocity's offset, and of what one observation may say of it: a position that jumps is no
 velocity."""
+_MOST_PULL = 0.5
+"""m/s, of what corrects the position."""
 _MOST_DRAG = 2.0
 """1/s."""
 _LONGEST = 0.1
@@ -114,6 +117,7 @@ class Tracking:
         self.envelope = 0.0
         self.compensation: Array = np.zeros(3)
         self.bias: Array = np.zeros(3)
+        self._found: Array = np.zeros(3)
         self._velocity: Array = np.zeros(2)
         self._place: Array = np.zeros(3)
         self._rest: Array = np.zeros(2)
@@ -160,6 +164,7 @@ class Tracking:
             return
         if loop.offset_s > 0.0:
             self._offset(dt, measured, loop.offset_s)
+            self.bias = self._found - _limited(loop.pull * self.error, _MOST_PULL)
         self._predict(dt, reference, measured, loop)
         self._learn(dt, measured.velocity[:2])
         self._compensate(dt, reference, loop.slew)
@@ -168,8 +173,8 @@ class Tracking:
         """By how much the estimated velocity is off, of the last ``seconds``."""
         moved, self._place = measured.position - self._place, measured.position.copy()
         surprise = _limited(measured.velocity - moved / dt, _MOST_SURPRISE)
-        bias = self.bias + (1.0 - exp(-dt / seconds)) * (surprise - self.bias)
-        self.bias = _limited(bias, _MOST_BIAS)
+        found = self._found + (1.0 - exp(-dt / seconds)) * (surprise - self._found)
+        self._found = _limited(found, _MOST_BIAS)
 
     def _disturbance(self, velocity: Array) -> Array:
         total: Array = self._drag * velocity + self._rest

@@ -34,7 +34,8 @@ class Loop(NamedTuple):
     fast (m/s³) what is added to a_r may change beside what plans ask for. ``shaping``: of an autopilot that
     chases set-points with a trajectory of its own. ``offset_s``: over so many seconds it is seen by how much
     the estimated velocity is off, for the velocity set-point to make up for it; 0: it does not. ``lead_us``:
-    by so much (µs) the attitude is late, and the acceleration of set-points early."""
+    by so much (µs) the attitude is late, and the acceleration of set-points early. ``pull``: rate (1/s) at
+    which the velocity set-point corrects the position beside what the loop does."""
 
     position: float
     velocity: float
@@ -42,6 +43,7 @@ class Loop(NamedTuple):
     shaping: Shaping | None = None
     offset_s: float = 0.0
     lead_us: int = 0
+    pull: float = 0.0
 
 
 class Profile(NamedTuple):

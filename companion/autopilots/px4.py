@@ -28,6 +28,6 @@ PX4 = Profile(
     takeoff_modes=frozenset((4 << 16 | 2 << 24,)),
     # MPC_XY_P and MPC_XY_VEL_P_ACC.
     # Its position loop has no integral: an estimated velocity that is off by 0.3 m/s leaves it 0.3 m beside.
-    loop=Loop(0.95, 1.8, 4.0, offset_s=0.5, lead_us=180_000),
+    loop=Loop(0.95, 1.8, 4.0, offset_s=0.5, lead_us=180_000, pull=0.5),
     bytewise=True,
 )
