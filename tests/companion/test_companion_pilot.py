@@ -436,3 +436,16 @@ def test_an_escort_begins_on_the_way_up_where_its_target_is_known(flavour, seen)
     rig.run(0.5, armed, landed(3), acks=True)
     rig.run(0.5, beat(flavour, armed=True, guided=True), landed(3), acks=True)
     assert (rig.pilot.phase is Phase.ESCORT) is seen
+
+
+@pytest.mark.parametrize("taken", [True, False])
+def test_plans_begin_when_the_mode_is_taken_and_end_when_no_heartbeat_shows_it(taken):
+    rig = Rig("px4").prepared()
+    armed = beat("px4", armed=True, guided=False)
+    rig.run(1.0, armed, landed(1), acks=True)
+    rig.view = READY._replace(own=state(HEIGHT))
+    rig.run(0.3, armed, landed(2), acks=taken)
+    assert rig.pilot.streaming
+    assert not rig.pilot.guided
+    assert rig.pilot.steers(rig.now) is taken
+    assert not rig.pilot.steers(rig.now + 2_000_000)

@@ -87,3 +87,13 @@ def test_it_is_addressed_to_the_own_autopilot():
     assert (message.target_system, message.target_component, message.frame) == (11, 1, 1)
     assert message.source == OWN
     assert message.time_boot == 2_000_000
+
+
+def test_the_acceleration_may_be_that_of_later():
+    accelerations = np.arange(48.0).reshape(16, 3)
+    horizon = roll_out(EPOCH, 100_000, ZERO, ZERO, accelerations)
+    plain = setpoint(EPOCH, 0, horizon, LEVEL, HOME, OWN, 0)
+    early = setpoint(EPOCH, 0, horizon, LEVEL, HOME, OWN, 0, lead=200_000)
+    east, north, up = accelerations[2]
+    np.testing.assert_allclose(early.acceleration, (north, east, -up), atol=1e-6)
+    assert early._replace(acceleration=plain.acceleration) == plain

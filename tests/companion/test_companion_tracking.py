@@ -68,6 +68,21 @@ def test_a_velocity_that_is_off_is_made_up_for_where_the_autopilot_does_not():
     assert tracking.bias == pytest.approx([0.3, 0.0, 0.0], abs=0.02)
 
 
+def test_a_position_is_pulled_to_its_set_point_faster():
+    """After a drag that is not known yet."""
+    loop = LOOP._replace(offset_s=0.5)
+    slow, _ = flown(ON, drag=1.0, loop=loop, seconds=8.0)
+    fast, tracking = flown(ON, drag=1.0, loop=loop._replace(pull=0.5), seconds=8.0)
+    assert np.percentile(fast, 95) < 0.9 * np.percentile(slow, 95)
+    assert np.linalg.norm(tracking.bias) <= 1.5
+
+
+def test_only_a_companion_that_compensates_sends_accelerations_early():
+    loop = LOOP._replace(lead_us=180_000)
+    assert Tracking(ON).lead(loop) == 180_000
+    assert Tracking(ON).lead(None) == Tracking(OFF).lead(loop) == 0
+
+
 def test_a_position_that_jumps_is_no_velocity():
     tracking, loop = Tracking(ON), LOOP._replace(offset_s=0.5)
     still = Motion(*np.zeros((3, 3)))
