@@ -136,7 +136,8 @@ class Aims:
         here = self._surface.nearest(offset)
         others = taking_part(formation, mates, float(np.linalg.norm(here)))
         turn = even_turn(offset, others)
-        self.spacing = spacing(hypot(here[0], here[1]), len(others), turn)
+        if 0 < len(others) == len(mates):
+            self.spacing = spacing(hypot(here[0], here[1]), len(others), turn)
         return max(-formation.turn, min(formation.turn, turn))
 
     def _place_to_hold(self, measured: Motion) -> Array:

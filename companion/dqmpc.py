@@ -148,7 +148,8 @@ class Dqmpc:
 
     def reachable(self, problem: Problem) -> Problem:
         """The problem with state limits that can be kept: first the bounds on a are opened for them, as
-        little as is enough; what even then no input keeps is widened to what is reachable, and a little."""
+        late and as little as is enough; what even then no input keeps is widened to what is reachable, and a
+        little."""
         _, x_l, x_u, h_l, h_u, far, flown = problem
         least, most = -far, far
         if self._jerk is not None and flown is not None:
@@ -161,11 +162,12 @@ class Dqmpc:
         x = self._low[:, -1] - h_l[:, -1] - self.seconds * v
         down = np.any(h_l > x_u @ self._G_T + _TOLERANCE, axis=1, keepdims=True)
         if down.any():
-            late = -self._late(-x_u, -most, x - self._low[:, -1], -v)
+            late = -self._late(-x_u, -most, x - self._low[:, -1], -v, flown, -1.0)
             x_u = np.where(down, np.maximum(x_u, late), x_u)
         up = np.any(x_l @ self._G_T > h_u + _TOLERANCE, axis=1, keepdims=True)
         if up.any():
-            x_l = np.where(up, np.minimum(x_l, self._late(x_l, least, self._high[:, -1] - x, v)), x_l)
+            late = self._late(x_l, least, self._high[:, -1] - x, v, flown, 1.0)
+            x_l = np.where(up, np.minimum(x_l, late), x_l)
         margin = _WIDEN * ((most - least) @ self._G_T)
         x_u = x_u + self._opened(h_l - x_u @ self._G_T, most - x_u, margin)
         x_l = x_l - self._opened(x_l @ self._G_T - h_u, x_l - least, margin)
@@ -178,20 +180,34 @@ class Dqmpc:
             h_u=np.maximum(h_u, low + margin),
         )
 
-    def _late(self, pushed: Array, least: Array, room: Array, v: Array) -> Array:
-        """The accelerations (3, n) towards a side that is ``room`` (3,) m away, at ``v`` (3,) m/s: as
-        ``pushed`` (3, n), until speed or braking distance allow no more. Not less than ``least`` (3, n)."""
+    def _late(
+        self, pushed: Array, least: Array, room: Array, v: Array, flown: Flown | None, side: float
+    ) -> Array:
+        """The accelerations (3, n) towards a ``side`` (1 up, −1 down) that is ``room`` (3,) m away, at ``v``
+        (3,) m/s: as ``pushed`` (3, n), until speed or braking distance allow no more. Not less than ``least``
+        (3, n); with bounded jerk no change that it forbids."""
         dt, found, room = self.dt, np.empty_like(pushed), room - _INSIDE
-        strong = -_SPARE * np.minimum(least.max(axis=1), 0.0)
+        strong = -_SPARE * np.minimum(least[:, -1], 0.0)
         fastest = self._high[:, 0] - _SLOWER
+        jerk, step, last = None, dt, np.zeros(3)
+        if self._jerk is not None and flown is not None:
+            jerk, step, last = np.array(self.limits.j_max), min(flown.elapsed, dt), side * flown.acceleration
         for n in range(self.n):
-            stop = np.sqrt(2.0 * strong * np.maximum(room - dt * np.maximum(v, 0.0), 0.0))
+            lost = dt if jerk is None else dt + strong / (2.0 * jerk)
+            stop = np.sqrt(2.0 * strong * np.maximum(room - lost * np.maximum(v, 0.0), 0.0))
             rest = np.minimum(fastest, stop) - v
             # A vehicle that is too fast away from that side has to be slowed down first.
-            a = np.minimum(np.maximum(pushed[:, n], (-fastest - v) / dt), rest / dt)
-            if self.limits.j_max is not None:
-                a = np.minimum(a, np.sqrt(2.0 * np.array(self.limits.j_max) * np.maximum(rest, 0.0)))
-            found[:, n] = a = np.maximum(a, least[:, n])
+            wanted = np.maximum(pushed[:, n], (-fastest - v) / dt)
+            if jerk is None:
+                a = np.maximum(np.minimum(wanted, rest / dt), least[:, n])
+            else:
+                # v + dt a + a²/2j, what it is when a has come back to zero, stays below.
+                slow = jerk * (np.sqrt(dt * dt + 2.0 * np.maximum(rest, 0.0) / jerk) - dt)
+                back = np.maximum(rest / dt, -np.sqrt(jerk * np.maximum(-rest, 0.0)))
+                a = np.minimum(wanted, np.where(rest > 0.0, slow, back))
+                a = np.minimum(np.maximum(a, last - jerk * step), last + jerk * step)
+                last, step = a, dt
+            found[:, n] = a
             room = room - dt * (v + 0.5 * dt * a)
             v = v + dt * a
         return found
@@ -199,10 +215,13 @@ class Dqmpc:
     def _opened(self, missing: Array, room: Array, margin: Array) -> Array:
         """What bounds (3, n) on a have to give way by, of the ``room`` (3, n) that they have, so that rows
         (3, 2n) gain what is ``missing`` there, and a ``margin``: the same share of it at every n."""
+        # Speed has been seen to: what is still too fast cannot be slowed down in time.
+        missing = missing[:, self.n :]
         if (missing <= _TOLERANCE).all():
             return np.zeros_like(room)
-        gain = np.maximum(room @ self._G_T, _TOLERANCE)
-        share = np.where(missing > _TOLERANCE, (missing + margin) / gain, 0.0).max(axis=1)
+        gains = self._G_T[:, self.n :]
+        gain = np.maximum(room @ gains, _TOLERANCE)
+        share = np.where(missing > _TOLERANCE, (missing + margin[:, self.n :]) / gain, 0.0).max(axis=1)
         opened: Array = np.minimum(share, 1.0)[:, None] * room
         return opened
 

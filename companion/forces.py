@@ -60,7 +60,8 @@ class Obstacles(NamedTuple):
         )
 
     def shared(self, systems: Collection[int], spacing: float) -> Obstacles:
-        """The same, where those of ``systems`` have places ``spacing`` m apart: there they push no more."""
+        """The same, where those of ``systems`` and the own vehicle are to be ``spacing`` m apart: at that
+        distance they push no more."""
         if not any(id_ in systems for id_ in self.ids):
             return self
         theirs = np.array([id_ in systems for id_ in self.ids])

@@ -10,7 +10,7 @@ outside of the surface.
 
 from __future__ import annotations
 
-from math import pi, sin
+from math import inf, pi, sin
 from typing import Annotated, Literal
 
 import numpy as np
@@ -22,6 +22,8 @@ from companion.settings import Settings
 _ROUND, _OUTSIDE = 0.25, 2.5
 """rad and m: a vehicle that has to go round by more than the first stays outside, by the second at one radian
 more."""
+_POINT = 0.1
+"""m: a circle that is smaller has no places."""
 _FURTHER = 2.0
 """1/rad: by how much further a vehicle keeps away that has to go round by more than ``_ROUND``."""
 
@@ -84,5 +86,7 @@ def taking_part(config: Spread, offsets: Array, radius: float) -> Array:
 
 def spacing(radius: float, others: int, turn: float = 0.0) -> float:
     """How far (m) even places on a circle of that ``radius`` (m) are apart, with so many ``others``; more for
-    a vehicle that still has to go round by ``turn`` (rad): it does not press in."""
+    a vehicle that still has to go round by ``turn`` (rad): it does not press in. ∞ where there are none."""
+    if not others or radius < _POINT:
+        return inf
     return 2.0 * radius * sin(pi / (others + 1)) * (1.0 + _FURTHER * max(abs(turn) - _ROUND, 0.0))

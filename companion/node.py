@@ -88,7 +88,6 @@ class Companion:
         self._planning = Planning(
             config, self.world, self.pilot, self._aims, certified, stopwatch, self._dials.note
         )
-        self._v_max = np.array(config.limits.v_max)
         self._boot: int | None = None
         self._next_setpoint = 0
         self.not_finite = 0
@@ -291,8 +290,8 @@ class Companion:
             profile.setpoint_mask,
             self._planning.tracking.compensation,
             self._planning.tracking.bias,
-            self._v_max,
-            self._planning.tracking.lead(self.pilot.loop),
+            np.array(self.pilot.limits.lowered.limits.v_max),
+            0 if self._certified is not None else self._planning.tracking.lead(self.pilot.loop),
         )
         if not is_finite(message):
             # Nothing of it may leave: the plan begins anew where the vehicle is measured to be.

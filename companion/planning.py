@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Sequence
-from math import hypot, inf
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -77,7 +77,7 @@ class Planning:
         self._frame: LocalFrame | None = None
         self._shares_surface = isinstance(config.formation, Spread)
         self._lowered = pilot.limits.lowered
-        self._fastest = hypot(*config.limits.v_max)
+        self._fastest: Array = np.array(config.limits.v_max)
         self._fading = fading(config)
         self._flown = 0
         self._plans = self._relaxed = 0
@@ -170,6 +170,7 @@ class Planning:
         )
         if stale:
             self.guard.hold(now, solver=False)
+            self.tracking.forget()
             return
         if not self._pilot.steers(now):
             # Set-points flow before they steer: a plan would run away from the vehicle.
@@ -182,7 +183,7 @@ class Planning:
     def _keep(self, lowered: Lowered) -> None:
         """Plan, brake and compensate within what the autopilot can follow."""
         self._lowered = lowered
-        self._fastest = hypot(*lowered.limits.v_max)
+        self._fastest = np.array(lowered.limits.v_max)
         self.planner.keep(lowered.limits)
         self.guard.keep(lowered.limits)
         self.tracking.keep(lowered.acceleration)
@@ -205,9 +206,8 @@ class Planning:
 
     def _bounded(self, velocity: Array) -> Array:
         """A measured ``velocity`` (3,) as a plan may begin with it: whatever the own autopilot, or who speaks
-        in its name, says of its speed, nothing faster than the limits is asked for."""
-        speed = float(np.sqrt(velocity @ velocity))
-        return velocity if speed <= self._fastest else velocity * (self._fastest / speed)
+        in its name, says of its speed, nothing faster than the limits is asked for on any axis."""
+        return np.minimum(np.maximum(velocity, -self._fastest), self._fastest)
 
     def _fly_certified(
         self, now: int, view: View, measured: Motion, flight: CertifiedFlight, *, stale: bool, cautious: bool

@@ -39,7 +39,9 @@ class Settling:
         if speed < config.guard.landing_speed:
             beside = self._beside(here, obstacles)
             self.clear = beside is None
-            if beside is not None and not self._waits(now, here, obstacles):
+            if beside is None:
+                self._waiting_since = None
+            elif not self._waits(now, here, obstacles):
                 self._rest = beside
         return self._rest
 
@@ -49,6 +51,7 @@ class Settling:
         nearest = int(np.argmin(np.sqrt(np.vecdot(apart, apart)) - obstacles.radius))
         way = obstacles.positions[nearest, -1, :2] - obstacles.positions[nearest, 0, :2]
         if float(np.hypot(way[0], way[1])) < _PASSES:
+            self._waiting_since = None
             return False
         self._waiting_since = now if self._waiting_since is None else self._waiting_since
         return now - self._waiting_since < _WAITS

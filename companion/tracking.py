@@ -127,6 +127,10 @@ class Tracking:
         self._fed: Array = np.zeros(2)
         self._means: Array = np.zeros((2, 2))
 
+    def forget(self) -> None:
+        """How far estimates disagree, and what the position lacked, is not known any more."""
+        self.bias, self._found = np.zeros(3), np.zeros(3)
+
     def keep(self, acceleration: float) -> None:
         """Reference and compensation together ask for no more ``acceleration`` (m/s²) from now on."""
         self._room = acceleration
@@ -158,6 +162,7 @@ class Tracking:
         if not self._config.compensate:
             return
         if not 0.0 < dt <= _LONGEST:
+            self.forget()
             self._velocity, self._place = measured.velocity[:2].copy(), measured.position.copy()
             self._asked = self._fed = reference.acceleration[:2] + self.compensation[:2]
             self._means = np.stack([self._velocity, self._disturbance(self._velocity)])

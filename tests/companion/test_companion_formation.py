@@ -65,6 +65,10 @@ def test_only_those_near_the_surface_take_part():
     np.testing.assert_array_equal(taking_part(Spread(kind="spread"), np.stack([near, far]), 5.8), near[None])
 
 
+def test_one_alone_and_a_point_have_no_places():
+    assert spacing(5.0, 0) == spacing(0.0, 4) == np.inf
+
+
 @given(st.integers(1, 8))
 def test_even_places_are_so_far_apart_and_push_no_more_there(others):
     angles = 2.0 * np.pi * np.arange(others + 1) / (others + 1)

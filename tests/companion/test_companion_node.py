@@ -506,8 +506,11 @@ def test_those_that_share_a_surface_tell_their_way_from_the_take_off_on(kind):
     bench = Bench(task="escort", formation={"kind": kind})
     bench.order(TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5.0)
     told = []
-    while bench.phase is not Phase.ESCORT:
+    for _ in range(2000):
+        if bench.phase is Phase.ESCORT:
+            break
         told += [m for m in only(Tunnel, bench.step(), "swarm") if m.payload_type == PAYLOAD_TYPE]
+    assert bench.phase is Phase.ESCORT
     assert bool(told) is (kind == "spread")
     # The last may be the first plan that it flies.
     for message in told[:-1]:
