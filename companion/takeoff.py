@@ -16,10 +16,11 @@ _STILL, _CALM = 0.3, 2_000_000
 """m/s and µs: slower than this for so long in the air, a take-off is over."""
 _NEARLY = 0.7
 """Share of the height asked for."""
-_ENOUGH, _ROOM, _THERE, _FAST = 0.6, 0.2, 0.3, 3.0
-"""Share of the height asked for, m above the floor of plans, m above that height and m/s: from there to
-there, and no faster, an escort may take over a vehicle that still climbs. An autopilot takes the rest slowly,
-in up to 3 s."""
+_ENOUGH, _ROOM = 0.6, 0.2
+"""An escort may begin on the way up above this share of the height asked for, and so many m above the floor
+of plans: the autopilot takes the rest slowly, in up to 3 s."""
+_THERE, _FAST = 0.3, 3.0
+"""It may not begin more than so many m above that height, or at more than so many m/s."""
 _NAN = float("nan")
 
 

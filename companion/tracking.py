@@ -10,16 +10,16 @@ autopilot is known to ask for,
 with the reference (p_r, v_r, a_r), the compensation c that was sent and the gains k_p, k_v of the firmware's
 own loops, delayed by the lag of its attitude loop. ArduPilot does not chase the set-point but a trajectory
 that itself chases the set-point with bounded jerk: there (p_r, v_r, a_r + c) are that trajectory's, which is
-predicted as well. What the measured velocity has less is the disturbance d =
-κ v + w: κ, the drag per speed, is learnt from how d changes with the velocity (a Kalman filter of one state),
-w is the rest. The compensation κ v_r + ρ w is added to the set-point's acceleration; position and velocity
-stay the plan's. ρ < 1 lets what a vehicle does not answer to decay; κ v_r is no feedback and needs none.
+predicted as well. What the measured velocity lacks is the disturbance d = κ v + w. κ, the drag per speed, is
+learnt from how d changes with the velocity (a Kalman filter of one state); w is the rest. The compensation
+κ v_r + ρ w is added to the set-point's acceleration. ρ < 1 lets what a vehicle does not answer to decay; κ v_r
+is no feedback and needs none.
 
 PX4's position loop is proportional. An estimated velocity that is off by b, as GNSS makes it for seconds,
 leaves the vehicle b/k_p beside its set-point for as long. b is how much faster the estimated velocity is than
-the estimated position moves; it is added to the velocity set-point, and so is a part of the error, since that
-loop is slow. (An integral of the error was tried: b changes within three seconds, and an integral so fast is
-not stable.)
+the estimated position moves; it is added to the velocity set-point. That loop is slow: ``pull`` times e is
+added, too. Its attitude is late: a_r is the plan's of ``lead_us`` later. (An integral of the error was tried:
+b changes within three seconds, and an integral so fast is not stable.)
 """
 
 from __future__ import annotations
