@@ -12,8 +12,8 @@ own loops, delayed by the lag of its attitude loop. ArduPilot does not chase the
 that itself chases the set-point with bounded jerk: there (p_r, v_r, a_r + c) are that trajectory's, which is
 predicted as well. What the measured velocity lacks is the disturbance d = κ v + w. κ, the drag per speed, is
 learnt from how d changes with the velocity (a Kalman filter of one state); w is the rest. The compensation
-κ v_r + ρ w is added to the set-point's acceleration. ρ < 1 lets what a vehicle does not answer to decay; κ v_r
-is no feedback and needs none.
+κ v_r + ρ w is added to the set-point's acceleration. ρ < 1 lets what a vehicle does not answer to decay;
+κ v_r is no feedback and needs none.
 
 PX4's position loop is proportional. An estimated velocity that is off by b, as GNSS makes it for seconds,
 leaves the vehicle b/k_p beside its set-point for as long. b is how much faster the estimated velocity is than
