@@ -290,7 +290,7 @@ class Companion:
             profile.setpoint_mask,
             self._planning.tracking.compensation,
             self._planning.tracking.bias,
-            np.array(self.pilot.limits.lowered.limits.v_max),
+            self._planning.fastest,
             0 if self._certified is not None else self._planning.tracking.lead(self.pilot.loop),
         )
         if not is_finite(message):

@@ -77,7 +77,8 @@ class Planning:
         self._frame: LocalFrame | None = None
         self._shares_surface = isinstance(config.formation, Spread)
         self._lowered = pilot.limits.lowered
-        self._fastest: Array = np.array(config.limits.v_max)
+        self.fastest: Array = np.array(config.limits.v_max)
+        """v_max (3,), m/s, as the autopilot's parameters leave it."""
         self._fading = fading(config)
         self._flown = 0
         self._plans = self._relaxed = 0
@@ -183,7 +184,7 @@ class Planning:
     def _keep(self, lowered: Lowered) -> None:
         """Plan, brake and compensate within what the autopilot can follow."""
         self._lowered = lowered
-        self._fastest = np.array(lowered.limits.v_max)
+        self.fastest = np.array(lowered.limits.v_max)
         self.planner.keep(lowered.limits)
         self.guard.keep(lowered.limits)
         self.tracking.keep(lowered.acceleration)
@@ -207,7 +208,7 @@ class Planning:
     def _bounded(self, velocity: Array) -> Array:
         """A measured ``velocity`` (3,) as a plan may begin with it: whatever the own autopilot, or who speaks
         in its name, says of its speed, nothing faster than the limits is asked for on any axis."""
-        return np.minimum(np.maximum(velocity, -self._fastest), self._fastest)
+        return np.minimum(np.maximum(velocity, -self.fastest), self.fastest)
 
     def _fly_certified(
         self, now: int, view: View, measured: Motion, flight: CertifiedFlight, *, stale: bool, cautious: bool

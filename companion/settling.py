@@ -37,34 +37,35 @@ class Settling:
             low, high = np.minimum(config.limits.box_min, here), np.maximum(config.limits.box_max, here)
             self._rest = np.clip(here + reach * measured.velocity, low, high)
         if speed < config.guard.landing_speed:
-            beside = self._beside(here, obstacles)
-            self.clear = beside is None
-            if beside is None:
+            nearest = self._in_the_way(here, obstacles)
+            self.clear = nearest is None
+            if nearest is None:
                 self._waiting_since = None
-            elif not self._waits(now, here, obstacles):
-                self._rest = beside
+            elif not self._waits(now, obstacles.positions[nearest]):
+                radius = float(np.broadcast_to(obstacles.radius, len(obstacles.ids))[nearest])
+                self._rest = self._beside(here, obstacles.positions[nearest, 0], radius)
         return self._rest
 
-    def _waits(self, now: int, here: Array, obstacles: Obstacles) -> bool:
-        """Whether the nearest obstacle passes, and not for too long."""
-        apart = here[:2] - obstacles.positions[:, 0, :2]
-        nearest = int(np.argmin(np.sqrt(np.vecdot(apart, apart)) - obstacles.radius))
-        way = obstacles.positions[nearest, -1, :2] - obstacles.positions[nearest, 0, :2]
+    def _in_the_way(self, here: Array, obstacles: Obstacles) -> int | None:
+        """Which obstacle is nearest; None if it is far enough."""
+        distance = np.linalg.norm(here[:2] - obstacles.positions[:, 0, :2], axis=1) - obstacles.radius
+        if distance.min(initial=np.inf) > self._config.guard.landing_clearance:
+            return None
+        return int(np.argmin(distance))
+
+    def _waits(self, now: int, positions: Array) -> bool:
+        """Whether an obstacle at ``positions`` (N + 1, 3) passes, and not for too long."""
+        way = positions[-1, :2] - positions[0, :2]
         if float(np.hypot(way[0], way[1])) < _PASSES:
             self._waiting_since = None
             return False
         self._waiting_since = now if self._waiting_since is None else self._waiting_since
         return now - self._waiting_since < _WAITS
 
-    def _beside(self, here: Array, obstacles: Obstacles) -> Array | None:
-        """A place (3,) clear of the nearest obstacle; None if it is far enough."""
-        clearance = self._config.guard.landing_clearance
-        apart = here[:2] - obstacles.positions[:, 0, :2]
-        centres = np.sqrt(np.vecdot(apart, apart))
-        distance = centres - obstacles.radius
-        if distance.min(initial=np.inf) > clearance:
-            return None
-        nearest = int(np.argmin(distance))
-        away = apart[nearest] / centres[nearest] if centres[nearest] > _NEAR else _EAST
-        room = float(centres[nearest] - distance[nearest]) + clearance + _ASIDE
-        return np.append(obstacles.positions[nearest, 0, :2] + room * away, here[2])
+    def _beside(self, here: Array, centre: Array, radius: float) -> Array:
+        """A place (3,) clear of an obstacle at ``centre`` (3,)."""
+        apart = here[:2] - centre[:2]
+        size = float(np.hypot(apart[0], apart[1]))
+        away = apart / size if size > _NEAR else _EAST
+        room = radius + self._config.guard.landing_clearance + _ASIDE
+        return np.append(centre[:2] + room * away, here[2])
