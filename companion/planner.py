@@ -156,7 +156,9 @@ class Planner:
         j_max, dt = self.config.limits.j_max, self.dqmpc.dt
         if j_max is not None:
             jerk = min(j_max)
-            force = rate_limited(force, self._force[0], jerk * min(elapsed, dt), jerk * dt)
+            # Where plans are made seldom, the last one's field has gone on along its horizon since.
+            last = self._force[min(int(min(elapsed, self.dqmpc.seconds) / dt), len(self._force) - 1)]
+            force = rate_limited(force, last, jerk * min(elapsed, dt), jerk * dt)
         elif elapsed < inf and self.config.field.smoothing_us > 0:
             share = -expm1(-1e6 * elapsed / self.config.field.smoothing_us)
             force = self._force + share * (force - self._force)
