@@ -183,3 +183,18 @@ def test_the_band_leads_out_of_the_deadlock_in_which_the_field_alone_ends(name):
         errors[method] = np.linalg.norm(track[-1] - goals[0])
     assert errors["baseline"] > 3.0
     assert errors["tangential"] < 0.3
+
+
+@QUICK
+@given(seed=SEEDS, later=st.integers(20_000, 2_000_000))
+def test_the_field_goes_on_from_where_the_last_plan_saw_it(seed, later):
+    """However seldom plans are made: a companion that is late evades with all its force."""
+    jerk, planner = 3.5, Planner(configured(limits={"j_max": (3.5, 3.5, 3.5)}))
+    x, away = np.array([0.0, 0.0, 6.0]), np.random.default_rng(seed).normal(size=3)
+    still = np.tile(x, (16, 1))
+    others = obstacles(np.array([x + 0.4 * away / np.linalg.norm(away)]), np.zeros((1, 3)))
+    first = planner.plan(START, x, np.zeros(3), still, standing(x), others)
+    second = planner.plan(START + later, x, np.zeros(3), still, standing(x), others)
+    seen = first.force[min(later // DT, 15)]
+    assert np.linalg.norm(second.force[0] - seen) <= jerk * 1e-6 * min(later, DT) + 1e-9
+    assert np.linalg.norm(second.force[0]) >= np.linalg.norm(seen) - 1e-9
