@@ -7,9 +7,9 @@ which may be there as well. It answers no order.
 from __future__ import annotations
 
 from companion.config import CompanionConfig
+from companion.flight.readiness import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
 from companion.node import Companion
-from companion.readiness import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
-from companion.understudy import Onlooker, Understudy
+from companion.shadow import Onlooker, Understudy
 from companion.world import View
 from mavlink_bridge.messages import (
     CommandLong,

@@ -7,24 +7,28 @@ from typing import ClassVar
 
 import numpy as np
 
-from companion.aims import Aims
-from companion.certified.flight import CertifiedFlight
-from companion.config import CompanionConfig, MethodName
-from companion.dials import Dials
-from companion.guard import Guard
-from companion.horizon import Horizon
-from companion.orders import Orders
-from companion.pilot import Phase, Pilot
-from companion.plan_log import PlanLog
-from companion.planner import Plan, Planner
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.field.plan_log import PlanLog
+from companion.avoidance.field.planner import Plan, Planner
+from companion.config import CompanionConfig
+from companion.config.planning import MethodName
+from companion.estimation.time_sync import RoundTrips
+from companion.flight.guard import Guard
+from companion.flight.health_monitor import Situation, Watch
+from companion.flight.orders import Orders
+from companion.flight.reactions import Reactions
+from companion.flight.setpoint import is_finite, setpoint
+from companion.flight.state_machine import Pilot
+from companion.goals.goals import Aims
 from companion.planning import Planning, Tally
-from companion.reactions import Reactions
-from companion.reception import LINKS, accepts
-from companion.round_trips import RoundTrips
-from companion.setpoint import is_finite, setpoint
-from companion.sharing import Sharing
-from companion.voice import Severity, Voice
-from companion.watch import Situation, Watch
+from companion.telemetry.metrics import Dials
+from companion.telemetry.reception import LINKS, accepts
+from companion.telemetry.sharing import Sharing
+from companion.telemetry.silence import report_silence
+from companion.telemetry.status_text import Severity, Voice
+from companion.values.components import COMPONENT
+from companion.values.horizon import Horizon
+from companion.values.phase import Phase
 from companion.world import View, World
 from mavlink_bridge.codec import Codec, Counters
 from mavlink_bridge.frames import FleetFrame
@@ -32,8 +36,6 @@ from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.signing import Signing
 
-COMPONENT = 195
-"""MAV_COMP_ID_PATHPLANNER."""
 _LOOK = 100_000
 """µs between two looks at what may be wrong."""
 _PLAIN = str.maketrans({"²": "2", "³": "3", "°": "deg"})
@@ -190,7 +192,7 @@ class Companion:
         """What the ground is told, by link: events and figures."""
         if not (self.config.voice.texts or self.config.voice.values):
             return _NOTHING
-        self.world.say(now, self.voice)
+        report_silence(now, self.world, self.voice)
         said: list[Message] = [*self.voice.due(now)]
         said += self._dials.due(now, self.held, self.world.target.age(now))
         return {link: said if link in self.config.voice.links else [] for link in ("autopilot", "ground")}

@@ -9,22 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.aims import Aims
-from companion.certified.flight import CertifiedFlight
-from companion.certified.keeper import Why
+from companion.avoidance.certified.commitment import Why
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.field.plan_log import PlanLog
+from companion.avoidance.field.planner import Aim, Plan, Planner
 from companion.config import CompanionConfig
+from companion.config.formation import Spread
 from companion.errors import CompanionError, SurfaceError
-from companion.forces import Obstacles
-from companion.formation import Spread
-from companion.guard import Guard
-from companion.heading import Heading, Yaw
-from companion.horizon import Array, Horizon, Motion, roll_out
-from companion.lowering import Lowered
-from companion.neighbours import fading
-from companion.pilot import Phase, Pilot
-from companion.plan_log import PlanLog
-from companion.planner import Aim, Plan, Planner
-from companion.tracking import Tracking
+from companion.flight.guard import Guard
+from companion.flight.lowering import Lowered
+from companion.flight.state_machine import Pilot
+from companion.flight.tracking import Tracking
+from companion.goals.goals import Aims
+from companion.goals.heading import Heading, Yaw
+from companion.obstacles.neighbours import fading
+from companion.values.horizon import Array, Horizon, Motion, roll_out
+from companion.values.obstacles import Obstacles
+from companion.values.phase import Phase
 from companion.world import View, World
 from mavlink_bridge.frames import LocalFrame
 

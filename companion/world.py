@@ -9,18 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.config import CompanionConfig
-from companion.forces import Obstacles
-from companion.horizon import Array
-from companion.moving import MovingObstacles
-from companion.neighbours import Neighbours
-from companion.obstacles import FixedObstacles
-from companion.origins import Origins
-from companion.reception import AUTOPILOT
-from companion.round_trips import Answer
-from companion.sensed import Sensed, Stance
-from companion.target import Target
-from companion.tracks import State, Track
-from companion.voice import Voice
+from companion.estimation.origins import Origins
+from companion.estimation.target import Target
+from companion.estimation.time_sync import Answer
+from companion.estimation.tracks import State, Track
+from companion.obstacles.moving import MovingObstacles
+from companion.obstacles.neighbours import Neighbours
+from companion.obstacles.sensed import Sensed, Stance
+from companion.obstacles.static import FixedObstacles
+from companion.values.components import AUTOPILOT
+from companion.values.horizon import Array
+from companion.values.obstacles import Obstacles
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import (
     AdsbVehicle,
@@ -126,14 +125,6 @@ class World:
         own, last = self._own.at(now), self.target.last(now)
         adrift = now - self._placed if own is None and self._left is not None else 0
         return View(own, yaw, self.target.fresh(last), self._local, last, adrift)
-
-    def say(self, now: int, voice: Voice) -> None:
-        """Let ``voice`` tell who has fallen silent, and who is back."""
-        if self.config.task == "escort" and self.target.age(now) is not None:
-            voice.watch(self.target.at(now) is None, "Target lost", "Target is back")
-        if self.sensed.proximity is not None:
-            silent = self.sensed.proximity.silent(now)
-            voice.watch(silent, "Obstacle sensor silent", "Obstacle sensor is back")
 
     @property
     def simulated(self) -> bool:

@@ -12,12 +12,12 @@ from typing import Annotated, Any, Protocol
 
 from pydantic import Discriminator, Tag
 
-from companion.horizon import Array
 from companion.surfaces.circle import Circle
 from companion.surfaces.cylinder import Cylinder
 from companion.surfaces.ellipsoid import Ellipsoid
 from companion.surfaces.parametric import Parametric
 from companion.surfaces.sphere import Sphere
+from companion.values.horizon import Array
 
 __all__ = ["Circle", "Cylinder", "Ellipsoid", "Parametric", "Sphere", "Surface", "SurfaceConfig"]
 

@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from companion.horizon import Array
-from companion.settings import Settings
+from companion.values.horizon import Array
+from companion.values.settings import Settings
 
 TURNS = np.linspace(0.0, 2.0 * np.pi, 73)
 """Where an outline has its points."""

@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from companion.horizon import Array
-from companion.settings import Settings
 from companion.surfaces.circle import outward, ring
+from companion.values.horizon import Array
+from companion.values.settings import Settings
 
 
 class Cylinder(Settings):

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from companion.horizon import Array
-from companion.settings import Settings
 from companion.surfaces.circle import TURNS
+from companion.values.horizon import Array
+from companion.values.settings import Settings
 
 _Axis = Annotated[float, Field(ge=0.1, le=100.0)]
 _HALVINGS = 80

@@ -17,8 +17,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from companion.errors import SurfaceError
-from companion.horizon import Array
-from companion.settings import Settings
+from companion.values.horizon import Array
+from companion.values.settings import Settings
 
 GROUP = "outrider.surfaces"
 _GRID = 48

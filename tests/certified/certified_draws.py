@@ -9,7 +9,7 @@ import numpy as np
 from certified_swarm import NEVER, Habits, Rough, Swarm
 from hypothesis import strategies as st
 
-from companion.horizon import Array
+from companion.values.horizon import Array
 
 UNTIL = 5_000_000
 """µs of a run."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
-from companion.certified.committed import carried_on, committed, controls
-from companion.horizon import Array
+from companion.avoidance.certified.committed import carried_on, committed, controls
+from companion.values.horizon import Array
 from mavlink_bridge.plan_wire import Integers, WirePlan, quantise
 
 DT = 200_000

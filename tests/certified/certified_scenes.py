@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from certified_plans import DT, EPOCH, STEPS, later, random_plan
 
-from companion.certified.committed import carried_on, controls
-from companion.certified.corridor import Others, Planes, planes
-from companion.certified.program import Program, State, Wish
-from companion.certified.settings import CertifiedConfig
-from companion.config import LimitsConfig
-from companion.horizon import Array, roll_out
+from companion.avoidance.certified.committed import carried_on, controls
+from companion.avoidance.certified.qp import Program, State, Wish
+from companion.avoidance.certified.separating_planes import Others, Planes, planes
+from companion.config.certified import CertifiedConfig
+from companion.config.planning import LimitsConfig
+from companion.values.horizon import Array, roll_out
 from mavlink_bridge.plan_wire import WirePlan
 
 CONFIG = CertifiedConfig(dt_us=DT)

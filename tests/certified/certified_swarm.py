@@ -11,15 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from certified_plans import DT, EPOCH, STEPS, curves
 
-from companion.certified.committed import carried_on, controls, horizon_of, resting
-from companion.certified.corridor import hull_distance
-from companion.certified.flight import CertifiedFlight
-from companion.certified.reach import between
-from companion.certified.settings import CertifiedConfig
+from companion.avoidance.certified.committed import carried_on, controls, horizon_of, resting
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.certified.margins import between
+from companion.avoidance.certified.separating_planes import hull_distance
+from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
-from companion.horizon import Array
-from companion.node import COMPONENT
-from companion.planner import standing
+from companion.config.certified import CertifiedConfig
+from companion.values.components import COMPONENT
+from companion.values.horizon import Array
 from companion.world import View, World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel

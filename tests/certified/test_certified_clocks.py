@@ -8,7 +8,7 @@ from certified_plans import EPOCH
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.certified.clocks import ClockWatch
+from companion.avoidance.certified.clocks import ClockWatch
 from mavlink_bridge.messages import Source
 
 OWN, OTHER, AUTOPILOT = Source(1, 195), Source(2, 195), Source(2, 1)

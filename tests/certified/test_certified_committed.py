@@ -8,7 +8,14 @@ from certified_plans import DT, EPOCH, STEPS, curves, random_plan, resting_plans
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.certified.committed import carried_on, committed, controls, horizon_of, resting, rests
+from companion.avoidance.certified.committed import (
+    carried_on,
+    committed,
+    controls,
+    horizon_of,
+    resting,
+    rests,
+)
 from companion.errors import CertificateError
 from mavlink_bridge.plan_wire import WirePlan, pack, quantise, unpack
 

@@ -13,8 +13,8 @@ from certified_plans import STEPS, curves, later, random_plan
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.certified.corridor import Others, Planes, hull_distance, nearest, planes
-from companion.horizon import Array
+from companion.avoidance.certified.separating_planes import Others, Planes, hull_distance, nearest, planes
+from companion.values.horizon import Array
 
 SPARE = 0.01
 seeds = st.integers(0, 2**32 - 1)

@@ -9,14 +9,14 @@ import pytest
 from certified_plans import DT, EPOCH, STEPS
 from certified_swarm import FLEET
 
-from companion.certified.committed import resting
-from companion.certified.flight import CertifiedFlight
-from companion.certified.reach import beside, between
-from companion.certified.settings import CertifiedConfig
+from companion.avoidance.certified.committed import resting
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.certified.margins import beside, between
+from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
-from companion.horizon import Array
-from companion.planner import standing
-from companion.sharing import position_message
+from companion.config.certified import CertifiedConfig
+from companion.telemetry.sharing import position_message
+from companion.values.horizon import Array
 from companion.world import View, World
 from mavlink_bridge.messages import Source
 from mavlink_bridge.plan_wire import pack

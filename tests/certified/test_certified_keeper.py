@@ -13,15 +13,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from companion.certified.committed import carried_on, committed, controls, resting, rests, rounding
-from companion.certified.corridor import Others, hull_distance
-from companion.certified.flight import CertifiedFlight
-from companion.certified.keeper import Keeper, Why
-from companion.certified.program import Program, Wish
-from companion.certified.settings import CertifiedConfig
-from companion.certified.stall import StallTurn
-from companion.config import CompanionConfig, HorizonConfig, LimitsConfig
-from companion.horizon import Array, Motion, roll_out
+from companion.avoidance.certified.commitment import Keeper, Why
+from companion.avoidance.certified.committed import carried_on, committed, controls, resting, rests, rounding
+from companion.avoidance.certified.deadlock import StallTurn
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.certified.qp import Program, Wish
+from companion.avoidance.certified.separating_planes import Others, hull_distance
+from companion.config import CompanionConfig
+from companion.config.certified import CertifiedConfig
+from companion.config.planning import HorizonConfig, LimitsConfig
+from companion.values.horizon import Array, Motion, roll_out
 from mavlink_bridge.messages import Message, Source, Tunnel
 from mavlink_bridge.roster_wire import unpack
 

@@ -9,9 +9,9 @@ from certified_plans import DT, EPOCH, STEPS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.certified.committed import carried_on, committed, controls, resting
-from companion.certified.ledger import Ledger
-from companion.horizon import Array
+from companion.avoidance.certified.committed import carried_on, committed, controls, resting
+from companion.avoidance.certified.peer_plans import Ledger
+from companion.values.horizon import Array
 from mavlink_bridge.plan_wire import WirePlan, pack
 from mavlink_bridge.roster_wire import Roster
 

@@ -24,10 +24,10 @@ from certified_scenes import (
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from companion.certified.committed import committed, controls, rests
-from companion.certified.program import Answer
+from companion.avoidance.certified.committed import committed, controls, rests
+from companion.avoidance.certified.qp import Answer
 from companion.errors import CompanionError
-from companion.horizon import Array
+from companion.values.horizon import Array
 
 CLOSE = 1e-5
 """m, m/s, m/s²."""

@@ -10,10 +10,10 @@ from certified_plans import curves
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.certified.reach import between, margin, stranger
-from companion.certified.settings import CertifiedConfig
-from companion.config import FieldConfig, LimitsConfig
-from companion.horizon import Array
+from companion.avoidance.certified.margins import between, margin, stranger
+from companion.config.certified import CertifiedConfig
+from companion.config.planning import FieldConfig, LimitsConfig
+from companion.values.horizon import Array
 
 STEPS, DT, FINE = 8, 0.2, 20
 SECONDS = DT * np.arange(STEPS + 1.0)

@@ -8,13 +8,13 @@ from certified_swarm import FLEET
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.certified.committed import controls, resting
-from companion.certified.flight import CertifiedFlight
-from companion.certified.strangers import Strangers
+from companion.avoidance.certified.committed import controls, resting
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.certified.noncooperative import Strangers
+from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
-from companion.horizon import Array
-from companion.planner import standing
-from companion.tracks import State
+from companion.estimation.tracks import State
+from companion.values.horizon import Array
 from companion.world import View, World
 from mavlink_bridge.messages import GlobalPosition, Source
 

@@ -12,8 +12,8 @@ from certified_plans import EPOCH
 from certified_swarm import Habits, Rough, Swarm
 from hypothesis import HealthCheck, given, settings
 
-from companion.certified.committed import rests
-from companion.horizon import Array
+from companion.avoidance.certified.committed import rests
+from companion.values.horizon import Array
 
 EXACT = 1e-9
 """m."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from companion_rig import STRONG, ZERO
 
-from companion.config import TangentialConfig
-from companion.methods import Influence, Scene
-from companion.methods.tangential import Tangential
+from companion.avoidance.field.methods import Influence, Scene
+from companion.avoidance.field.methods.tangential import Tangential
+from companion.config.planning import TangentialConfig
 
 U_MAX, DT = 2.0, 0.1
 NOTHING = Influence(np.zeros((16, 3)), 1.0, ZERO)

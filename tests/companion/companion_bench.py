@@ -10,12 +10,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from companion.autopilots import Profile
-from companion.autopilots.ardupilot import ARDUPILOT
-from companion.autopilots.px4 import PX4
 from companion.config import CompanionConfig
-from companion.node import COMPONENT, Companion
-from companion.pilot import Phase
+from companion.flight.autopilots import Profile
+from companion.flight.autopilots.ardupilot import ARDUPILOT
+from companion.flight.autopilots.px4 import PX4
+from companion.node import Companion
+from companion.values.components import COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key

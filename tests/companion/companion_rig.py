@@ -11,12 +11,12 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from companion.avoidance.field.methods import Scene
+from companion.avoidance.field.planner import Plan, Planner, standing
 from companion.config import CompanionConfig
-from companion.forces import Obstacles
-from companion.horizon import Array, Horizon
-from companion.methods import Scene
-from companion.planner import Plan, Planner, standing
 from companion.surfaces import Circle, Surface
+from companion.values.horizon import Array, Horizon
+from companion.values.obstacles import Obstacles
 
 LAWS = settings(deadline=None, max_examples=60)
 QUICK = settings(deadline=None, max_examples=25)

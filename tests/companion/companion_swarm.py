@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from companion_rig import CIRCLE, ZERO
 
+from companion.avoidance.field.planner import Aim, Planner, standing
 from companion.config import CompanionConfig
-from companion.forces import Obstacles
-from companion.horizon import Array, roll_out
-from companion.planner import Aim, Planner, standing
+from companion.values.horizon import Array, roll_out
+from companion.values.obstacles import Obstacles
 
 START = 1_767_225_600_000_000
 DT, STEPS = 100_000, 16

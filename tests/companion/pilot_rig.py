@@ -14,8 +14,9 @@ from companion_bench import (
 )
 
 from companion.config import CompanionConfig
-from companion.pilot import Phase, Pilot
-from companion.tracks import State
+from companion.estimation.tracks import State
+from companion.flight.state_machine import Pilot
+from companion.values.phase import Phase
 from companion.world import View
 from mavlink_bridge.messages import CommandAck, ExtendedSysState, Heartbeat, Message, Source, SysStatus
 

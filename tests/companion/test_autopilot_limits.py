@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.autopilots.known import KNOWN
-from companion.autopilots.limits import STOCK, Limits, deciding, limits_of, stock_parameters
+from companion.flight.autopilots.known import KNOWN
+from companion.flight.autopilots.limits import STOCK, Limits, deciding, limits_of, stock_parameters
 
 ARDUPILOT, PX4 = 3, 12
 BOTH = (ARDUPILOT, PX4)

@@ -7,7 +7,7 @@ import pytest
 from companion_bench import LAND, NAN, TAKEOFF, TARGET, Bench, only, seen_at
 
 from companion.errors import SolverError
-from companion.pilot import Phase
+from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandLong
 
 RETURN, HOLD = 20, 17

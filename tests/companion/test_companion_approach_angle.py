@@ -8,9 +8,9 @@ from companion_rig import LAWS, TARGET, ZERO, numbers, obstacles, scene, vectors
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.config import ApproachAngleConfig
-from companion.methods import Influence
-from companion.methods.approach_angle import ApproachAngle
+from companion.avoidance.field.methods import Influence
+from companion.avoidance.field.methods.approach_angle import ApproachAngle
+from companion.config.planning import ApproachAngleConfig
 
 CONFIG = ApproachAngleConfig()
 MIRROR = np.diag([1.0, -1.0, 1.0])

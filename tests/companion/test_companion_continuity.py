@@ -13,12 +13,15 @@ from companion_swarm import DT, OTHER, START, STEPS, WAYS, configured
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.config import ApproachAngleConfig, CompanionConfig, TurningSense
-from companion.forces import Obstacles, limit, repulsion
-from companion.horizon import Array
-from companion.methods import Influence, Method, Scene
-from companion.methods.approach_angle import ApproachAngle
-from companion.planner import Planner, build, standing
+from companion.avoidance.field.forces import repulsion
+from companion.avoidance.field.methods import Influence, Method, Scene
+from companion.avoidance.field.methods.approach_angle import ApproachAngle
+from companion.avoidance.field.planner import Planner, build, standing
+from companion.config import CompanionConfig
+from companion.config.planning import ApproachAngleConfig, TurningSense
+from companion.values.horizon import Array
+from companion.values.obstacles import Obstacles
+from companion.values.vectors import limit
 
 
 class Meeting(NamedTuple):

@@ -24,7 +24,7 @@ from pilot_rig import (
 )
 
 from companion.config import CompanionConfig
-from companion.pilot import Phase
+from companion.values.phase import Phase
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -11,10 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from companion.config import CompanionConfig, CostConfig, HorizonConfig, LimitsConfig
-from companion.dqmpc import Dqmpc
+from companion.avoidance.field.dqmpc import Dqmpc
+from companion.config import CompanionConfig
+from companion.config.planning import CostConfig, HorizonConfig, LimitsConfig
 from companion.errors import ShapeError
-from companion.forces import limit
+from companion.values.vectors import limit
 
 TIGHT = CompanionConfig.model_validate(
     {"limits": {"v_max": (2.0, 2.0, 1.0), "box_min": (-6.0, -6.0, 4.5), "box_max": (6.0, 6.0, 5.5)}}

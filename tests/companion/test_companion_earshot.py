@@ -10,20 +10,15 @@ from companion_rig import LAWS, QUICK, ZERO, numbers, vectors
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.config import (
-    ApproachAngleConfig,
-    CompanionConfig,
-    FieldConfig,
-    GuardConfig,
-    MovingSphere,
-    RatesConfig,
-)
-from companion.horizon import Motion, roll_out
-from companion.planner import Planner, standing
-from companion.reception import accepts
-from companion.settling import Settling
-from companion.sharing import plan_message, position_message
-from companion.tracks import State
+from companion.avoidance.field.planner import Planner, standing
+from companion.config.companion import CompanionConfig, MovingSphere
+from companion.config.flight import GuardConfig, RatesConfig
+from companion.config.planning import ApproachAngleConfig, FieldConfig
+from companion.estimation.tracks import State
+from companion.goals.settling import Settling
+from companion.telemetry.reception import accepts
+from companion.telemetry.sharing import plan_message, position_message
+from companion.values.horizon import Motion, roll_out
 from companion.world import World
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame

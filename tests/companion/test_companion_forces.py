@@ -10,7 +10,8 @@ from companion_rig import LAWS, numbers, obstacles, rotations, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.forces import limit, magnitude, repulsion, stopping_distance
+from companion.avoidance.field.forces import magnitude, repulsion, stopping_distance
+from companion.values.vectors import limit
 
 GAIN, CLAMP, BRAKING, DT = 10.0, 7.0, 4.0, 0.1
 D_MIN, D_SAFE = np.array(0.5), np.array(3.0)

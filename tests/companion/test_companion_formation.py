@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.bearings import turned
-from companion.forces import Obstacles
-from companion.formation import Spread, even_turn, outside, spacing, taking_part
+from companion.config.formation import Spread
+from companion.goals.formation import even_turn, outside, spacing, taking_part
+from companion.values.bearings import turned
+from companion.values.obstacles import Obstacles
 
 ANGLES = st.lists(st.floats(0.0, 6.28), min_size=2, max_size=8, unique=True).filter(
     lambda angles: np.diff(np.sort([*angles, min(angles) + 2.0 * np.pi])).min() > 1e-3

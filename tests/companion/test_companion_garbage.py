@@ -19,7 +19,7 @@ from companion_rig import QUICK
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from companion.pilot import Phase
+from companion.values.phase import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import TABLE
 from mavlink_bridge.framing import frame_v1, frame_v2

@@ -29,8 +29,8 @@ from pilot_rig import (
     state,
 )
 
-from companion.pilot import Phase
-from companion.tracks import State
+from companion.estimation.tracks import State
+from companion.values.phase import Phase
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

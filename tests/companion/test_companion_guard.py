@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
-from companion.guard import Guard, Holding, brake
-from companion.horizon import Motion, roll_out
+from companion.flight.guard import Guard, Holding, brake
+from companion.values.horizon import Motion, roll_out
 
 CONFIG = CompanionConfig()
 ESCORT = CompanionConfig.model_validate(

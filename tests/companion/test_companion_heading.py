@@ -10,8 +10,8 @@ from companion_rig import LAWS, QUICK, numbers
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.config import HeadingConfig, HorizonConfig
-from companion.heading import Heading
+from companion.config.planning import HeadingConfig, HorizonConfig
+from companion.goals.heading import Heading
 
 CONFIG, HORIZON = HeadingConfig(), HorizonConfig()
 N, DT = HORIZON.steps + 1, HORIZON.dt_us

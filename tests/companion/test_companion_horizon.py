@@ -7,7 +7,7 @@ from companion_rig import LAWS, numbers, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.horizon import HorizonTable, roll_out
+from companion.values.horizon import HorizonTable, roll_out
 
 EPOCH = 1_767_225_600_000_000
 DTS = st.integers(1_000, 65_000).map(lambda k: 4 * k)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.config import CostConfig, HorizonConfig, LimitsConfig
-from companion.dqmpc import Dqmpc
-from companion.jerk import Flown, rate_limited
+from companion.avoidance.field.dqmpc import Dqmpc
+from companion.avoidance.field.jerk import Flown, rate_limited
+from companion.config.planning import CostConfig, HorizonConfig, LimitsConfig
 
 J_MAX = np.array([3.5, 3.5, 4.0])
 LIMITS = LimitsConfig(u_max=(2.0, 2.0, 2.0), v_max=(3.5, 3.5, 1.5), a_total=4.0, j_max=tuple(J_MAX))

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.autopilots import Profile
-from companion.autopilots.ardupilot import ARDUPILOT
-from companion.autopilots.px4 import PX4
-from companion.last_word import LastWord
+from companion.flight.autopilots import Profile
+from companion.flight.autopilots.ardupilot import ARDUPILOT
+from companion.flight.autopilots.px4 import PX4
+from companion.flight.hold_on_exit import LastWord
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, Source
 from mavlink_bridge.node import Datagram

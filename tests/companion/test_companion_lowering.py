@@ -9,10 +9,10 @@ from companion_bench import PROFILES
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.autopilots import Loop, Shaping
-from companion.autopilots.limits import limits_of, stock_parameters
-from companion.config import LimitsConfig
-from companion.lowering import lowered
+from companion.config.planning import LimitsConfig
+from companion.flight.autopilots import Loop, Shaping
+from companion.flight.autopilots.limits import limits_of, stock_parameters
+from companion.flight.lowering import lowered
 from outrider.aboard.fly_config import FlyConfig
 from outrider.resources import find
 from outrider.scenario import Scenario

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from companion.avoidance.field.planner import Planner, standing
 from companion.config import CompanionConfig
-from companion.forces import Obstacles
-from companion.planner import Planner, standing
+from companion.values.obstacles import Obstacles
 from companion.world import World, reach
 from mavlink_bridge.messages import GlobalPosition, Source
 

@@ -9,12 +9,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from companion.config import CompanionConfig, MovingPost, MovingSphere, Post, Sphere
-from companion.forces import repulsion
-from companion.horizon import roll_out
-from companion.moving import MovingObstacles
-from companion.obstacles import FixedObstacles
-from companion.sharing import plan_message
+from companion.avoidance.field.forces import repulsion
+from companion.config.companion import CompanionConfig, MovingPost, MovingSphere, Post, Sphere
+from companion.obstacles.moving import MovingObstacles
+from companion.obstacles.static import FixedObstacles
+from companion.telemetry.sharing import plan_message
+from companion.values.horizon import roll_out
 from companion.world import World
 from mavlink_bridge.frames import FleetFrame, enu_to_ned
 from mavlink_bridge.messages import GlobalPosition, Source

@@ -9,8 +9,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
-from companion.horizon import roll_out
-from companion.neighbours import Neighbours
+from companion.obstacles.neighbours import Neighbours
+from companion.values.horizon import roll_out
 from mavlink_bridge.frames import FleetFrame, enu_to_ned
 from mavlink_bridge.messages import GlobalPosition, Source, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise

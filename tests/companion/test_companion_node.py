@@ -31,9 +31,9 @@ from companion_bench import (
 )
 
 from companion.errors import SolverError
-from companion.guard import Holding
-from companion.orders import NAV_LOITER_UNLIM, NAV_RETURN
-from companion.pilot import Phase
+from companion.flight.guard import Holding
+from companion.flight.orders import NAV_LOITER_UNLIM, NAV_RETURN
+from companion.values.phase import Phase
 from mavlink_bridge.messages import (
     Attitude,
     CommandAck,

@@ -8,9 +8,10 @@ from companion_rig import LAWS, numbers, vectors
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from companion.avoidance.field.forces import repulsion
 from companion.config import CompanionConfig
-from companion.forces import repulsion
-from companion.obstacles import FIRST_ID, FixedObstacles, Post, Sphere
+from companion.config.obstacles import Post, Sphere
+from companion.obstacles.static import FIRST_ID, FixedObstacles
 from companion.world import World, reach
 from mavlink_bridge.frames import FleetFrame
 

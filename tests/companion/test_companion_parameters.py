@@ -9,8 +9,8 @@ from companion_bench import AUTOPILOT, PROFILES, START
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.autopilots.limits import stock_parameters
-from companion.parameters import PATIENCE, Parameters
+from companion.flight.autopilots.limits import stock_parameters
+from companion.flight.parameters import PATIENCE, Parameters
 from mavlink_bridge.messages import ParamRequestRead, ParamValue, Source
 
 OWN = Source(11, 195)

@@ -36,9 +36,9 @@ from pilot_rig import (
     state,
 )
 
-from companion.calls import Calls
 from companion.config import CompanionConfig
-from companion.pilot import Phase
+from companion.flight.command_protocol import Calls
+from companion.values.phase import Phase
 from companion.world import View
 from mavlink_bridge.messages import Message
 

@@ -8,7 +8,7 @@ from companion_rig import LAWS, QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.plan_clock import PlanClock
+from companion.estimation.plan_clock import PlanClock
 
 NOW = 1_767_225_600_000_000
 DELAY, STALE, DT, PERIOD = 20_000, 500_000, 100_000, 100_000

@@ -8,8 +8,8 @@ from companion_rig import QUICK, ZERO, fly, obstacles, ring
 from hypothesis import given
 from hypothesis import strategies as st
 
+from companion.avoidance.field.planner import Aim, Planner, standing
 from companion.config import CompanionConfig
-from companion.planner import Aim, Planner, standing
 
 CONFIG = CompanionConfig()
 START = 1_767_225_600_000_000

@@ -11,8 +11,8 @@ from companion_rig import LAWS, numbers
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.doubts import Doubts
-from companion.positioning import Positioning
+from companion.flight.positioning import Positioning
+from companion.obstacles.uncertainty import Doubts
 from mavlink_bridge.doubt_wire import pack
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.messages import EkfStatus, EstimatorStatus, GpsRaw

@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
-from companion.obstacles import FixedObstacles, Post
-from companion.proximity import BODY, Proximity, ProximityConfig, returns
-from companion.reception import accepts
-from companion.sensed import Sensed, Stance
+from companion.config.obstacles import Post, ProximityConfig
+from companion.obstacles.proximity import BODY, Proximity, returns
+from companion.obstacles.sensed import Sensed, Stance
+from companion.obstacles.static import FixedObstacles
+from companion.telemetry.reception import accepts
 from companion.world import World
 from mavlink_bridge.messages import (
     Attitude,

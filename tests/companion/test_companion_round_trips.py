@@ -13,8 +13,8 @@ from companion_rig import LAWS, QUICK, numbers
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.round_trips import RoundTrips
-from companion.timing import SenderClock
+from companion.estimation.sender_clock import SenderClock
+from companion.estimation.time_sync import RoundTrips
 from mavlink_bridge.messages import Source, Timesync
 
 OWN, AUTOPILOT = Source(11, 195), Source(11, 1)

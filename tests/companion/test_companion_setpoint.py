@@ -10,9 +10,9 @@ from companion_rig import LAWS, ZERO, numbers, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.heading import Yaw
-from companion.horizon import roll_out
-from companion.setpoint import setpoint
+from companion.flight.setpoint import setpoint
+from companion.goals.heading import Yaw
+from companion.values.horizon import roll_out
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from companion_bench import LINKS, TARGET, Bench, seen_at
 
-from companion.pilot import Phase
+from companion.values.phase import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.key import Key
 from mavlink_bridge.messages import Heartbeat

@@ -7,8 +7,8 @@ import pytest
 from companion_rig import LAWS, vectors
 from hypothesis import given
 
+from companion.avoidance.solver import QpSolver
 from companion.errors import CompanionError, ShapeError, SolverError
-from companion.solver import QpSolver
 
 WIDE = np.full(3, 1e3)
 ROW = np.array([[1.0, 1.0, 1.0]])

@@ -8,9 +8,9 @@ from companion_rig import CIRCLE, LAWS, TARGET, numbers, obstacles, scene, vecto
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.config import SwivelConfig
-from companion.methods import Influence
-from companion.methods.swivel import Swivel
+from companion.avoidance.field.methods import Influence
+from companion.avoidance.field.methods.swivel import Swivel
+from companion.config.planning import SwivelConfig
 from companion.surfaces import Ellipsoid
 
 CONFIG = SwivelConfig()

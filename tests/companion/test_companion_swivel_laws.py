@@ -9,10 +9,10 @@ from companion_swarm import AHEAD, DT, METHODS, OTHER, START, STEPS, configured,
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.dqmpc import Dqmpc
-from companion.methods import Influence
-from companion.methods.swivel import Swivel
-from companion.planner import Aim, Planner
+from companion.avoidance.field.dqmpc import Dqmpc
+from companion.avoidance.field.methods import Influence
+from companion.avoidance.field.methods.swivel import Swivel
+from companion.avoidance.field.planner import Aim, Planner
 from companion.surfaces import Cylinder, Sphere, Surface
 
 ROUND: list[Surface] = [CIRCLE, Cylinder(kind="cylinder"), Sphere(kind="sphere", radius=5.0)]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from companion_swarm import OTHER, START, WAYS, configured, escort, fly, swap
 
-from companion.horizon import Array
+from companion.values.horizon import Array
 
 CLOSE = 1e-4
 """m."""

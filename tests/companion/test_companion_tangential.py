@@ -9,8 +9,8 @@ from companion_rig import LAWS, ZERO, numbers, obstacles, vectors
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.config import TangentialConfig
-from companion.methods import Influence
+from companion.avoidance.field.methods import Influence
+from companion.config.planning import TangentialConfig
 
 D_SAFE = 3.0
 CONFIG = TangentialConfig()

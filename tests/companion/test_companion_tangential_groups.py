@@ -11,7 +11,7 @@ from companion_rig import LAWS, obstacles
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.config import TangentialConfig
+from companion.config.planning import TangentialConfig
 
 CONFIG = TangentialConfig()
 APART, TOGETHER = ([[2.0, side * off, 0.0] for side in (1.0, -1.0)] for off in (1.7, 0.7))

@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from companion.config import CompanionConfig, TrackConfig
-from companion.reception import accepts
-from companion.target import Target
-from companion.tracks import Track
+from companion.config import CompanionConfig
+from companion.config.estimation import TrackConfig
+from companion.estimation.target import Target
+from companion.estimation.tracks import Track
+from companion.telemetry.reception import accepts
 from mavlink_bridge.converters import BY_TYPE
 from mavlink_bridge.messages import CameraTrackingGeo, FollowTarget, GlobalPosition, Source
 

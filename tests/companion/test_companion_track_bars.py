@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.config import CompanionConfig, TrackConfig
-from companion.tracks import Track
+from companion.config import CompanionConfig
+from companion.config.estimation import TrackConfig
+from companion.estimation.tracks import Track
 
 SEEDS = 20
 SECONDS = 40

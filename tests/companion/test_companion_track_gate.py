@@ -11,10 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from companion.config import CompanionConfig, TrackConfig
-from companion.estimator import Estimator
-from companion.gains import model
-from companion.tracks import Track
+from companion.config import CompanionConfig
+from companion.config.estimation import TrackConfig
+from companion.estimation.estimator import Estimator
+from companion.estimation.kalman_gains import model
+from companion.estimation.tracks import Track
 
 PERIOD = 100_000
 START = 1_000_000_000

@@ -9,11 +9,11 @@ from companion_rig import LAWS, QUICK, numbers, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.config import TrackConfig
-from companion.estimator import Estimator
-from companion.rewind import Rewind
-from companion.timing import Dated
-from companion.tracks import Track
+from companion.config.estimation import TrackConfig
+from companion.estimation.estimator import Estimator
+from companion.estimation.out_of_sequence import Rewind
+from companion.estimation.sender_clock import Dated
+from companion.estimation.tracks import Track
 
 CONFIG = TrackConfig(sigma_turn=0.5)
 WINDOW = CONFIG.rewind_us

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import outrider
-from companion.config import TrackConfig
-from companion.timing import SenderClock
-from companion.tracks import Track
+from companion.config.estimation import TrackConfig
+from companion.estimation.sender_clock import SenderClock
+from companion.estimation.tracks import Track
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition

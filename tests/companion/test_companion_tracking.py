@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from companion.autopilots import Loop, Shaping
-from companion.horizon import Motion
-from companion.tracking import Errors, Tracking, TrackingConfig
+from companion.config.flight import TrackingConfig
+from companion.flight.autopilots import Loop, Shaping
+from companion.flight.tracking import Errors, Tracking
+from companion.values.horizon import Motion
 
 LOOP = Loop(1.0, 2.0, 4.0)
 DT = 0.02

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.autopilots.ardupilot import ARDUPILOT
-from companion.horizon import Motion
-from companion.tracking import Tracking, TrackingConfig
+from companion.config.flight import TrackingConfig
+from companion.flight.autopilots.ardupilot import ARDUPILOT
+from companion.flight.tracking import Tracking
+from companion.values.horizon import Motion
 
 CONFIG = TrackingConfig(compensate=True)
 ROOM = 3.0

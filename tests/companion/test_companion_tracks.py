@@ -8,8 +8,8 @@ from companion_rig import LAWS, QUICK, numbers, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.config import TrackConfig
-from companion.tracks import Track
+from companion.config.estimation import TrackConfig
+from companion.estimation.tracks import Track
 
 CONFIG = TrackConfig()
 START = 1_000_000_000

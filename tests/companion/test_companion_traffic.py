@@ -11,10 +11,11 @@ from companion_rig import LAWS, QUICK, numbers, vectors
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from companion.avoidance.field.forces import repulsion
 from companion.config import CompanionConfig
-from companion.forces import repulsion
-from companion.reception import accepts
-from companion.traffic import FIRST_ID, Traffic, TrafficConfig
+from companion.config.obstacles import TrafficConfig
+from companion.obstacles.traffic import FIRST_ID, Traffic
+from companion.telemetry.reception import accepts
 from companion.world import World
 from mavlink_bridge.messages import AdsbVehicle, Source
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.config import TrackConfig
-from companion.tracks import Track
-from companion.turning import Turn, TurnFilter, carried
+from companion.config.estimation import TrackConfig
+from companion.estimation.tracks import Track
+from companion.estimation.turn_rate import Turn, TurnFilter, carried
 
 PERIOD = 200_000
 START = 10_000_000

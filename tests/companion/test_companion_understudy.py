@@ -7,9 +7,9 @@ from itertools import count
 from companion_bench import AUTOPILOT, FLEET, SYSTEM, TARGET, Bench, only, seen_at
 
 from companion.dry_run import ONLOOKER, REQUESTS, DryRun
-from companion.pilot import Phase
-from companion.readiness import OPERATORS_GO
-from companion.understudy import Understudy
+from companion.flight.readiness import OPERATORS_GO
+from companion.shadow import Understudy
+from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandLong, GpsGlobalOrigin, Source
 
 

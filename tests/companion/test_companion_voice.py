@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from test_companion_proximity import scan
 
 from companion.config import CompanionConfig
-from companion.dials import Dials
-from companion.node import COMPONENT
-from companion.voice import Severity, Voice, VoiceConfig
+from companion.config.flight import VoiceConfig
+from companion.telemetry.metrics import Dials
+from companion.telemetry.status_text import Severity, Voice
+from companion.values.components import COMPONENT
 from mavlink_bridge.messages import NamedValue, Source, StatusText
 
 OWN = Source(SYSTEM, COMPONENT)

@@ -21,11 +21,11 @@ from companion_bench import (
 )
 
 from companion.config import CompanionConfig
-from companion.guard import Holding
-from companion.pilot import Phase
-from companion.tracks import State
-from companion.vehicle import Vehicle
-from companion.watch import Reaction, Situation, Watch
+from companion.estimation.tracks import State
+from companion.flight.guard import Holding
+from companion.flight.health_monitor import Reaction, Situation, Watch
+from companion.flight.vehicle import Vehicle
+from companion.values.phase import Phase
 from companion.world import View
 from mavlink_bridge.messages import (
     CommandLong,

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.certified.committed import committed, horizon_of
+from companion.avoidance.certified.committed import committed, horizon_of
+from companion.backup_node import Helm
 from companion.config import CompanionConfig
-from companion.helm import Helm
-from companion.node import COMPONENT
+from companion.values.components import COMPONENT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key

@@ -10,7 +10,7 @@ import yaml
 from typer.main import get_command
 
 from companion.config import CompanionConfig
-from companion.pilot import Phase
+from companion.values.phase import Phase
 from mavlink_bridge.links.endpoints import parse_endpoint
 from outrider.__main__ import app
 from outrider.aboard.airtime import FLEET, SHARE, room, said, said_by_target

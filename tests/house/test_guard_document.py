@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.config import GuardConfig
+from companion.config.flight import GuardConfig
 from outrider.aboard.fly_config import FlyConfig
 from outrider.resources import find
 from outrider.yaml_file import load

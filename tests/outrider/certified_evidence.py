@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from hypothesis import strategies as st
 
-from companion.certified.committed import carried_on, controls, resting
-from companion.horizon import Array
+from companion.avoidance.certified.committed import carried_on, controls, resting
+from companion.values.horizon import Array
 from mavlink_bridge.plan_wire import Integers, WirePlan
 from outrider.certify.evidence import Evidence, Log, Sighting, Terms, Word
 

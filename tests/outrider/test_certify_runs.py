@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shipped import FIREFLY, scenario
 
-from companion.certified.ledger import Ledger
+from companion.avoidance.certified.peer_plans import Ledger
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Message, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE

@@ -9,7 +9,7 @@ import pytest
 from autopilot_rig import FLAVOURS
 from doctor_bench import GCS, Bench, autopilot, found, warnings
 
-from companion.autopilots.limits import STOCK, limits_of, stock_parameters
+from companion.flight.autopilots.limits import STOCK, limits_of, stock_parameters
 from mavlink_bridge.messages import ParamRequestRead, ParamSet
 from outrider.doctor.agility import Demand, lowered, shipped, summary
 from outrider.doctor.finding import Severity, Verdict

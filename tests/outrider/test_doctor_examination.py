@@ -16,7 +16,7 @@ from doctor_bench import TICK, Bench, autopilot, blocking, found, warnings
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.vehicle import PREARM_OK
+from companion.flight.vehicle import PREARM_OK
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_ID
 from mavlink_bridge.framing import CRC_EXTRA, frame_v1, frame_v2, leading_frames

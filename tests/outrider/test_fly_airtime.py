@@ -12,8 +12,8 @@ from companion_bench import TARGET, Bench, seen_at
 from said import Run
 from shipped import FIREFLY
 
-from companion.pilot import Phase
-from companion.readiness import GPS_RAW, HEALTH, STREAMS
+from companion.flight.readiness import GPS_RAW, HEALTH, STREAMS
+from companion.values.phase import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key

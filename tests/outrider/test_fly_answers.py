@@ -11,9 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.dry_run import ONLOOKER, DryRun
-from companion.node import COMPONENT, Companion
-from companion.orders import NAV_RETURN
-from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase
+from companion.flight.orders import NAV_RETURN
+from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
+from companion.node import Companion
+from companion.values.components import COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.followed_clock import FollowedClock

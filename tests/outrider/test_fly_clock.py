@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.config import CompanionConfig
-from companion.tracks import Track
+from companion.estimation.tracks import Track
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.followed_clock import FollowedClock
 from outrider.aboard.news import judgement

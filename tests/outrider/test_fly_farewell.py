@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from companion.autopilots.ardupilot import ARDUPILOT
-from companion.last_word import LastWord
+from companion.flight.autopilots.ardupilot import ARDUPILOT
+from companion.flight.hold_on_exit import LastWord
 from companion.node import Companion
-from companion.pilot import Phase
+from companion.values.phase import Phase
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.landing import Landing
+from companion.flight.landing import Landing
 from outrider.aboard.diary import Diary
 from outrider.aboard.figures import summary
 from outrider.aboard.flight import Flight

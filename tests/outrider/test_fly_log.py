@@ -16,7 +16,7 @@ import pytest
 from said import Ended, Run
 
 from companion import node
-from companion.setpoint import setpoint
+from companion.flight.setpoint import setpoint
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import LocalPosition, SetpointLocal
 from mavlink_bridge.tlog import TlogWriter, read_tlog

@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
 from companion.dry_run import DryRun
-from companion.node import COMPONENT, Companion
-from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase
-from companion.readiness import OPERATORS_GO
+from companion.flight.readiness import OPERATORS_GO
+from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
+from companion.node import Companion
+from companion.values.components import COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.followed_clock import FollowedClock

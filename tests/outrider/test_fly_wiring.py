@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
-from companion.node import COMPONENT
-from companion.reception import LINKS, accepts
+from companion.telemetry.reception import LINKS, accepts
+from companion.values.components import COMPONENT
 from mavlink_bridge.header import Header
 from outrider.aboard.wiring import wants
 

@@ -12,8 +12,8 @@ from pydantic import ValidationError
 from shipped import FIREFLY, LOGS, scenario
 from ways import bent_ring
 
-from companion.moving import MovingObstacles
-from companion.sharing import plan_message
+from companion.obstacles.moving import MovingObstacles
+from companion.telemetry.sharing import plan_message
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition, Message, Source, Tunnel

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.obstacles import FixedObstacles
+from companion.obstacles.static import FixedObstacles
 from outrider.errors import InputError
 from outrider.resources import config_root
 from outrider.scenario import Scenario

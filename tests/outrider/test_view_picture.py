@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shipped import SCENARIOS, scenario
 
-from companion.horizon import roll_out
+from companion.values.horizon import roll_out
 from outrider.viewing import shapes
 from outrider.viewing.moment import KNOTS, Moment, State, euler_attitude, nearest, padded
 from outrider.viewing.palette import VEHICLES, linear, rgb

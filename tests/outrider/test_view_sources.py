@@ -14,7 +14,7 @@ from said import Run
 from shipped import FIREFLY, LOGS
 from view_flights import small
 
-from companion.node import COMPONENT
+from companion.values.components import COMPONENT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.link import LinkCounters
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Source, Tunnel

@@ -10,8 +10,8 @@ import numpy as np
 import yaml
 from single_vehicle import BOOT, SITE, SYSTEM, TICK, SingleVehicle
 
-from companion.horizon import Array
-from companion.pilot import Phase
+from companion.values.horizon import Array
+from companion.values.phase import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import GlobalPosition, SetpointLocal, Source
 from mavlink_bridge.node import Datagram

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from companion.pilot import Phase
+from companion.values.phase import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.tlog import read_tlog

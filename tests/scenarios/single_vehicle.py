@@ -11,8 +11,9 @@ import numpy as np
 from lockstep_flights import FIREFLY
 
 from companion.config import CompanionConfig
-from companion.node import COMPONENT, Companion
-from companion.pilot import Phase
+from companion.node import Companion
+from companion.values.components import COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import (

@@ -11,10 +11,11 @@ import pytest
 from flight_facts import check_told, clock, log
 from lockstep_flights import Flown, check, fly, scenario, setpoints
 
-from companion.calls import DO_SET_MODE
-from companion.node import COMPONENT
-from companion.pilot import NAV_LAND, NAV_TAKEOFF, Phase
-from companion.takeoff import ARM_DISARM
+from companion.flight.command_protocol import DO_SET_MODE
+from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
+from companion.flight.takeoff import ARM_DISARM
+from companion.values.components import COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandInt, CommandLong
 from outrider.flight import EPOCH
 from outrider.names import LINK_NUMBERS

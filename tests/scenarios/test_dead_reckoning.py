@@ -8,7 +8,7 @@ import pytest
 from single_vehicle import SITE, SYSTEM, SingleVehicle
 
 from companion.config import CompanionConfig
-from companion.neighbours import Neighbours
+from companion.obstacles.neighbours import Neighbours
 from mavlink_bridge.doubt_wire import PAYLOAD_TYPE, unpack
 from mavlink_bridge.messages import GlobalPosition, Source, StatusText, Tunnel
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from lockstep_flights import FIREFLY, scenario
 
-from companion.earshot import Earshot
-from companion.neighbours import Neighbours
+from companion.obstacles.neighbours import Neighbours
+from companion.obstacles.relevance_filter import Earshot
 from outrider.flight import Flight
 from outrider.resources import config_root
 

@@ -11,9 +11,9 @@ import pytest
 from single_vehicle import LAND, OPERATOR, SITE, SYSTEM, TAKEOFF, TARGET, SingleVehicle
 
 from companion.dry_run import DryRun
-from companion.node import COMPONENT
-from companion.pilot import Phase
-from companion.readiness import OPERATORS_GO
+from companion.flight.readiness import OPERATORS_GO
+from companion.values.components import COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.messages import (
     CommandAck,
     CommandInt,

@@ -7,7 +7,7 @@ import pytest
 from single_vehicle import LAND, RETURN, SingleVehicle
 from test_slow_clock import go_to
 
-from companion.pilot import Phase
+from companion.values.phase import Phase
 
 
 def far_off(flavour, **settings):

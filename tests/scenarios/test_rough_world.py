@@ -18,7 +18,7 @@ import pytest
 from flight_facts import arrived, check_told, clock, figure, log, spoke
 from lockstep_flights import Flown, fly, scenario
 
-from companion.pilot import Phase
+from companion.values.phase import Phase
 from mavlink_bridge.messages import SetpointLocal, StatusText, Tunnel
 from outrider.conductor import NEAR
 from outrider.names import LINK_NUMBERS

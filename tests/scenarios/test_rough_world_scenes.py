@@ -11,7 +11,7 @@ import pytest
 from flight_facts import arrived, check_told, clock, log
 from lockstep_flights import FIREFLY, Flown, check, fly, scenario
 
-from companion.obstacles import FixedObstacles
+from companion.obstacles.static import FixedObstacles
 from mavlink_bridge.messages import GlobalPosition
 from outrider.names import LINK_NUMBERS
 from outrider.standoff import standoff

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from single_vehicle import LAND, MODE, OPERATOR, SYSTEM, SingleVehicle
 
-from companion.pilot import Phase
+from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandLong, SetpointLocal, SysStatus
 from sitl.flavours import Mode
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from single_vehicle import OPERATOR, RETURN, SITE, SYSTEM, SingleVehicle
 
-from companion.node import COMPONENT
-from companion.pilot import Phase
+from companion.values.components import COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandInt, GlobalPosition, Timesync
 
 

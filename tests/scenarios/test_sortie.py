@@ -77,7 +77,9 @@ def test_a_vehicle_without_a_companion_is_passed_by_companions_that_are_late(
     seed: int, fault: tuple[int, float], tmp_path: Path
 ) -> None:
     gone = {"faults": [{"kind": "vanish", "vehicle": fault[0], "at_s": fault[1]}]}
-    flown = fly(Scenario.model_validate(merged(merged(of(5, flavour="px4").model_dump(), LATE), gone)), seed, tmp_path)
+    flown = fly(
+        Scenario.model_validate(merged(merged(of(5, flavour="px4").model_dump(), LATE), gone)), seed, tmp_path
+    )
     assert flown.summary["failure"] is None
     assert flown.summary["min_separation_m"] >= 1.5
 

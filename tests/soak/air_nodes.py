@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from companion.node import COMPONENT, Companion
-from companion.pilot import NAV_TAKEOFF
+from companion.flight.state_machine import NAV_TAKEOFF
+from companion.node import Companion
+from companion.values.components import COMPONENT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandLong, Message, SetpointLocal, Source, StatusText

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from airfield import CONFIG, Craft
 
-from companion.pilot import Phase
-from companion.tracks import State
+from companion.estimation.tracks import State
+from companion.values.phase import Phase
 from mavlink_bridge.messages import SetpointLocal
 
 _SINGLE = 1e-4

@@ -22,9 +22,9 @@ from corpora import absurd_plan, frames, messages
 from damage import WIRE_EDITS, absurd, damaged, framed
 from recorded_logs import PIECES, SHIPPED, WHOLE
 
-from companion.node import COMPONENT
-from companion.pilot import Phase
-from companion.readiness import OPERATORS_GO
+from companion.flight.readiness import OPERATORS_GO
+from companion.values.components import COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.converters import BY_ID
 from mavlink_bridge.framing import leading_frames

@@ -22,9 +22,9 @@ from airfield import CONFIG, Airfield, Craft
 from mishaps import MISHAPS, NO_PLAN, OLD, UNHEARD, Mishap, Scene
 from setpoint_laws import SetpointLaws
 
-from companion.guard import Holding
-from companion.pilot import STEERED, Phase
-from companion.readiness import OPERATORS_GO
+from companion.flight.guard import Holding
+from companion.flight.readiness import OPERATORS_GO
+from companion.values.phase import STEERED, Phase
 from mavlink_bridge.messages import SetpointLocal
 
 LOOK = 100_000

@@ -11,9 +11,9 @@ from companion_bench import AUTOPILOT, FLEET, GROUND, LINKS, SYSTEM, TARGET, Ben
 from corpora import Known, absurd_plan, frames, messages
 from damage import WIRE_EDITS, absurd, damaged
 
-from companion.node import COMPONENT
-from companion.orders import UNSUPPORTED
-from companion.pilot import Phase
+from companion.flight.orders import UNSUPPORTED
+from companion.values.components import COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandAck, CommandLong, GpsGlobalOrigin, Message, SetpointLocal
 from mavlink_bridge.node import Datagram
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from companion.sharing import position_message
+from companion.telemetry.sharing import position_message
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.bearings import bearing
+from companion.avoidance.field.planner import Aim, Planner, standing
 from companion.config import CompanionConfig
-from companion.forces import Obstacles
-from companion.heading import Heading
-from companion.planner import Aim, Planner, standing
-from companion.setpoint import setpoint
-from companion.sharing import position_message
+from companion.flight.setpoint import setpoint
+from companion.goals.heading import Heading
+from companion.telemetry.sharing import position_message
+from companion.values.bearings import bearing
+from companion.values.obstacles import Obstacles
 from companion.world import World
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame

@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.bearings import bearing
-from companion.certified.committed import committed
-from companion.certified.flight import CertifiedFlight
+from companion.avoidance.certified.committed import committed
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.field.planner import Aim, standing
 from companion.config import CompanionConfig
-from companion.heading import Heading
-from companion.horizon import Array
-from companion.planner import Aim, standing
-from companion.setpoint import setpoint
+from companion.flight.setpoint import setpoint
+from companion.goals.heading import Heading
+from companion.values.bearings import bearing
+from companion.values.horizon import Array
 from companion.world import World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel

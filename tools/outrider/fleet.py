@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.bearings import bearing
+from companion.backup_node import Helm
 from companion.config import CompanionConfig
-from companion.helm import Helm
 from companion.node import Companion
+from companion.values.bearings import bearing
 from mavlink_bridge.ether import Channel, Faults
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.node_clock import NodeClock

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
-from companion.moving import MovingObstacles
-from companion.obstacles import FixedObstacles
-from companion.pilot import Phase
+from companion.obstacles.moving import MovingObstacles
+from companion.obstacles.static import FixedObstacles
 from companion.planning import Tally
+from companion.values.phase import Phase
 from mavlink_bridge.ether import Ether
 from mavlink_bridge.garbage import seldom_collected
 from mavlink_bridge.runtime import LockStep, Scheduled

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from companion.horizon import Horizon, roll_out
-from companion.sharing import plan_message
+from companion.telemetry.sharing import plan_message
+from companion.values.horizon import Horizon, roll_out
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.plan_wire import KNOTS

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.node import COMPONENT
-from companion.orders import DO_REPOSITION, NAV_RETURN
-from companion.pilot import NAV_LAND, NAV_TAKEOFF
+from companion.flight.orders import DO_REPOSITION, NAV_RETURN
+from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
+from companion.values.components import COMPONENT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Source

@@ -8,7 +8,8 @@ from typing import NamedTuple, get_args
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from companion.config import Avoidance, MethodName
+from companion.config.companion import Avoidance
+from companion.config.planning import MethodName
 from outrider.errors import InputError
 from outrider.scenario import FlavourName, Points, Scenario
 from outrider.schema_nodes import Schema

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from companion.plan_log import PlanLog
+from companion.avoidance.field.plan_log import PlanLog
 from companion.planning import Tally
 from outrider.scenario import Scenario
 from outrider.starts import Starts

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from companion.config import CompanionConfig, Moving, Obstacle
+from companion.config.companion import CompanionConfig, Moving, Obstacle
 from outrider.scenario_faults import Clocks, FaultPart
 from outrider.scenario_links import ROLES, AllLinks, PartitionPart
 from outrider.scenario_moving import MovingPart, clashes

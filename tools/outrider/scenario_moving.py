@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from companion.config import Moving, MovingPost, MovingSphere
+from companion.config.companion import Moving, MovingPost, MovingSphere
 from outrider.scenario_part import FIRST_MOVING, FIRST_SYSTEM, Coordinate, Length, Part, Position
 
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.moving import MovingObstacles
-from companion.obstacles import FixedObstacles
+from companion.obstacles.moving import MovingObstacles
+from companion.obstacles.static import FixedObstacles
 
 Array = NDArray[np.float64]
 SAMPLE = 20_000

@@ -6,8 +6,8 @@ from __future__ import annotations
 from typing import Final
 
 from companion.config import CompanionConfig
-from companion.readiness import HEALTH, STREAMS
-from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
+from companion.flight.readiness import HEALTH, STREAMS
+from companion.telemetry.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.endpoints import BAUD_RATES, Endpoint, Serial
 from mavlink_bridge.messages import (

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from companion.dry_run import DryRun
-from companion.last_word import LastWord
+from companion.flight.hold_on_exit import LastWord
 from companion.node import Companion
-from companion.pilot import STEERED, Phase
-from companion.voice import Severity
+from companion.telemetry.status_text import Severity
+from companion.values.phase import STEERED, Phase
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.node import Datagram

@@ -6,7 +6,7 @@ from collections import Counter
 from struct import Struct
 from typing import Final
 
-from companion.config import LimitsConfig
+from companion.config.planning import LimitsConfig
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.framing import leading_frames
 from mavlink_bridge.messages import SetpointLocal

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from companion.last_word import LastWord
+from companion.flight.hold_on_exit import LastWord
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.node import Datagram

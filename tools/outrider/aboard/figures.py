@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from companion.autopilots.known import KNOWN
+from companion.flight.autopilots.known import KNOWN
 from outrider.aboard.flight import Flight
 
 _NUMBER = 1

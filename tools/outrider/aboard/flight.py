@@ -14,12 +14,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from companion.dry_run import ONLOOKER
-from companion.landing import Landing
-from companion.last_word import LastWord
-from companion.node import COMPONENT
-from companion.pilot import Phase
-from companion.readiness import OPERATORS_GO
-from companion.reception import AUTOPILOT
+from companion.flight.hold_on_exit import LastWord
+from companion.flight.landing import Landing
+from companion.flight.readiness import OPERATORS_GO
+from companion.values.components import AUTOPILOT, COMPONENT
+from companion.values.phase import Phase
 from mavlink_bridge.clock import WallClock
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.signing import Signing

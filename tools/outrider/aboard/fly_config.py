@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from companion.config import CompanionConfig
-from companion.settings import Settings
+from companion.values.settings import Settings
 from mavlink_bridge.frames import FleetFrame
 
 System = Annotated[int, Field(ge=0, le=250)]

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from struct import Struct
 from typing import Final
 
-from companion.node import COMPONENT
-from companion.pilot import NAV_TAKEOFF
-from companion.reception import LINKS
+from companion.flight.state_machine import NAV_TAKEOFF
+from companion.telemetry.reception import LINKS
+from companion.values.components import COMPONENT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.framing import Frame, leading_frames
 from mavlink_bridge.messages import CommandAck, Source

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections import Counter
 from math import dist, hypot, inf, isfinite, pi
 
-from companion.config import HeadingConfig, LimitsConfig
-from companion.setpoint import FRAME_LOCAL_NED, is_finite
+from companion.config.planning import HeadingConfig, LimitsConfig
+from companion.flight.setpoint import FRAME_LOCAL_NED, is_finite
 from mavlink_bridge.messages import SetpointLocal, Vector
 
 TOGETHER = 100_000

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from companion.autopilots import Profile
-from companion.autopilots.known import KNOWN, profile_of
-from companion.reception import AUTOPILOT
-from companion.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
+from companion.flight.autopilots import Profile
+from companion.flight.autopilots.known import KNOWN, profile_of
+from companion.telemetry.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
+from companion.values.components import AUTOPILOT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import Heartbeat, Source

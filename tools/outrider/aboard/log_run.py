@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from companion.autopilots import Profile
-from companion.autopilots.known import KNOWN, profile_of
-from companion.reception import AUTOPILOT
-from companion.sharing import AUTOPILOT_INVALID
+from companion.flight.autopilots import Profile
+from companion.flight.autopilots.known import KNOWN, profile_of
+from companion.telemetry.sharing import AUTOPILOT_INVALID
+from companion.values.components import AUTOPILOT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.messages import Heartbeat

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from companion.dry_run import DryRun
-from companion.landing import Landing
-from companion.pilot import Phase
-from companion.readiness import OPERATORS_GO
-from companion.vehicle import Vehicle
-from companion.watch import Concern
+from companion.flight.health_monitor import Concern
+from companion.flight.landing import Landing
+from companion.flight.readiness import OPERATORS_GO
+from companion.flight.vehicle import Vehicle
+from companion.values.phase import Phase
 from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.histogram import Histogram

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 
-from companion.calls import ACCEPTED
-from companion.node import COMPONENT
-from companion.orders import NAV_LOITER_UNLIM, NAV_RETURN
-from companion.pilot import NAV_LAND, NAV_TAKEOFF
-from companion.reception import LINKS
+from companion.flight.command_protocol import ACCEPTED
+from companion.flight.orders import NAV_LOITER_UNLIM, NAV_RETURN
+from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
+from companion.telemetry.reception import LINKS
+from companion.values.components import COMPONENT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import CommandLong, Source
 from mavlink_bridge.signing import Signing

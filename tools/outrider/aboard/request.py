@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from companion.target_source import GlobalPositionSource
+from companion.config.target_source import GlobalPositionSource
 from mavlink_bridge.errors import EndpointError
 from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Endpoint, Replay, parse_endpoint

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import Final
 
-from companion.node import COMPONENT
+from companion.values.components import COMPONENT
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.framing import leading_frames
 from mavlink_bridge.header import Header

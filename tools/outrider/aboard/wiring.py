@@ -6,8 +6,8 @@ from contextlib import ExitStack
 from typing import NamedTuple
 
 from companion.config import CompanionConfig
-from companion.node import COMPONENT
-from companion.reception import AUTOPILOT, accepts
+from companion.telemetry.reception import accepts
+from companion.values.components import AUTOPILOT, COMPONENT
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.errors import LinkError, LogError
 from mavlink_bridge.header import Header

@@ -11,7 +11,7 @@ from enum import Enum
 from itertools import zip_longest
 from typing import NamedTuple
 
-from companion.certified.committed import carried_on, rests
+from companion.avoidance.certified.committed import carried_on, rests
 from mavlink_bridge.plan_wire import WirePlan, pack
 from outrider.certify.evidence import Finding, Log, Sighting, Terms
 

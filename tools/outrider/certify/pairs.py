@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.certified.committed import carried_on, controls
-from companion.certified.corridor import hull_distance
-from companion.horizon import Array
+from companion.avoidance.certified.committed import carried_on, controls
+from companion.avoidance.certified.separating_planes import hull_distance
+from companion.values.horizon import Array
 from mavlink_bridge.plan_wire import WirePlan
 from outrider.certify.evidence import Finding, Terms
 from outrider.certify.histories import History, Kind

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import Final, NamedTuple
 
-from companion.autopilots.limits import STOCK, Limits, limits_of, stock_parameters
+from companion.flight.autopilots.limits import STOCK, Limits, limits_of, stock_parameters
 from outrider.aboard.fly_config import FlyConfig
 from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
 from outrider.doctor.finding import Finding, Severity

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from companion.autopilots import Profile
+from companion.flight.autopilots import Profile
 from mavlink_bridge.messages import ParamValue, Source
 from mavlink_bridge.param_value import number_of
 from outrider.doctor.hearing import Hearing

@@ -7,7 +7,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as dialect
 
-from companion.vehicle import PREARM_OK
+from companion.flight.vehicle import PREARM_OK
 from mavlink_bridge.messages import BatteryStatus, SysStatus
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from companion.vehicle import IN_AIR, ON_GROUND
+from companion.flight.vehicle import IN_AIR, ON_GROUND
 from mavlink_bridge.messages import AutopilotVersion, ExtendedSysState, Heartbeat
 from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
 from outrider.doctor.finding import Finding, Severity

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from companion.vehicle import INVALID
+from companion.flight.vehicle import INVALID
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 from outrider.doctor.hearing import MOST, SETPOINTS, Hearing

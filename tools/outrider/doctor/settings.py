@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from companion.autopilots.limits import stock_parameters
+from companion.flight.autopilots.limits import stock_parameters
 from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
 from outrider.doctor.finding import Finding, Severity
 from outrider.doctor.rule import Rule

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Final, TypeVar, cast
 
-from companion.vehicle import INVALID, PREARM_OK, Vehicle
+from companion.flight.vehicle import INVALID, PREARM_OK, Vehicle
 from mavlink_bridge.framing import Frame
 from mavlink_bridge.messages import (
     Attitude,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from companion.readiness import STREAMS
+from companion.flight.readiness import STREAMS
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 

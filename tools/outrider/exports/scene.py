@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from companion.config import Obstacle
-from companion.obstacles import Post
+from companion.config.companion import Obstacle
+from companion.config.obstacles import Post
 from outrider.errors import InputError
 from outrider.exports import foxglove, foxglove_schemas
 from outrider.exports.arrays import Array, Motion

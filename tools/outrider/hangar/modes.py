@@ -6,8 +6,8 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as dialect
 
-from companion.autopilots.ardupilot import ARDUPILOT
-from companion.vehicle import ARMED
+from companion.flight.autopilots.ardupilot import ARDUPILOT
+from companion.flight.vehicle import ARMED
 from mavlink_bridge.messages import Heartbeat
 
 _PREFIX: Final = "COPTER_MODE_"

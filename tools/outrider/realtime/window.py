@@ -11,7 +11,7 @@ import mmap
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.config import MethodName
+from companion.config.planning import MethodName
 from outrider.viewing.glimpse import MODES, Glimpse
 from outrider.viewing.moment import KNOTS, Array, State
 from outrider.viewing.orders import Change

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from companion.avoidance.field.plan_log import PlanLog
 from companion.node import Companion
-from companion.pilot import Phase
-from companion.plan_log import PlanLog
 from companion.planning import Tally
+from companion.values.phase import Phase
 from mavlink_bridge.clock import Clock
 from mavlink_bridge.garbage import IdleCollector
 from mavlink_bridge.histogram import Histogram

@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.node import COMPONENT
-from companion.reception import AUTOPILOT
+from companion.values.components import AUTOPILOT, COMPONENT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.header import header

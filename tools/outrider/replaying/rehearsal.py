@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from companion.config import CompanionConfig
-from companion.understudy import Understudy
+from companion.shadow import Understudy
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.followed_clock import FollowedClock

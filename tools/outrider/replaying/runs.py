@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.node import COMPONENT
+from companion.values.components import COMPONENT
 from mavlink_bridge.tlog import read_tlog
 from outrider import names
 from outrider.errors import Fault, InputError

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.moving import MovingObstacles
-from companion.obstacles import FixedObstacles
+from companion.obstacles.moving import MovingObstacles
+from companion.obstacles.static import FixedObstacles
 from outrider.report.run import Array, Motions
 from outrider.scenario import Scenario
 

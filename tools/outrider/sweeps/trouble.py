@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, JsonValue, model_validator
 
-from companion.certified.settings import CertifiedConfig
+from companion.config.certified import CertifiedConfig
 from outrider.scenario_part import FIRST_SYSTEM, Part, Share
 
 Milliseconds = Annotated[float, Field(ge=0.0, le=5_000.0)]

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.guard import Holding
+from companion.flight.guard import Holding
 from companion.node import Companion
-from companion.pilot import Phase
+from companion.values.phase import Phase
 from outrider.viewing.moment import NO_PLAN, Single, State, padded
 
 _HELD = {Holding.HELD: ", old plan", Holding.BRAKING: ", braking"}

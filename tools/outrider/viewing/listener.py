@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.certified.committed import horizon_of
+from companion.avoidance.certified.committed import horizon_of
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu, yaw_to_enu

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.certified.corridor import nearest
+from companion.avoidance.certified.separating_planes import nearest
 from outrider.viewing.moment import Array, Single
 
 NEAR = 8.0

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.certified.committed import horizon_of
-from companion.reception import AUTOPILOT
-from companion.vehicle import HEARTBEAT_LOST
+from companion.avoidance.certified.committed import horizon_of
+from companion.flight.vehicle import HEARTBEAT_LOST
+from companion.values.components import AUTOPILOT
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, Source, Tunnel

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.config import Obstacle
+from companion.config.companion import Obstacle
 from outrider.scenario import FixedTarget, Scenario
 from outrider.scenario_moving import MovingPostPart
 from outrider.starts import starts

@@ -10,7 +10,7 @@ import json
 import math
 from typing import NamedTuple
 
-from companion.config import MethodName
+from companion.config.planning import MethodName
 from outrider.options import METHODS
 
 FASTEST = 100.0

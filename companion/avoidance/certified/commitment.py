@@ -1,0 +1,182 @@
+"""The committed plan of one vehicle from epoch to epoch: who is held, who replans, what is told.
+
+In the epoch that begins at t_e every vehicle flies its plan of t_e and makes that of t_{e+1}: by solving, as
+soon as it holds the plans of t_e of all it counts with; or, when the epoch is nearly over, by carrying its
+own on. Either way the plan of t_{e+1} is told, and told again until the next one is. Delivery is never needed
+for safety, only for progress.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+
+from companion.avoidance.certified.committed import (
+    carried_on,
+    committed,
+    controls,
+    horizon_of,
+    resting,
+    rounding,
+)
+from companion.avoidance.certified.deadlock import StallTurn
+from companion.avoidance.certified.qp import Program, State, Wish
+from companion.avoidance.certified.separating_planes import Others, planes
+from companion.config.certified import CertifiedConfig
+from companion.errors import CertificateError, CompanionError, SolverError
+from companion.values.horizon import Array, Horizon, Motion
+from mavlink_bridge.plan_wire import WirePlan, quantise
+
+
+class Why(Enum):
+    """Why a plan was carried on instead of made anew."""
+
+    MISSING = "a plan of somebody who counts has not arrived"
+    CLOCK = "the clock of somebody who counts is wrong, or our own"
+    UNSOLVED = "no plan that keeps all planes was found"
+
+
+class Keeper:
+    """Owns ``current``, the plan that is flown, and ``following``, that of the next epoch once it is made.
+
+    ``epoch`` (µs): a whole number of knots. ``program`` and ``stall`` make plans; what they must keep away
+    from is given with each.
+    """
+
+    def __init__(
+        self,
+        config: CertifiedConfig,
+        program: Program,
+        stall: StallTurn,
+        origin: int,
+        *,
+        planar: bool = False,
+    ) -> None:
+        self._config, self._program, self._stall, self._origin = config, program, stall, origin
+        self._planar = planar
+        self._rounding = rounding(program.n, config.dt_us)
+        self.told_until = 0
+        """The last epoch (µs) of which a plan was told."""
+        self.current: WirePlan | None = None
+        # What is made of ``current``, and of both plans, is asked for several times.
+        self._ahead: tuple[WirePlan, WirePlan, Array] | None = None
+        self._flown: tuple[WirePlan, WirePlan | None, Horizon] | None = None
+        self.following: WirePlan | None = None
+        self.held: dict[Why, int] = dict.fromkeys(Why, 0)
+        self.anchored_anew = 0
+
+    def epoch(self, now: int) -> int:
+        """The beginning (µs) of the epoch that holds ``now``."""
+        return now - now % self._config.epoch_us
+
+    def begin(self, now: int, position: Array) -> None:
+        """Stand at ``position`` (3,) m; what is told is the plan of the next epoch of which nothing else has
+        been told."""
+        epoch, steps = self.epoch(now), self._program.n
+        self.current = resting(epoch, self._config.dt_us, steps, position, self._origin)
+        free = max(epoch, self.told_until) + self._config.epoch_us
+        self.following = self.current._replace(epoch=free)
+
+    def turn(self, now: int) -> bool:
+        """Go on to the epoch that holds ``now``. True if its follower is still to be made."""
+        epoch = self.epoch(now)
+        if self.following is not None and self.following.epoch <= epoch:
+            self.current, self.following = self.following, None
+        if self.current is not None and self.current.epoch < epoch:
+            # Nothing was made or told in the meantime: nobody can have counted on anything else.
+            self.current = carried_on(self.current, (epoch - self.current.epoch) // self.current.dt)
+        return self.current is not None and self.following is None
+
+    def last_call(self, now: int) -> bool:
+        """Whether the epoch is so nearly over that nothing is waited for any more."""
+        return now + self._config.last_call_us >= self.epoch(now) + self._config.epoch_us
+
+    def carry_on(self, why: Why) -> None:
+        """Fly on in the next epoch as committed."""
+        self.following = self.start()
+        self.held[why] += 1
+
+    def own(self) -> Array:
+        """Control points (n, 3, 3) of the committed plan from the next epoch on, m."""
+        return self._carried()[1]
+
+    def start(self) -> WirePlan:
+        """The committed plan from the next epoch on: where the next plan begins. CompanionError without
+        one."""
+        return self._carried()[0]
+
+    def replan(self, wish: Wish, goal: Array, others: Others) -> bool:
+        """Make the next epoch's plan; False if none was found and the old one is carried on."""
+        start, own = self._carried()
+        corridor = planes(own, others, self._config.spare, upright=self._planar)
+        state = State(start.position_m, start.velocity_m_s, self._flown_until(), start.accelerations_m_s2)
+        # Where there is no room, rounding breaks what is just kept: then a little more is asked for.
+        firmly = np.maximum(corridor.wanted, corridor.least + self._rounding)
+        for asked in (corridor, corridor._replace(wanted=firmly)):
+            try:
+                answer = self._program.solve(state, wish, asked)
+                plan = committed(start, answer.accelerations)
+            except (SolverError, CertificateError):
+                continue
+            points = controls(plan)
+            # What was rounded is what is checked: the plan that the others will hold.
+            kept = np.einsum("mnk,nik->mni", corridor.normals, points) - corridor.least
+            if kept.min(initial=np.inf) >= 0.0:
+                push = np.einsum("mni,mnk->k", answer.pressure, corridor.normals)
+                self._stall.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
+                self.following = plan
+                return True
+        self.carry_on(Why.UNSOLVED)
+        return False
+
+    def anchor(self, now: int, measured: Motion) -> None:
+        """Plan the next epoch anew from the ``measured`` motion, to rest: after a jump or a push that left
+        the tube. What is between two such plans is not certified."""
+        begins = self.epoch(now) + self._config.epoch_us
+        left = 1e-6 * (begins - now)
+        n, dt = self._program.n, 1e-6 * self._config.dt_us
+        start = quantise(
+            begins,
+            self._config.dt_us,
+            measured.position + left * measured.velocity,
+            measured.velocity,
+            np.zeros((n, 3)),
+            self._origin,
+        )
+        slowing = np.repeat(-start.velocity_m_s[None] / ((n - 1) * dt), n, axis=0)
+        slowing[-1] = 0.0
+        self.following = committed(start, slowing)
+        self.anchored_anew += 1
+
+    def horizon(self) -> Horizon | None:
+        """What is flown from now on: this epoch's plan, and the next one's where it is made."""
+        if self.current is None:
+            return None
+        if self._flown is None or self._flown[0] is not self.current or self._flown[1] is not self.following:
+            horizon = horizon_of(self.current)
+            if self.following is not None:
+                first, rest = horizon.knots[: self._config.knots], horizon_of(self.following).knots
+                horizon = horizon._replace(knots=np.vstack([first, rest]))
+            self._flown = self.current, self.following, horizon
+        return self._flown[2]
+
+    def told(self) -> WirePlan | None:
+        """The plan that others are to know now."""
+        return self.current if self.following is None else self.following
+
+    def _flown_until(self) -> Array:
+        """The acceleration (3,) with which this epoch ends."""
+        if self.current is None:
+            return np.zeros(3)
+        result: Array = self.current.accelerations_m_s2[self._config.knots - 1]
+        return result
+
+    def _carried(self) -> tuple[WirePlan, Array]:
+        """The committed plan from the next epoch on, and its control points."""
+        if self.current is None:
+            raise CompanionError("there is no committed plan yet")
+        if self._ahead is None or self._ahead[0] is not self.current:
+            plan = carried_on(self.current, self._config.knots)
+            self._ahead = self.current, plan, controls(plan)
+        return self._ahead[1:]

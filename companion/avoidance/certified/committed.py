@@ -1,0 +1,90 @@
+"""Committed plans: integer trajectories on absolute knots that end at rest, so that each is valid for ever.
+
+With positions in units of ½ A dt² and velocities in A dt (A = 1 mm/s²; see ``mavlink_bridge.plan_wire``) the
+motion over a knot is p' = p + 2v + a, v' = v + a, and the segment between is the quadratic Bézier curve with
+the control points p, p + v, p'. All of it is exact in integers: moving on by a knot, coming to rest, and what
+a receiver makes of the bytes.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.errors import CertificateError
+from companion.values.horizon import Array, Horizon
+from mavlink_bridge.plan_wire import Integers, WirePlan, quantise
+
+_MM = 1e-3
+
+
+def resting(epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: int) -> WirePlan:
+    """To stand at ``position`` (3,) m (rounded to the wire) from ``epoch`` (µs) on."""
+    return quantise(epoch, dt, position, np.zeros(3), np.zeros((steps, 3)), origin)
+
+
+def rests(plan: WirePlan) -> bool:
+    """Whether it ends at rest, exactly."""
+    return all(v + sum(a) == 0 for v, a in zip(plan.velocity, _by_axis(plan), strict=True))
+
+
+def carried_on(plan: WirePlan, knots: int) -> WirePlan:
+    """The same motion from ``knots`` (≥ 0) later on, as long as before: what is missing at its end is rest.
+
+    Raises CertificateError for a plan that does not end at rest.
+    """
+    if not rests(plan):
+        raise CertificateError("a plan that does not end at rest cannot be carried on")
+    steps = len(plan.accelerations)
+    later = plan.shifted(min(knots, steps))
+    missing = steps - len(later.accelerations)
+    return later._replace(
+        epoch=plan.epoch + knots * plan.dt, accelerations=later.accelerations + ((0, 0, 0),) * missing
+    )
+
+
+def committed(start: WirePlan, accelerations: Array) -> WirePlan:
+    """The plan from the state that ``start`` begins with, with ``accelerations`` (n, 3) m/s² rounded to the
+    wire; the last one is what brings it to rest exactly.
+
+    Raises CertificateError if one is not finite.
+    """
+    if not np.isfinite(accelerations).all():
+        raise CertificateError("an acceleration is not finite")
+    rounded = np.rint(accelerations / _MM).astype(np.int64)
+    rounded[-1] = -np.array(start.velocity) - rounded[:-1].sum(axis=0)
+    knots: tuple[Integers, ...] = tuple((x, y, z) for x, y, z in rounded.tolist())
+    return start._replace(accelerations=knots)
+
+
+def rounding(steps: int, dt: int) -> Array:
+    """How far (n, 3) m rounding moves the control points of a plan, at most: half a unit an acceleration."""
+    n = np.arange(steps)
+    units = np.stack([n**2, n**2 + n, (n + 1) ** 2], axis=1)
+    result: Array = 0.25 * sqrt(3.0) * _MM * (dt * 1e-6) ** 2 * units
+    return result
+
+
+def controls(plan: WirePlan) -> Array:
+    """Control points (n, 3, 3) of the segments, m, fleet-local ENU."""
+    states = plan.states()
+    position, velocity = states[:, 0], states[:, 1]
+    points = np.stack([position[:-1], position[:-1] + velocity[:-1], position[1:]], axis=1)
+    return points * (0.5 * _MM * (plan.dt * 1e-6) ** 2)
+
+
+def horizon_of(plan: WirePlan) -> Horizon:
+    """The plan as a horizon, in metres; beyond its end it rests."""
+    states = plan.states()
+    seconds = plan.dt * 1e-6
+    knots = np.zeros((len(states), 9))
+    knots[:, 0:3] = states[:, 0] * (0.5 * _MM * seconds**2)
+    knots[:, 3:6] = states[:, 1] * (_MM * seconds)
+    knots[:-1, 6:9] = plan.accelerations_m_s2
+    return Horizon(plan.epoch, plan.dt, knots)
+
+
+def _by_axis(plan: WirePlan) -> list[list[int]]:
+    return [[a[axis] for a in plan.accelerations] for axis in range(3)]

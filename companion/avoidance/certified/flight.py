@@ -1,0 +1,172 @@
+"""The certified mode of one companion: what it hears and tells of plans, and when it makes the next one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.avoidance.certified.clocks import ClockWatch
+from companion.avoidance.certified.commitment import Keeper, Why
+from companion.avoidance.certified.constraint_sources import Surroundings
+from companion.avoidance.certified.deadlock import StallTurn
+from companion.avoidance.certified.peer_plans import Ledger
+from companion.avoidance.certified.qp import Program, Wish
+from companion.avoidance.field.planner import Aim
+from companion.config import CompanionConfig
+from companion.values.horizon import Array, Horizon, Motion
+from companion.world import View, World
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack
+from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.roster_wire import Roster
+from mavlink_bridge.roster_wire import pack as pack_roster
+from mavlink_bridge.roster_wire import unpack as unpack_roster
+
+_SENSES = {"left": -1.0}
+
+
+class CertifiedFlight:
+    """Committed plans, the others' plans and the surroundings, put together for one vehicle."""
+
+    def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
+        certified, steps = config.certified, config.horizon.steps + 1
+        self._config, self._own = config, own
+        program = Program(
+            steps, config.limits.within(config.field.margin(1)), certified, planar=config.planar
+        )
+        self._stall = StallTurn(certified.stall, program.pull, _SENSES.get(config.turning_sense, 1.0))
+        self.keeper = Keeper(certified, program, self._stall, fleet.fingerprint, planar=config.planar)
+        self.ledger = Ledger(
+            own.system,
+            frozenset(certified.fleet),
+            steps,
+            certified.dt_us,
+            certified.epoch_us,
+            fleet.fingerprint,
+        )
+        self.clocks = ClockWatch(own, certified.clock_us)
+        self._replies: list[Timesync] = []
+        self._surroundings = Surroundings(config, steps)
+        seconds = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
+        self._before_end: Array = seconds - seconds[-1]
+        self._steps = steps
+        self.off = self.excursion = 0.0
+        """Distance (m) of the vehicle from its plan, now and at most."""
+        self.left_tube = 0
+        """How often it got out of the tube."""
+        self._outside = self._steers = self._told = False
+        self._asked: int | None = None
+        self._next_told = 0
+        self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
+        """From now to the end of the plan that is made next, s, at most."""
+
+    def hear(self, now: int, message: Tunnel | Timesync) -> None:
+        """A TUNNEL or TIMESYNC on the swarm link."""
+        system = message.source.system
+        if isinstance(message, Timesync):
+            self._replies += self.clocks.hear(now, message)
+            return
+        if message.payload_type == PAYLOAD_TYPE:
+            self.ledger.hear_plan(now, system, message.payload)
+        elif message.payload_type == ROSTER:
+            try:
+                self.ledger.hear_roster(now, system, unpack_roster(message.payload))
+            except PlanWireError:
+                self.ledger.refused += 1
+
+    def stand(self, now: int, position: Array) -> None:
+        """Not steering, not yet or just again: the plan is to stand at ``position`` (3,), and nobody is told
+        before it steers. But a plan in whose tube the vehicle still is goes on, and so does one that was told
+        for this epoch: others count on it. To leave one that was told before is to plan anew."""
+        self._asked = now
+        keeper, horizon = self.keeper, self.keeper.horizon()
+        if horizon is not None:
+            off = horizon.at(now).position - position
+            inside = float(off @ off) <= self._config.certified.tube**2
+            if inside or keeper.told_until >= keeper.epoch(now):
+                keeper.turn(now)
+                return
+        keeper.begin(now, position)
+        keeper.anchored_anew += self._told
+        self._steers = self._told = False
+
+    def due(self, now: int) -> bool:
+        """Whether the next epoch's plan is to be made now, one way or the other. Carries on by itself what
+        cannot wait any longer."""
+        self._asked, self._steers = now, True
+        if not self.keeper.turn(now):
+            return False
+        wrong = not self.clocks.wrong.isdisjoint(self.ledger.members)
+        if not wrong and not self.ledger.missing(self.keeper.epoch(now)):
+            return True
+        if self.keeper.last_call(now):
+            self.keeper.carry_on(Why.CLOCK if wrong else Why.MISSING)
+        return False
+
+    def watch(self, now: int, measured: Motion) -> None:
+        """Note how far the vehicle is from its plan. Outside the tube the promise rests; the plan stays, for
+        the autopilot finds back to it."""
+        horizon = self.keeper.horizon()
+        if horizon is None:
+            return
+        off = horizon.at(now).position - measured.position
+        self.off = float(np.sqrt(off @ off))
+        self.excursion = max(self.excursion, self.off)
+        outside = self.off > self._config.certified.tube
+        self.left_tube += outside and not self._outside
+        self._outside = outside
+
+    @property
+    def lost(self) -> bool:
+        """Whether the vehicle is so far from its plan that it has to be planned anew from where it is."""
+        return self.off > self._config.guard.tube
+
+    def plan(self, now: int, aim: Aim, world: World, view: View) -> bool:
+        """Make the next epoch's plan towards ``aim``, whose end is where this plan ends."""
+        keeper = self.keeper
+        start = keeper.start()
+        own = keeper.own()
+        others, field = self._surroundings.around(now, keeper.epoch(now), own, self.ledger, world, view)
+        goal = self._stall.turned(start.position_m, aim.destination)
+        places = goal + self._before_end[:, None] * aim.velocity
+        wish = Wish(places, np.broadcast_to(aim.velocity, places.shape), field)
+        return keeper.replan(wish, aim.destination, others)
+
+    def idle(self, now: int) -> bool:
+        """Whether there is nothing to make or to tell until something else is due."""
+        following = self.keeper.following
+        waiting = following is not None and now < following.epoch and now < self._next_told
+        return waiting and not self._replies
+
+    def horizon(self) -> Horizon | None:
+        """What is flown."""
+        return self.keeper.horizon()
+
+    def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
+        """What is to be told on the swarm link now: the newest plan, at once and then from time to time, and
+        whom it was made with. ``farewell``: it makes no other; that is said once it flies the last. Without
+        that a plan that is not flown is not told: it steers no more that was not asked at ``now`` either
+        whether a plan is ``due``, or to ``stand``."""
+        sync: list[Message] = [*self._replies, *self.clocks.due(now)]
+        self._replies.clear()
+        if farewell:
+            self.keeper.turn(now)
+            farewell = self.keeper.following is None
+        elif self._asked != now:
+            self._steers = False
+        told = self.keeper.told()
+        if told is None or not (self._steers or farewell):
+            return sync
+        if told.epoch == self.keeper.told_until and now < self._next_told:
+            return sync
+        self.keeper.told_until, self._next_told = told.epoch, now + self._config.certified.repeat_us
+        self._told = True
+        if farewell:
+            self.ledger.leave(told.epoch)
+        roster = Roster(told.epoch, self.ledger.members, farewell)
+        return [
+            *sync,
+            Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(told)),
+            Tunnel(self._own, 0, 0, ROSTER, pack_roster(roster)),
+        ]

@@ -1,0 +1,106 @@
+"""The repulsive potential field of the paper, eqs. (8) and (9), over the whole horizon.
+
+F(d) = K · (π/2)/(d_safe − d_min) · (cot z + z − π/2),  z = (π/2)(d − d_min)/(d_safe − d_min)
+
+Settled against the text: the force points *away* from the obstacle (the printed α points towards it); below
+d_min the formula turns negative, so it is clamped there, far above what the vehicle has. It is the sum that
+is limited to a_total, not its parts, or one that pushes from behind would cancel one that is about to be hit.
+
+Closing speed. From d_safe = 3 m the bare field cannot stop two vehicles that meet at 5 m/s each: that takes
+about 10 m/s² net. So the distance that enters F is what would be left after braking, d − ċ²/(2 a_rel) with ċ
+the speed of closing and a_rel the relative deceleration to count on. At rest this is the paper's field; when
+closing fast its reach grows with the square of the speed, and d_min is approached no faster than can be
+braked. With bounded jerk a vehicle brakes late: ``reaction`` seconds of closing are taken off, too. Who moves
+away has as much to spare, up to twice its distance from d_min: a field that pushes as hard on the way out as
+on the way in flings vehicles out of every encounter. ``braking=None`` is the paper's field alone.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+from companion.values.horizon import Array
+from companion.values.obstacles import Obstacles
+
+_CLOSES = 1.0
+"""m/s."""
+_NEAR = 1e-6
+"""Below this distance (m) no direction is away; the force then points along +x rather than nowhere."""
+
+
+def magnitude(distance: Array, d_min: Array, d_safe: Array, gain: float, clamp: float) -> Array:
+    """F_hyp(d), m/s², the shapes broadcast: 0 from d_safe on, continuous, falling, ``clamp`` at and below
+    d_min."""
+    width = d_safe - d_min
+    z = np.minimum(np.maximum((0.5 * pi) * (distance - d_min) / width, 1e-9), 0.5 * pi)
+    force: Array = np.minimum((gain * 0.5 * pi) * (1.0 / np.tan(z) + z - 0.5 * pi) / width, clamp)
+    return np.maximum(force, 0.0, out=force)
+
+
+def repulsion(
+    own: Array,
+    obstacles: Obstacles,
+    gain: float,
+    clamp: float,
+    braking: float | None,
+    dt: float,
+    reaction: float = 0.0,
+    turn: float = 0.0,
+) -> Array:
+    """Σ_j F_rep (N + 1, 3) on the own predicted positions (N + 1, 3), each source clamped to ``clamp`` m/s².
+
+    ``braking`` is a_rel (m/s²) of the module's docstring, ``reaction`` (s) what passes until it brakes,
+    ``dt`` (s) the step between the predicted positions. ``turn`` (rad, counter-clockwise from above): by
+    so much the force of an obstacle is turned that closes at ``_CLOSES`` or faster, by less of a slower one.
+    """
+    if not obstacles.ids:
+        return np.zeros_like(own)
+    away = own - obstacles.positions
+    distance = np.sqrt(np.vecdot(away, away))
+    reserve = distance
+    if braking is not None:
+        spare = np.maximum(distance - obstacles.d_min[:, None], 0.0)
+        reserve = distance - np.maximum(stopping_distance(distance, braking, dt, reaction), -spare)
+    if (reserve >= obstacles.d_safe[:, None]).all():
+        return np.zeros_like(own)
+    force = magnitude(reserve, obstacles.d_min[:, None], obstacles.d_safe[:, None], gain, clamp)
+    near = distance < _NEAR
+    if near.any():
+        away[near] = (1.0, 0.0, 0.0)
+        distance[near] = 1.0
+    if turn:
+        away = _turned(away, turn * np.clip(closing_speed(distance, dt) / _CLOSES, 0.0, 1.0))
+    result: Array = np.einsum("jn,jni->ni", force / distance, away)
+    return result
+
+
+def _turned(away: Array, angle: Array) -> Array:
+    """Vectors (M, N + 1, 3) turned about the vertical by ``angle`` (M, N + 1)."""
+    c, s = np.cos(angle), np.sin(angle)
+    turned = away.copy()
+    turned[..., 0] = c * away[..., 0] - s * away[..., 1]
+    turned[..., 1] = s * away[..., 0] + c * away[..., 1]
+    return turned
+
+
+def closing_speed(distance: Array, dt: float) -> Array:
+    """How fast distances (M, N + 1) shrink, m/s; negative where they grow."""
+    closing = np.empty_like(distance)
+    np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
+    closing[:, -1] = closing[:, -2]
+    closing /= dt
+    return closing
+
+
+def stopping_distance(distance: Array, braking: float, dt: float, reaction: float = 0.0) -> Array:
+    """ċ²/(2 a_rel) + ċ·``reaction`` (M, N + 1) from predicted distances (M, N + 1), with ċ their rate;
+    negative where they grow."""
+    closing = np.empty_like(distance)
+    np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
+    closing[:, -1] = closing[:, -2]
+    result: Array = closing * np.abs(closing) * (0.5 / (braking * dt**2))
+    if reaction:
+        result += closing * (reaction / dt)
+    return result

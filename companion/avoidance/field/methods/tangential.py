@@ -1,0 +1,181 @@
+"""Tangential band (Sec. III-C.3): inside a band around an obstacle a force about its centre acts, and Ω_t is
+lowered.
+
+F_tang(0) = k_tang ‖∇J‖ α̂,  α̂ ⊥ α, the same for the whole horizon.
+
+Settled against the text. The gradient is its norm divided by Ω_t. The band reaches from the obstacle to
+d_safe + d_band and further for one that comes fast (``reach_s`` times the closing speed): turning aside
+takes time, not distance. The force grows from zero at the band's edge, quickly up to u_max − the input
+cancels so much of it − and then up to ``force_max`` at ``d_full``. It acts only about obstacles that stand
+in the way: ahead, fading out from 60° off the bow to abeam, so that the band is left once the obstacle is
+passed; and not beyond the destination, fading out over d_safe; and not when the vehicle has all but
+arrived. The sense is latched per obstacle for as long as the encounter lasts, otherwise it chatters when
+the bearing crosses zero. Obstacles with no way between them (``gap``) are passed as one, with one sense:
+about each with its own, a vehicle before a U would be sent between its ends.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from companion.avoidance.field.methods import Influence, Scene
+from companion.avoidance.field.methods.fading import reserve, share, shares
+from companion.config.planning import TangentialConfig, TurningSense
+from companion.values.horizon import Array
+from companion.values.obstacles import Obstacles
+
+_ABEAM = 0.5
+"""Cosine of the bearing off the bow at which the force is whole; it vanishes abeam."""
+_STEEP = 2.0
+"""One over the cosine of the elevation up to which the force is whole; it vanishes overhead."""
+_QUICK = 10.0
+"""How much faster the force grows up to u_max than beyond."""
+_NEAR = 1e-6
+_THERE, _ON_THE_WAY = 0.5, 1.5
+"""m to go: who has less than the first goes round nobody, from the second on the force is whole. In a moving
+formation the way to go is tenths of a metre in any direction, and a force across it flings a vehicle out."""
+_SLOW, _SOON = 0.5, 3.0
+"""m/s and s: slower than that nobody is on the way; what happens later does not count."""
+_RIGHT: Array = np.array([1.0])
+_LEFT: Array = np.array([-1.0])
+
+
+class Tangential:
+    """The band around every obstacle; latches one turning sense per obstacle id."""
+
+    def __init__(self, config: TangentialConfig, turning: TurningSense, u_max: float, dt: float) -> None:
+        self._config = config
+        self._turning = turning
+        self._u_max = u_max
+        self._dt = dt
+        self._sense: dict[int, float] = {}
+
+    def influence(self, scene: Scene, influence: Influence) -> Influence:
+        """Adds F_tang of every obstacle whose band holds the vehicle and that lies ahead."""
+        obstacles = scene.obstacles
+        if not obstacles.ids:
+            self._sense.clear()
+            return influence
+        away = scene.position - obstacles.positions[:, 0]
+        square = away * away
+        flat = np.sqrt(square[:, 0] + square[:, 1]) + _NEAR
+        distance = np.sqrt(square.sum(axis=1)) + _NEAR
+        # What is right above or below can be passed on no side.
+        weight = self._weights(scene, away, distance) * shares(_STEEP * flat / distance)
+        self._release(obstacles, weight)
+        # α̂ = ± ẑ × α, horizontal: passing never costs height.
+        signed = weight * self._senses(obstacles, weight, away, scene.to_go) / flat
+        total = np.array([-(signed @ away[:, 1]), signed @ away[:, 0], 0.0])
+        norm = sqrt(total @ total)
+        if norm < _NEAR:
+            return influence
+        whole = min(norm, 1.0)
+        config, u_max = self._config, self._u_max
+        strength = min(
+            config.k_tang * sqrt(scene.gradient @ scene.gradient),
+            u_max * min(1.0, _QUICK * whole) + (config.force_max - u_max) * whole,
+        )
+        direction = total / norm
+        # Who is under way sideways already is not made faster still, or it is flung out: no faster than half
+        # of u_max stops within what there is to go.
+        sideways = float((scene.velocity - scene.destination_velocity) @ direction)
+        most = min(config.pass_speed, sqrt(u_max * sqrt(scene.to_go @ scene.to_go)) + _NEAR)
+        strength *= share(reserve(sideways, most))
+        return influence._replace(
+            force=influence.force + direction * strength, omega_scale=config.omega_scale
+        )
+
+    def _weights(self, scene: Scene, away: Array, distance: Array) -> Array:
+        """How much each obstacle's band acts, (M,) in 0…1; ``away`` (M, 3) and its norms ``distance``."""
+        config, obstacles = self._config, scene.obstacles
+        moving = (obstacles.positions[:, 1] - obstacles.positions[:, 0]) / self._dt
+        closing = np.maximum(np.vecdot(away, moving - scene.velocity) / distance, 0.0)
+        edge = obstacles.d_safe + config.d_band + config.reach_s * closing
+        depth = shares((edge - distance) / (edge - config.d_full - obstacles.radius))
+        to_go = scene.to_go
+        length = sqrt(to_go @ to_go) + _NEAR
+        along = -(away @ to_go) / length
+        ahead = shares(along / (_ABEAM * distance))
+        before = shares(1.0 + (length - along) / obstacles.d_safe)
+        before *= share((length - _THERE) / (_ON_THE_WAY - _THERE))
+        weights: Array = depth * ahead * before * self._meeting(obstacles, away, moving - scene.velocity)
+        return weights
+
+    def _meeting(self, obstacles: Obstacles, away: Array, velocity: Array) -> Array:
+        """How near (0…1) each obstacle comes if both go on as they do; ``velocity`` (M, 3) is relative to the
+        own."""
+        config = self._config
+        square = np.vecdot(velocity, velocity) + _SLOW**2
+        time = np.minimum(np.maximum(np.vecdot(away, velocity) / square, 0.0), _SOON)
+        miss = away - time[:, None] * velocity
+        distance = np.sqrt(np.vecdot(miss, miss))
+        return shares((obstacles.d_safe - distance) / (obstacles.d_safe - config.d_full - obstacles.radius))
+
+    def _release(self, obstacles: Obstacles, weight: Array) -> None:
+        if not self._sense:
+            return
+        for name in set(self._sense).difference(
+            name for name, w in zip(obstacles.ids, weight, strict=True) if w > 0.0
+        ):
+            del self._sense[name]
+
+    def _senses(self, obstacles: Obstacles, weight: Array, away: Array, to_go: Array) -> Array:
+        """Per obstacle +1: counter-clockwise about it as seen from above (it stays on the left), −1:
+        clockwise."""
+        config = self._config
+        if self._turning != "own":
+            return _RIGHT if self._turning == "right" else _LEFT
+        senses = np.zeros(len(weight))
+        acting = np.flatnonzero(weight > 0.0)
+        new = [j for j in acting if obstacles.ids[j] not in self._sense]
+        if new:
+            for group in groups(
+                away[acting, :2], np.broadcast_to(obstacles.radius, len(weight))[acting], config.gap
+            ):
+                self._latch([int(acting[j]) for j in group], obstacles, weight, away, to_go)
+        for j in acting:
+            senses[j] = self._sense[obstacles.ids[j]]
+        return senses
+
+    def _latch(
+        self, group: list[int], obstacles: Obstacles, weight: Array, away: Array, to_go: Array
+    ) -> None:
+        """The sense of those that are new in a group: that of the group, or on which side most of it is."""
+        names = [obstacles.ids[j] for j in group]
+        known = [
+            (weight[j], self._sense[name])
+            for j, name in zip(group, names, strict=True)
+            if name in self._sense
+        ]
+        heaviest = max(known, default=(0.0, 0.0))[0]
+        senses = {sense for w, sense in known if w == heaviest}
+        if len(senses) == 1:
+            sense = senses.pop()
+        else:
+            # What is to the left of the course is left on the left.
+            x, y = (weight[group, None] * away[group, :2]).sum(axis=0)
+            sense = 1.0 if to_go[1] * x - to_go[0] * y >= 0.0 else -1.0
+        for name in names:
+            self._sense.setdefault(name, sense)
+
+
+def groups(places: Array, radius: Array, gap: float) -> list[list[int]]:
+    """Indices of places (m, 2), those in one group that are connected by gaps of less than ``gap`` between
+    their surfaces."""
+    count = len(places)
+    off = places[:, None] - places[None, :]
+    size = np.broadcast_to(radius, count)
+    near = np.hypot(off[..., 0], off[..., 1]) - size[:, None] - size[None, :] < gap
+    left, found = set(range(count)), []
+    while left:
+        group, todo = [], [left.pop()]
+        while todo:
+            one = todo.pop()
+            group.append(one)
+            joined = [other for other in left if near[one, other]]
+            left.difference_update(joined)
+            todo += joined
+        found.append(sorted(group))
+    return found

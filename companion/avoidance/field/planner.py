@@ -1,0 +1,188 @@
+"""Destination → forces → QP → plan: Algorithm 1 of the paper, on one screen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import expm1, inf
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.avoidance.field.dqmpc import Dqmpc, Problem
+from companion.avoidance.field.forces import repulsion
+from companion.avoidance.field.jerk import Flown, rate_limited
+from companion.avoidance.field.methods import Influence, Method, Scene
+from companion.avoidance.field.methods.approach_angle import ApproachAngle
+from companion.avoidance.field.methods.swivel import Swivel
+from companion.avoidance.field.methods.tangential import Tangential
+from companion.config import CompanionConfig
+from companion.config.planning import LimitsConfig, MethodName
+from companion.surfaces import Surface
+from companion.values.horizon import Array, Horizon, roll_out
+from companion.values.obstacles import Obstacles
+from companion.values.vectors import limit
+
+_ZERO = np.zeros(3)
+_ZERO.flags.writeable = False
+
+
+class Aim(NamedTuple):
+    """Where to: destination x̌ (3,) and terminal velocity (3,) at the end of the horizon, the target now (3,)
+    and then (3,), fleet-local ENU; and the surface that x̌ lies on, None for a goal."""
+
+    destination: Array
+    velocity: Array
+    target: Array
+    target_end: Array
+    surface: Surface | None = None
+
+
+def standing(goal: Array, target: Array | None = None) -> Aim:
+    """To come to rest at ``goal`` (3,), and face ``target`` (3,)."""
+    seen = goal if target is None else target
+    return Aim(goal, np.zeros(3), seen, seen)
+
+
+class Plan(NamedTuple):
+    """A solved plan, with what it was made from. ``gradient`` is ∇J (3,), normalised by Ω_t."""
+
+    horizon: Horizon
+    aim: Aim
+    force: Array
+    gradient: Array
+    omega_scale: float
+    relaxed: int
+    problem: Problem
+
+
+class Planner:
+    """Plans for one vehicle; remembers its gradient and what its methods latch."""
+
+    def __init__(self, config: CompanionConfig) -> None:
+        self.config = config
+        self.dqmpc = Dqmpc(config.horizon, config.cost, config.limits.within(config.field.margin(1)))
+        self._methods = build(config)
+        self._gradient: Array = np.zeros(3)
+        self._force: Array = np.zeros((config.horizon.steps + 1, 3))
+        self._planned_at: int | None = None
+
+    def use(self, methods: tuple[MethodName, ...]) -> None:
+        """From the next plan on, with nothing latched."""
+        self.config = self.config.model_copy(update={"methods": methods})
+        self._methods = build(self.config)
+
+    def keep(self, limits: LimitsConfig) -> None:
+        """Within other ``limits`` from the next plan on, with nothing latched."""
+        self.config = config = self.config.model_copy(update={"limits": limits})
+        self.dqmpc = Dqmpc(config.horizon, config.cost, limits.within(config.field.margin(1)))
+        self._methods = build(config)
+
+    def plan(
+        self,
+        now: int,
+        position: Array,
+        velocity: Array,
+        prediction: Array,
+        aim: Aim,
+        obstacles: Obstacles,
+        acceleration: Array = _ZERO,
+    ) -> Plan:
+        """One plan from the state at ``now`` (µs), with the ``acceleration`` (3,) that is flown until then.
+        ``prediction`` (N + 1, 3): the previous plan at n = 0…N.
+
+        SolverError when there is no solution: the caller holds what it has.
+        """
+        to_go = aim.destination - (aim.target_end - aim.target) - position
+        scene = Scene(
+            position,
+            velocity,
+            prediction,
+            aim.destination,
+            aim.velocity,
+            to_go,
+            aim.target,
+            obstacles,
+            self._gradient,
+            aim.target_end,
+            aim.surface,
+        )
+        elapsed = self._elapsed(now)
+        influence = self._influence(elapsed, scene)
+        problem = self.dqmpc.problem(
+            position,
+            velocity,
+            influence.force,
+            influence.destination,
+            aim.velocity,
+            influence.omega_scale,
+            None if self.config.limits.j_max is None else Flown(acceleration, elapsed),
+        )
+        solution = self.dqmpc.solve(problem, influence.omega_scale)
+        horizon = roll_out(now, self.config.horizon.dt_us, position, velocity, solution.acceleration)
+        end = horizon.knots[-1]
+        self._gradient = self.dqmpc.gradient(
+            solution.acceleration, end[0:3], end[3:6], influence.destination, aim.velocity
+        )
+        return Plan(
+            horizon, aim, influence.force, self._gradient, influence.omega_scale, solution.relaxed, problem
+        )
+
+    def _elapsed(self, now: int) -> float:
+        """Seconds since the last plan; ∞ for the first."""
+        last, self._planned_at = self._planned_at, now
+        return inf if last is None else (now - last) * 1e-6
+
+    def _influence(self, elapsed: float, scene: Scene) -> Influence:
+        config = self.config
+        a_total = config.limits.a_total
+        field = repulsion(
+            scene.prediction,
+            scene.obstacles,
+            config.field.gain,
+            _NEAREST_COUNTS * a_total,
+            config.field.braking,
+            self.dqmpc.dt,
+            config.field.reaction,
+            config.field.turn * _SIGNS[config.turning_sense],
+        )
+        influence = Influence(field, 1.0, scene.destination)
+        for method in self._methods:
+            influence = method.influence(scene, influence)
+        force = influence.force
+        if config.planar:
+            force = force * _FLAT
+        return influence._replace(force=self._smoothed(elapsed, limit(force, a_total)))
+
+    def _smoothed(self, elapsed: float, force: Array) -> Array:
+        """The field without its steps: neighbours' plans arrive at 10 Hz and would jolt the attitude. With
+        bounded jerk it changes no faster than the acceleration may, in time and along the horizon."""
+        j_max, dt = self.config.limits.j_max, self.dqmpc.dt
+        if j_max is not None:
+            jerk = min(j_max)
+            # Where plans are made seldom, the last one's field has gone on along its horizon since.
+            last = self._force[min(int(min(elapsed, self.dqmpc.seconds) / dt), len(self._force) - 1)]
+            force = rate_limited(force, last, jerk * min(elapsed, dt), jerk * dt)
+        elif elapsed < inf and self.config.field.smoothing_us > 0:
+            share = -expm1(-1e6 * elapsed / self.config.field.smoothing_us)
+            force = self._force + share * (force - self._force)
+        self._force = force
+        return force
+
+
+_FLAT = np.array([1.0, 1.0, 0.0])
+_SIGNS = {"own": 0.0, "right": 1.0, "left": -1.0}
+"""Of the angle by which forces are turned; where each vehicle has a sense of its own they are not."""
+_NEAREST_COUNTS = 20.0
+"""The sum is limited to a_total, not its parts: were each limited, two that push from behind would cancel one
+that is about to be hit."""
+
+
+def build(config: CompanionConfig) -> list[Method]:
+    """The strategies that the configuration names, in its order; ``baseline`` adds nothing."""
+    u_max, dt = max(config.limits.u_max), config.horizon.dt_us * 1e-6
+    makers: dict[str, Callable[[], Method]] = {
+        "swivel": lambda: Swivel(config.swivel, config.turning_sense),
+        "approach_angle": lambda: ApproachAngle(config.approach_angle, config.turning_sense),
+        "tangential": lambda: Tangential(config.tangential, config.turning_sense, u_max, dt),
+    }
+    return [makers[name]() for name in config.methods if name != "baseline"]

@@ -1,0 +1,211 @@
+"""The helm: carries a committed plan on when the companion that made it falls silent.
+
+A vehicle that is promised to keep to its plan has to be told so every 20 ms; without a word its autopilot
+flies on along the last set-point for a time-out and then brakes, beside its plan and in the way of others
+that count on it. So a second, small program listens to what its companion tells: plans on the swarm link,
+set-points on the autopilot's. While these flow it says nothing. When they stop, and the autopilot is still in
+the mode in which set-points steer, it sends those of the newest committed plan, to its end and for some
+seconds of hover; then it leaves the vehicle to the autopilot's own failsafe. When the companion is back, it
+is at the same plan.
+
+It carries on only what it knows to be flown: the companion's last set-point has to agree with the plan that
+the helm holds, by its own clock and in its own local frame. It starts before the companion steers, or else it
+waits for the next plan; and an order to land, a farewell, another mode, a disarmed vehicle or three seconds
+without a heartbeat make it forget all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from companion.avoidance.certified.committed import horizon_of, rests
+from companion.config import CompanionConfig
+from companion.estimation.origins import Origins
+from companion.flight.autopilots import Profile, is_guided
+from companion.flight.autopilots.known import profile_of
+from companion.flight.setpoint import setpoint
+from companion.flight.state_machine import NAV_LAND
+from companion.flight.vehicle import ARMED, HEARTBEAT_LOST
+from companion.goals.heading import Yaw
+from companion.telemetry.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
+from companion.values.components import AUTOPILOT, COMPONENT
+from companion.values.horizon import Horizon
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.frames import FleetFrame, LocalFrame
+from mavlink_bridge.messages import (
+    CommandLong,
+    GpsGlobalOrigin,
+    Heartbeat,
+    Message,
+    SetpointLocal,
+    Source,
+    Tunnel,
+)
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE as PLAN
+from mavlink_bridge.plan_wire import WirePlan
+from mavlink_bridge.plan_wire import unpack as unpack_plan
+from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.roster_wire import unpack as unpack_roster
+from mavlink_bridge.signing import Signing
+
+HELM = 191
+"""MAV_COMP_ID_ONBOARD_COMPUTER."""
+_AGREES = 0.3
+"""m between a set-point of the companion and the own plan: what is flown in the time that it takes to
+arrive."""
+_EPOCHS = 4
+"""A plan that begins further from now is none of this time."""
+_SECOND = 1_000_000
+_SILENT = 4
+"""Set-points missing on end after which the companion counts as silent."""
+_HEARTBEAT, _SETPOINT, _ORIGIN, _COMMAND, _TUNNEL = 0, 84, 49, 76, 385
+
+
+class Helm:
+    """A ``Node`` beside the companion of ``system``, on the same clock. Links: ``autopilot``, ``swarm``.
+    ``signing``: its own, with the companion's key."""
+
+    def __init__(
+        self, config: CompanionConfig, system: int, fleet: FleetFrame, signing: Signing | None = None
+    ) -> None:
+        self.name = f"helm-{system}"
+        self._config, self._fleet = config, fleet
+        self._own = Source(system, HELM)
+        self._codecs = {
+            "autopilot": Codec(
+                lambda identifier, sender, component: (
+                    sender == system
+                    and (
+                        (component == AUTOPILOT and identifier in (_HEARTBEAT, _ORIGIN))
+                        or (component == COMPONENT and identifier in (_SETPOINT, _COMMAND))
+                    )
+                ),
+                signing,
+            ),
+            "swarm": Codec(
+                lambda identifier, sender, component: (
+                    sender == system and component == COMPONENT and identifier == _TUNNEL
+                ),
+                signing,
+            ),
+        }
+        self._signing = signing
+        self._plans: dict[int, WirePlan] = {}
+        self._flown: tuple[WirePlan, Horizon] | None = None
+        self._heard: tuple[int, SetpointLocal] | None = None
+        self._beat: tuple[int, Heartbeat] | None = None
+        self._local: LocalFrame | None = None
+        self._origins = Origins()
+        self._next = self._next_beat = 0
+        self._boot: int | None = None
+        self.carried = 0
+        """Set-points sent in the companion's place."""
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Listen; and where the companion is silent, send what its plan says at ``now`` (µs)."""
+        self._boot = now if self._boot is None else self._boot
+        if self._signing is not None:
+            self._signing.present(now)
+        for link, data in inbox:
+            for message in self._codecs[link].feed(data, whole=True):
+                self._hear(now, message)
+        beat = self._heartbeat(now)
+        profile = self._profile(now)
+        if profile is None:
+            # Somebody else has the vehicle, or may have it: what was planned before that counts no more.
+            self._forget()
+        if now < self._next or profile is None or self._local is None or self._heard is None:
+            return beat
+        period = self._config.rates.setpoint_us
+        since, last = self._heard
+        if now - since <= _SILENT * period:
+            return beat
+        horizon = self._horizon(now)
+        if horizon is None or now > horizon.end + self._config.certified.helm_us:
+            return beat
+        self._next = now + period
+        self.carried += 1
+        # The nose stays where it was: whom it faces is not known here.
+        yaw = Yaw(self._local.yaw_to_fleet(last.yaw), 0.0, 0.0)
+        time = now + self._config.setpoint_lead_us
+        mask = profile.setpoint_mask
+        message = setpoint(time, now - self._boot, horizon, yaw, self._local, self._own, mask)
+        return [*beat, Datagram("autopilot", self._codecs["autopilot"].encode(message))]
+
+    def _heartbeat(self, now: int) -> list[Datagram]:
+        """Once a second: so that routers know the way to it, and people that it is there."""
+        if now < self._next_beat:
+            return []
+        self._next_beat = now + _SECOND
+        beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+        return [Datagram("autopilot", self._codecs["autopilot"].encode(beat))]
+
+    def _hear(self, now: int, message: Message) -> None:
+        match message:
+            case Heartbeat():
+                self._beat = now, message
+            case GpsGlobalOrigin() if self._origins.counts(now, message):
+                self._local = self._fleet.local(message.latitude, message.longitude, message.altitude)
+            case SetpointLocal():
+                self._heard = (now, message) if self._agrees(now, message) else None
+            case CommandLong(command=command) if command == NAV_LAND:
+                self._forget()
+            case Tunnel():
+                self._file(now, message)
+            case _:
+                pass
+
+    def _file(self, now: int, message: Tunnel) -> None:
+        """A plan of the companion's; or, with a farewell, the end of its plans: it lands."""
+        try:
+            if message.payload_type == ROSTER and unpack_roster(message.payload).farewell:
+                self._forget()
+            if message.payload_type != PLAN:
+                return
+            plan = unpack_plan(message.payload)
+        except PlanWireError:
+            return
+        near = abs(plan.epoch - now) <= _EPOCHS * self._config.certified.epoch_us
+        if plan.origin != self._fleet.fingerprint or not rests(plan) or not near:
+            return
+        self._plans[plan.epoch] = plan
+        # The one that is flown, and what follows it.
+        flown = max((epoch for epoch in self._plans if epoch <= now), default=plan.epoch)
+        self._plans = {epoch: kept for epoch, kept in self._plans.items() if epoch >= flown}
+
+    def _horizon(self, now: int) -> Horizon | None:
+        """The committed plan at ``now`` (µs): the newest that has begun."""
+        epoch = max((epoch for epoch in self._plans if epoch <= now), default=None)
+        if epoch is None:
+            return None
+        plan = self._plans[epoch]
+        if self._flown is None or self._flown[0] is not plan:
+            self._flown = plan, horizon_of(plan)
+        return self._flown[1]
+
+    def _agrees(self, now: int, message: SetpointLocal) -> bool:
+        """Whether the companion sends what the own plan says."""
+        horizon = self._horizon(now)
+        if horizon is None or self._local is None:
+            return False
+        planned = self._local.position_to_local(horizon.at(now + self._config.setpoint_lead_us).position)
+        off = planned - np.array(message.position)
+        # Asked so that a NaN does not agree.
+        return bool(off @ off <= _AGREES**2)
+
+    def _forget(self) -> None:
+        self._plans.clear()
+        self._heard = None
+
+    def _profile(self, now: int) -> Profile | None:
+        """What the autopilot wants, where it is armed and follows set-points."""
+        if self._beat is None or now - self._beat[0] > HEARTBEAT_LOST:
+            return None
+        beat = self._beat[1]
+        profile = profile_of(beat)
+        steers = profile is not None and beat.base_mode & ARMED and is_guided(profile, beat)
+        return profile if steers else None

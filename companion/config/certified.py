@@ -1,0 +1,75 @@
+"""Settings of the certified mode. SI units, times in µs."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from companion.values.settings import Positive, Settings, WireStep
+
+Weight = Annotated[float, Field(ge=0.0, le=1e4)]
+
+
+class StallConfig(Settings):
+    """When a plan is pushed back and gets nowhere, the goal is turned aside."""
+
+    bend: Positive = Field(0.8, description="rad, the largest turn at first")
+    bend_more: Positive = Field(3.1, description="rad, the largest turn ever")
+    patience: Positive = Field(2.5, description="s without progress before larger turns are tried")
+    slow: Positive = Field(1.0, description="rad/s by which the largest turn grows then")
+    detour: Positive = Field(
+        3.0, description="m: on a turn that is larger than ``bend`` the goal is no further"
+    )
+    up: Positive = Field(4.0, description="rad/s at which it turns aside where it is pushed back in full")
+    down: Positive = Field(6.0, description="rad/s at which it turns back")
+    speed: Positive = Field(2.0, description="m/s of the rest point towards the goal that is no stall")
+    pushed: float = Field(0.2, ge=0.0, lt=1.0, description="share of the pull from which it counts as pushed")
+
+
+class CertifiedConfig(Settings):
+    """Committed plans, planes and epochs."""
+
+    dt_us: WireStep = Field(200_000, description="knots of the plans, µs: absolute, k·dt")
+    epoch_us: int = Field(200_000, gt=0, le=2_000_000, multiple_of=4, description="µs; a whole number of dt")
+    last_call_us: int = Field(
+        20_000, ge=0, le=1_000_000, description="so long before the end of an epoch nothing is waited for"
+    )
+    repeat_us: int = Field(
+        50_000, gt=0, le=2_000_000, multiple_of=4, description="a plan is told again so often"
+    )
+    tube: Positive = Field(0.25, description="m, largest tracking error that the promise allows for")
+    sigmas: float = Field(3.0, ge=0.0, le=6.0, description="k of k·σ of the position estimate")
+    clock_us: int = Field(5_000, ge=0, le=100_000, description="µs that a clock may differ from fleet time")
+    helm_us: int = Field(
+        10_000_000,
+        ge=0,
+        le=600_000_000,
+        description="µs of hover at the end of a plan whose companion is gone",
+    )
+    fleet: tuple[int, ...] = Field(
+        (), max_length=255, description="system ids that take part: nobody moves before all are heard"
+    )
+    stranger_speed: Positive = Field(1.0, description="m/s, of those that share no plan")
+    stranger_acceleration: Positive = Field(1.0, description="m/s², of those that share no plan")
+    omega_end: Positive = Field(30.0, description="weight of where the plan comes to rest")
+    omega_place: Weight = Field(0.3, description="weight of where it is after each step before")
+    omega_speed: Weight = Field(0.1, description="weight of its speeds")
+    omega_input: Positive = Field(0.05, description="weight of a")
+    omega_field: Weight = Field(0.3, description="weight of the field of those that share no plan")
+    omega_jerk: Weight = Field(0.3, description="weight of the change of a from step to step")
+    spare: Positive = Field(0.01, description="m wanted beyond the least distance, for rounding")
+    stall: StallConfig = StallConfig()
+
+    @property
+    def knots(self) -> int:
+        """Knots of an epoch."""
+        return self.epoch_us // self.dt_us
+
+    @model_validator(mode="after")
+    def _epochs(self) -> CertifiedConfig:
+        if self.epoch_us % self.dt_us:
+            raise ValueError(f"certified.epoch_us must be a multiple of dt_us = {self.dt_us}")
+        if self.last_call_us >= self.epoch_us:
+            raise ValueError(f"certified.last_call_us must be less than epoch_us = {self.epoch_us}")
+        return self

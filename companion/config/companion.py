@@ -1,0 +1,162 @@
+"""The companion's settings: frozen, checked at load, passed explicitly. SI units, fleet-local ENU, times in
+µs.
+
+Defaults are the paper's where it gives a number; where it is silent, the value that we settled on stands
+here. A scenario file may say otherwise.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from companion.config.certified import CertifiedConfig
+from companion.config.estimation import TrackConfig
+from companion.config.flight import GuardConfig, RatesConfig, TrackingConfig, VoiceConfig
+from companion.config.formation import FormationConfig, Nearest
+from companion.config.obstacles import (
+    Moving,
+    MovingPost,
+    MovingSphere,
+    Obstacle,
+    Post,
+    ProximityConfig,
+    Sphere,
+    TrafficConfig,
+)
+from companion.config.planning import (
+    ApproachAngleConfig,
+    CostConfig,
+    FieldConfig,
+    HeadingConfig,
+    HorizonConfig,
+    LimitsConfig,
+    MethodName,
+    SwivelConfig,
+    TangentialConfig,
+    TurningSense,
+)
+from companion.config.target_source import GlobalPositionSource, TargetSource
+from companion.surfaces import Circle, Surface, SurfaceConfig
+from companion.values.settings import Settings
+
+Avoidance = Literal["field", "certified"]
+
+
+__all__ = [
+    "CompanionConfig",
+    "Moving",
+    "MovingPost",
+    "MovingSphere",
+    "Obstacle",
+    "Post",
+    "Settings",
+    "Sphere",
+]
+
+
+class OwnSurface(Settings):
+    """The surface of one vehicle."""
+
+    vehicle: int = Field(ge=1, le=255, description="system id")
+    surface: SurfaceConfig
+
+
+class CompanionConfig(Settings):
+    """Everything one companion needs beside its links."""
+
+    task: Literal["escort", "goto"] = "escort"
+    methods: tuple[MethodName, ...] = ("tangential",)
+    turning_sense: TurningSense = Field(
+        "own", description="'own': by approach, as the paper; otherwise one sense for all vehicles"
+    )
+    avoidance: Avoidance = Field(
+        "field", description="'field': the paper's; 'certified': committed plans between moving planes"
+    )
+    planar: bool = False
+    shares_plan: bool = Field(True, description="tell the others the horizon that is flown")
+    neighbour_prediction: Literal["held", "velocity"] = Field(
+        "held",
+        description="without a shared horizon: the paper holds the n = 0 position; 'velocity' moves it on",
+    )
+    setpoint_lead_us: int = Field(10_000, ge=0, le=1_600_000, description="look-ahead of the set-point")
+    own: TrackConfig = TrackConfig(delay_us=5_000, sigma_acceleration=10.0)
+    neighbour: TrackConfig = TrackConfig()
+    target: TrackConfig = TrackConfig(
+        sigma_position=1.0, sigma_velocity=0.3, sigma_acceleration=1.0, sigma_turn=0.5, jump=8.0
+    )
+    target_source: TargetSource = Field(GlobalPositionSource(), description="what tells where the target is")
+    target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
+    target_d_safe: float | None = Field(None, gt=0.0, le=100.0)
+    obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed; the field is about them")
+    moving: tuple[Moving, ...] = Field(
+        (), max_length=100, description="who of those heard on the swarm link is an obstacle, and how large"
+    )
+    proximity: ProximityConfig | None = Field(
+        None, description="obstacles from OBSTACLE_DISTANCE; null: not listened to"
+    )
+    traffic: TrafficConfig | None = Field(
+        None, description="obstacles from ADSB_VEHICLE; null: not listened to"
+    )
+    horizon: HorizonConfig = HorizonConfig()
+    cost: CostConfig = CostConfig()
+    limits: LimitsConfig = LimitsConfig()
+    limits_from_autopilot: bool = Field(
+        False,
+        description="read before the go, from the autopilot's parameters, what it can follow, and lower the"
+        " limits to it; with avoidance 'field'",
+    )
+    field: FieldConfig = FieldConfig()
+    tangential: TangentialConfig = TangentialConfig()
+    swivel: SwivelConfig = SwivelConfig()
+    approach_angle: ApproachAngleConfig = ApproachAngleConfig()
+    surface: SurfaceConfig = Circle()
+    surfaces: tuple[OwnSurface, ...] = Field(
+        (), max_length=255, description="of vehicles that have their own"
+    )
+    formation: FormationConfig = Field(
+        Nearest(), description="how the vehicles share the surface: each its nearest point, or spread evenly"
+    )
+    turn_rate: float = Field(
+        0.0, ge=-1.0, le=1.0, description="rad/s, counter-clockwise from above: the ring turns on its surface"
+    )
+    heading: HeadingConfig = HeadingConfig()
+    tracking: TrackingConfig = TrackingConfig()
+    certified: CertifiedConfig = CertifiedConfig()
+    guard: GuardConfig = GuardConfig()
+    rates: RatesConfig = RatesConfig()
+    voice: VoiceConfig = VoiceConfig()
+
+    def surface_of(self, system: int) -> Surface:
+        """Where the vehicle of that system id is to be around the target."""
+        return next((own.surface for own in self.surfaces if own.vehicle == system), self.surface)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> CompanionConfig:
+        dt = self.horizon.dt_us * 1e-6
+        least = max(self.limits.v_max[:2]) * dt + max(self.limits.u_max[:2]) * dt**2 / 2
+        if self.tangential.d_band <= least:
+            raise ValueError(f"tangential.d_band must exceed v_max·dt + u_max·dt²/2 = {least:.2f} m")
+        longest = (self.horizon.steps + 1) * self.certified.dt_us
+        if self.certified.epoch_us > longest:
+            raise ValueError(f"certified.epoch_us must not exceed (N + 1)·certified.dt_us = {longest}")
+        for name in ("tangential", "approach_angle"):
+            if name in self.methods and getattr(self, name).force_max <= max(self.limits.u_max):
+                raise ValueError(f"{name}.force_max must exceed u_max, or the input cancels it")
+        if len(set(self.methods)) != len(self.methods):
+            raise ValueError("methods: a method is there twice; allowed: once")
+        systems = [one.system for one in self.moving]
+        for system in systems:
+            if systems.count(system) > 1:
+                raise ValueError(f"moving: system {system} is there twice; allowed: once")
+        if (self.target_d_min is None) != (self.target_d_safe is None):
+            raise ValueError("target_d_min and target_d_safe come together")
+        nearest = self.field.d_safe
+        if self.target_d_min is not None and self.target_d_safe is not None:
+            if self.target_d_safe <= self.target_d_min:
+                raise ValueError("target_d_safe must be larger than target_d_min")
+            nearest = min(nearest, self.target_d_safe)
+        if self.tangential.d_full >= nearest:
+            raise ValueError(f"tangential.d_full must be less than d_safe, here {nearest:g} m")
+        return self

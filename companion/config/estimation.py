@@ -1,0 +1,41 @@
+"""Settings of the estimation of tracks."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from companion.values.settings import Positive, Settings
+
+Micros = Annotated[int, Field(gt=0, le=10_000_000, multiple_of=4)]
+
+
+class TrackConfig(Settings):
+    """A filterpy track of one sender."""
+
+    sigma_position: Positive = Field(0.02, description="m")
+    sigma_velocity: Positive = Field(0.05, description="m/s")
+    sigma_acceleration: Positive = Field(2.0, description="m/s², of the constant-velocity model")
+    sigma_turn: float = Field(
+        0.0, ge=0.0, le=10.0, description="rad/s, of the rates at which its course turns; 0: it goes straight"
+    )
+    turn_memory_us: Micros = Field(3_000_000, description="so long a turn lasts")
+    delay_us: int = Field(
+        20_000, ge=0, le=2_000_000, description="least age of a message when it arrives; jitter adds to it"
+    )
+    stamps: bool = Field(True, description="date by the sender's time_boot_ms; false: by the arrival alone")
+    rewind_us: int = Field(
+        2_000_000, ge=0, le=10_000_000, description="how late a message may be and still be put in its place"
+    )
+    extrapolate_us: Micros = Field(1_000_000, description="no track is carried further than this")
+    gate: Positive = Field(
+        22.46, description="on d² = yᵀS⁻¹y, χ² of six: 16.81 passes 99 % of what is true, 22.46 99.9 %"
+    )
+    jump: Positive = Field(
+        3.0, description="m and m/s: an innovation beyond it is refused too; it grows by this per second"
+    )
+    witnesses: int = Field(
+        2, ge=1, le=10, description="refused measurements that agree with each other and are then believed"
+    )
+    velocity_up: bool = Field(False, description="the sender's vz is positive up, contrary to MAVLink")

@@ -1,0 +1,123 @@
+"""Settings of a flight: age limits, periods, tracking and telemetry."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from companion.config.estimation import Micros
+from companion.values.settings import Positive, Settings
+
+
+class GuardConfig(Settings):
+    """Age limits of what a plan stands on, µs."""
+
+    own_stale_us: Micros = 500_000
+    hold_us: Micros = Field(500_000, description="a plan is held for so long after the last good one")
+    target_stale_us: Micros = 3_000_000
+    plan_stale_us: Micros = Field(500_000, description="a shared horizon older than this is not used")
+    go_keeps_us: int = Field(
+        30_000_000, gt=0, le=600_000_000, description="a go that has not armed it by then is forgotten"
+    )
+    landing_speed: Positive = Field(0.3, description="m/s; slower than this a vehicle may land")
+    landing_clearance: Positive = Field(1.0, description="m, horizontally to the nearest neighbour, to land")
+    settle_us: int = Field(30_000_000, ge=0, le=600_000_000, description="longest way from escort to landing")
+    own_lost_us: int = Field(
+        5_000_000, gt=0, le=60_000_000, description="without own state for so long, it is told to land"
+    )
+    unsolved_us: int = Field(
+        5_000_000, gt=0, le=60_000_000, description="without a plan for so long, it is told to land"
+    )
+    neighbour_lost_us: int = Field(
+        3_000_000, gt=0, le=600_000_000, description="said then, and kept away from"
+    )
+    flown_on_us: int = Field(
+        0,
+        ge=0,
+        le=60_000_000,
+        description="an autopilot may fly on for so long without its companion (GUID_TIMEOUT, "
+        "COM_OF_LOSS_T): a neighbour that falls silent may be anywhere on that way; 0: it is carried on "
+        "as any track is",
+    )
+    cautious_speed: Positive | None = Field(
+        None,
+        description="m/s, beside the target's: who misses deadlines, or hears a neighbour no more, flies "
+        "about so fast at most",
+    )
+    late_us: Micros = Field(100_000, description="a step later than that is a missed deadline")
+    battery_low: float = Field(0.2, ge=0.0, le=1.0, description="share left: it comes back and lands")
+    battery_critical: float = Field(0.1, ge=0.0, le=1.0, description="share left: it lands")
+    fence_radius: float | None = Field(None, gt=0.0, description="m from the fleet origin: it comes back")
+    fence_height: float | None = Field(None, gt=0.0, description="m above the fleet origin: it comes back")
+    displaced: Positive = Field(
+        5.0, description="m by which the own place may change with the autopilot's origin; beyond, it lands"
+    )
+    tube: Positive = Field(1.0, description="m of tracking error at which the plan is anchored anew")
+    blend: Positive | None = Field(
+        None,
+        description="1/s: a plan begins between the last plan and the vehicle, and comes nearer to it at this"
+        " rate; out of the tube by 0.2 m a plan; null: on the plan, and out of the tube where the vehicle is",
+    )
+    astray_us: int = Field(
+        0,
+        ge=0,
+        le=10_000_000,
+        description="a vehicle beside its plan comes back to it with this time constant: own and others' ways"
+        " are taken so; 0: as planned while within 1 m",
+    )
+    return_step: float = Field(
+        0.0,
+        ge=0.0,
+        le=20.0,
+        description="m: on the way back the vehicles fly so far above each other, in the order of their ids",
+    )
+    near: Positive | None = Field(
+        None,
+        description="m to a neighbour: nearer is a concern, and the vehicle flies cautiously; null: none",
+    )
+
+
+class RatesConfig(Settings):
+    """Periods of what the companion does, µs."""
+
+    replan_us: Micros = 10_000
+    setpoint_us: Micros = 20_000
+    state_us: Micros = 100_000
+    plan_us: Micros = 100_000
+
+
+class TrackingConfig(Settings):
+    """What is done about the difference between set-points and vehicle."""
+
+    compensate: bool = Field(
+        False, description="add to the set-point's acceleration what drag and wind take from the vehicle"
+    )
+    bandwidth: float = Field(3.5, gt=0.0, le=20.0, description="1/s, of the disturbance observer")
+    lag: float = Field(0.18, ge=0.0, le=2.0, description="s, of the autopilot's attitude loop")
+    most: float = Field(4.0, ge=0.0, le=10.0, description="m/s², of the compensation")
+    usual: Positive | None = Field(
+        None,
+        description="m: what the error has lately had beyond it, all keep further away; null: not told",
+    )
+    alarm: Positive | None = Field(
+        None, description="m: a larger error is a concern, and the vehicle flies cautiously; null: none is"
+    )
+
+    @property
+    def largest(self) -> float:
+        """The largest compensation, m/s²."""
+        return self.most if self.compensate else 0.0
+
+
+class VoiceConfig(Settings):
+    """What is told to the ground, and by which link. The autopilot's link is mostly the narrowest, and
+    whether it passes on what it hears is up to its own settings: so not unless asked."""
+
+    texts: bool = Field(False, description="events as STATUSTEXT")
+    values: bool = Field(
+        False,
+        description="plan time and the like as NAMED_VALUE_FLOAT, once a second; no two flights then send "
+        "the same bytes",
+    )
+    links: tuple[Literal["ground", "autopilot"], ...] = Field(("ground",), max_length=2)

@@ -1,0 +1,93 @@
+"""Settings: obstacles that every companion knows."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from companion.values.settings import Positive, Settings
+
+_Age = Annotated[int, Field(gt=0, le=60_000_000)]
+_Duration = Annotated[int, Field(ge=0, le=60_000_000)]
+_Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
+
+
+Size = Annotated[float, Field(gt=0.0, le=1000.0)]
+
+
+class Sphere(Settings):
+    """A ball."""
+
+    kind: Literal["sphere"]
+    at: tuple[_Coordinate, _Coordinate, _Coordinate] = Field(description="centre, m, fleet-local ENU")
+    radius: Size = Field(description="m")
+
+
+class Post(Settings):
+    """A vertical cylinder from below up to ``height``."""
+
+    kind: Literal["post"]
+    at: tuple[_Coordinate, _Coordinate] = Field(description="axis, m east and north of the fleet origin")
+    radius: Size = Field(description="m")
+    height: Size = Field(100.0, description="m above the fleet origin")
+
+
+Obstacle = Annotated[Sphere | Post, Field(discriminator="kind")]
+
+
+class _Moving(Settings):
+    system: int = Field(ge=1, le=254, description="system id that it speaks with")
+
+
+class MovingSphere(_Moving):
+    """A ball; where it says that it is, is its centre."""
+
+    kind: Literal["sphere"]
+    radius: Size = Field(description="m")
+
+
+class MovingPost(_Moving):
+    """A vertical cylinder from below up to ``height``; where it says that it is, is its axis."""
+
+    kind: Literal["post"]
+    radius: Size = Field(description="m")
+    height: Size = Field(100.0, description="m above the fleet origin")
+
+
+Moving = Annotated[MovingSphere | MovingPost, Field(discriminator="kind")]
+
+
+class ProximityConfig(Settings):
+    """What is made of OBSTACLE_DISTANCE."""
+
+    age_us: _Age = Field(1_000_000, description="a return is forgotten after so long")
+    delay_us: int = Field(
+        50_000, ge=0, le=1_000_000, description="age at arrival, where the autopilot's stamp does not say"
+    )
+    reach: Positive = Field(15.0, description="m: what is further off does not count")
+    spacing: Positive = Field(0.3, description="m: returns nearer to each other than this are one")
+    known: float = Field(
+        1.0, ge=0.0, le=10.0, description="m: a return so near to a neighbour is that neighbour"
+    )
+    most: int = Field(48, ge=1, le=300, description="the nearest so many count")
+
+
+_ADDRESSES = 1 << 24
+
+
+_Address = Annotated[int, Field(ge=0, lt=_ADDRESSES)]
+
+
+class TrafficConfig(Settings):
+    """What is made of ADSB_VEHICLE."""
+
+    radius: Positive = Field(30.0, description="m of room about it, in which no vehicle is to be")
+    height_error: float = Field(50.0, ge=0.0, le=1000.0, description="m, how wrong its height may be")
+    ahead_us: _Duration = Field(10_000_000, description="so far ahead its way is kept clear")
+    age_us: _Duration = Field(10_000_000, description="it is forgotten after so long without a message")
+    reach: Positive = Field(3000.0, description="m horizontally: what is further off does not count")
+    most: int = Field(32, ge=1, le=200, description="the nearest so many count")
+    ignore: tuple[_Address, ...] = Field(
+        (), max_length=255, description="ICAO addresses of the fleet's own transponders"
+    )

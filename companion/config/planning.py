@@ -1,0 +1,176 @@
+"""Settings of the planner: horizon, cost, limits, field, methods and heading."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from companion.values.settings import Positive, Settings, WireStep
+
+MethodName = Literal["baseline", "swivel", "approach_angle", "tangential"]
+
+
+TurningSense = Literal["own", "right", "left"]
+
+
+Triple = tuple[float, float, float]
+
+
+Bounds = tuple[
+    Annotated[float, Field(gt=0.0, le=100.0)],
+    Annotated[float, Field(gt=0.0, le=100.0)],
+    Annotated[float, Field(gt=0.0, le=100.0)],
+]
+
+
+class HorizonConfig(Settings):
+    """N steps of dt; N + 1 inputs u(0)…u(N)."""
+
+    steps: int = Field(15, ge=2, le=15, description="N; at most 15, so that a plan fits one TUNNEL message")
+    dt_us: WireStep = Field(100_000, description="prediction step, µs; not the replan period")
+
+
+class CostConfig(Settings):
+    """Ω_t and Ω_i. Only their ratios matter. Not given in the paper: settled by
+    flying the swap and the escort."""
+
+    omega_t_position: Positive = 100.0
+    omega_t_velocity: Positive = 40.0
+    omega_i: Positive = 0.5
+
+
+class LimitsConfig(Settings):
+    """What the planner may ask for. ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it. The box is where
+    vehicles may be: plans stay inside by k·σ of the own place (``field.margin``)."""
+
+    u_max: Bounds = (2.0, 2.0, 2.0)
+    v_max: Bounds = (5.0, 5.0, 5.0)
+    a_total: float = Field(7.0, gt=0.0, le=30.0, description="m/s²; the firefly at 35° of tilt has 6.9")
+    j_max: Bounds | None = Field(
+        None,
+        description="m/s³ an axis: a hard bound on how fast a plan's acceleration changes; null: none, as the"
+        " paper",
+    )
+    box_min: Triple = (-20.0, -20.0, 3.0)
+    box_max: Triple = (20.0, 20.0, 10.0)
+
+    @model_validator(mode="after")
+    def _box(self) -> LimitsConfig:
+        if any(low >= high for low, high in zip(self.box_min, self.box_max, strict=True)):
+            raise ValueError("box_min must lie below box_max on every axis")
+        if self.a_total < max(self.u_max):
+            raise ValueError("a_total must be at least the largest u_max")
+        return self
+
+    def within(self, margin: float) -> LimitsConfig:
+        """The same with a box that is smaller by ``margin`` (m) on each side, or half as large where there is
+        no room for that."""
+        sides = tuple(zip(self.box_min, self.box_max, strict=True))
+        off = tuple(min(margin, (high - low) / 4.0) for low, high in sides)
+        return self.model_copy(
+            update={
+                "box_min": tuple(low + by for (low, _), by in zip(sides, off, strict=True)),
+                "box_max": tuple(high - by for (_, high), by in zip(sides, off, strict=True)),
+            }
+        )
+
+
+class Potential(Settings):
+    """What F_hyp of eq. (8) needs."""
+
+    gain: Positive
+    d_min: Positive
+    d_safe: Positive
+
+    @model_validator(mode="after")
+    def _order(self) -> Self:
+        if self.d_safe <= self.d_min:
+            raise ValueError("d_safe must be larger than d_min")
+        return self
+
+
+class FieldConfig(Potential):
+    """The repulsive field, eq. (8)."""
+
+    gain: Positive = Field(10.0, description="K; the paper gives none")
+    d_min: Positive = Field(0.5, description="m, between centres: the field is clamped there")
+    d_safe: Positive = Field(3.0, description="m, between centres: the field begins there")
+    braking: Positive | None = Field(
+        4.0,
+        description="m/s², relative deceleration to count on when closing; null is the paper's bare field",
+    )
+
+    turn: float = Field(
+        0.0,
+        ge=0.0,
+        le=1.0,
+        description="rad: by so much the force of what closes in is turned to the side of `turning_sense`, so"
+        " that a vehicle that is met head on moves aside and not ahead",
+    )
+    reaction: float = Field(
+        0.0, ge=0.0, le=2.0, description="s that pass until a vehicle brakes: with bounded jerk about a/(2 j)"
+    )
+    smoothing_us: int = Field(
+        50_000, ge=0, le=2_000_000, description="time constant of the field's low-pass, µs; 0 for none"
+    )
+    position_sigma: float = Field(
+        0.0, ge=0.0, le=5.0, description="m, σ of a vehicle's estimated position on its worst axis"
+    )
+    margin_sigmas: float = Field(
+        2.0, ge=0.0, le=6.0, description="k: the field's distances grow by k·σ of the error of a distance"
+    )
+
+    def margin(self, estimates: int) -> float:
+        """By how much (m) d_min and d_safe grow where a distance is known from so many estimates: k·σ·√n,
+        n = 2 between vehicles, 1 to what stands."""
+        return self.margin_sigmas * self.position_sigma * math.sqrt(estimates)
+
+
+class TangentialConfig(Settings):
+    """The tangential band, Sec. III-C.3."""
+
+    k_tang: Positive = 2.0
+    d_band: Positive = Field(1.0, description="m beyond d_safe; more than v_max·dt + u_max·dt²/2")
+    reach_s: float = Field(0.5, ge=0.0, le=5.0, description="the band grows by this times the closing speed")
+    d_full: Positive = Field(1.0, description="m, between centres: the force is at its full there")
+    omega_scale: float = Field(0.1, gt=0.0, le=1.0, description="Ω_t,min / Ω_t,max inside the band")
+    force_max: Positive = Field(6.0, description="m/s²; above u_max, or the input cancels it")
+    pass_speed: Positive = Field(5.0, description="m/s sideways at which the force is gone; whole up to half")
+    gap: float = Field(
+        3.2, ge=0.0, le=100.0, description="m between surfaces; what is nearer to each other is passed as one"
+    )
+
+
+class SwivelConfig(Settings):
+    """The swivelling destination, Sec. III-C.1."""
+
+    k_s: Positive = Field(0.08, description="rad per m of ‖∇J‖/Ω_t; the paper has 0.05 of its own gradient")
+    arrived: Positive = Field(0.3, description="‖∇J‖ below which the vehicle is there and its sense is free")
+
+
+class ApproachAngleConfig(Potential):
+    """The field of approach angles, Sec. III-C.2. Its distances are squares of angles, rad²."""
+
+    gain: Positive = Field(2.0, description="K of the angles")
+    d_min: Positive = Field(0.01, description="rad²: the field is clamped there")
+    d_safe: Positive = Field(1.0, description="rad²: the field begins there; (2π/8)² is 0.62")
+    force_max: Positive = Field(4.0, description="m/s²; above u_max, or the input cancels it")
+    pass_speed: Positive = Field(3.0, description="m/s across at which the force is gone; whole up to half")
+    reach: Positive = Field(6.0, description="m: who is further off is not met yet")
+
+
+class HeadingConfig(Settings):
+    """What yaw may be asked of the vehicle, and how eagerly."""
+
+    rate_max: Positive = Field(3.0, description="rad/s")
+    acceleration_max: Positive = Field(
+        1.6, description="rad/s²; the firefly's yaw torque gives 2.5 at hover, less while it turns hard"
+    )
+    effort: Positive = Field(1e-4, description="s⁴, weight of (yaw acceleration)² against (yaw error)²")
+    blind: Positive = Field(0.1, description="m, horizontally: nearer than this no bearing counts")
+
+
+FADING = 1.0
+"""m over which the force fades out beyond ``reach``, behind, and towards the target, which has no bearing."""

@@ -1,0 +1,93 @@
+"""The last seconds of a track, so that a late measurement is taken in its place.
+
+The measurements lie in the order of the times at which they were true, each with the belief after it. A late
+one goes between them, and those after it are taken again, gate and doubts included: what comes of them is the
+same, bit by bit, as if they had come in order.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+
+from companion.estimation.estimator import Belief, Estimator, Measured
+from companion.estimation.sender_clock import Dated
+
+
+class Rewind:
+    """Measurements of the last ``window`` µs, and for a while some older ones, and what was believed before
+    them."""
+
+    __slots__ = (
+        "_before",
+        "_beliefs",
+        "_estimator",
+        "_measured",
+        "_times",
+        "_window",
+        "belief",
+        "too_late",
+    )
+
+    def __init__(self, estimator: Estimator, window: int) -> None:
+        self._estimator = estimator
+        self._window = window
+        self._before: Belief | None = None
+        self._times: list[int] = []
+        self._measured: list[Measured] = []
+        self._beliefs: list[Belief] = []
+        self.belief: Belief | None = None
+        self.too_late = 0
+
+    def put(self, dated: Dated, z: Measured) -> bool:
+        """Take a measurement ``z``; whether it became part of the belief.
+
+        One from before the window is refused and counted. Of several with the same stamp the first counts:
+        the answer for the others is its own.
+        """
+        times = self._times
+        time = dated.time
+        if times and time <= times[-1]:
+            if time < times[-1] - self._window:
+                self.too_late += 1
+                return False
+            return self._between(dated, z)
+        before = self.belief
+        self.belief = belief = self._estimator.after(before, time, z)
+        times.append(time)
+        self._measured.append(z)
+        self._beliefs.append(belief)
+        # Not one by one: what is kept for longer is never asked for.
+        if times[0] < time - 2 * self._window:
+            self._forget()
+        return before is None or belief.refused == before.refused
+
+    def _between(self, dated: Dated, z: Measured) -> bool:
+        """Take a late measurement."""
+        times, time = self._times, dated.time
+        place = bisect_right(times, time)
+        if dated.stamped and place > 0 and times[place - 1] == time:
+            return self._accepted(place - 1)
+        times.insert(place, time)
+        self._measured.insert(place, z)
+        self._replay(place)
+        return self._accepted(place)
+
+    def _replay(self, first: int) -> None:
+        """Take the measurements from ``first`` on, again or for the first time."""
+        beliefs = self._beliefs
+        del beliefs[first:]
+        belief = beliefs[-1] if first > 0 else self._before
+        for time, z in zip(self._times[first:], self._measured[first:], strict=True):
+            belief = self._estimator.after(belief, time, z)
+            beliefs.append(belief)
+        self.belief = belief
+
+    def _accepted(self, place: int) -> bool:
+        before = self._beliefs[place - 1] if place > 0 else self._before
+        return before is None or self._beliefs[place].refused == before.refused
+
+    def _forget(self) -> None:
+        """Nothing may still come between those from before the window."""
+        old = bisect_left(self._times, self._times[-1] - self._window)
+        self._before = self._beliefs[old - 1]
+        del self._times[:old], self._measured[:old], self._beliefs[:old]

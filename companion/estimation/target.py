@@ -1,0 +1,109 @@
+"""The target, by whichever kind of message is configured to tell of it: one speaker at a time, one track."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.config import CompanionConfig
+from companion.config.target_source import CameraSource, FixedSource, message_of, speaker_of
+from companion.estimation.tracks import State, Track
+from companion.values.horizon import Array
+from mavlink_bridge.frames import FleetFrame, ned_to_enu
+from mavlink_bridge.messages import CameraTrackingGeo, FollowTarget, GlobalPosition, Message, Source
+
+_KINDS = {33: GlobalPosition, 144: FollowTarget, 276: CameraTrackingGeo}
+_TRACKING = 1
+"""CAMERA_TRACKING_STATUS_FLAGS_ACTIVE."""
+
+
+class Target:
+    """Hears of the target and says where it is, fleet-local ENU. ``refused``: messages of the right kind that
+    did not count: of others than the speaker, or of a camera that does not track."""
+
+    def __init__(self, config: CompanionConfig, system: int, target_system: int, fleet: FleetFrame) -> None:
+        source = config.target_source
+        self._config = config
+        self._fleet = fleet
+        self._system = system
+        self._kind = _KINDS.get(message_of(source) or 0)
+        self._believed = speaker_of(source, system, target_system)
+        self._links = ("target", "autopilot") if isinstance(source, CameraSource) else ("target",)
+        self._fixed = None
+        if isinstance(source, FixedSource):
+            self._fixed = State(np.array(source.at), np.zeros(3), 0, 0.0)
+        self._track = self._before = Track(config.target)
+        self._speaker: Source | None = None
+        self._heard = 0
+        self.refused = 0
+
+    def hear(self, now: int, link: str, message: Message) -> bool:
+        """Take a message that arrived by ``link`` at ``now`` (µs); whether it became part of the track."""
+        if self._kind is None or not isinstance(message, self._kind) or link not in self._links:
+            return False
+        if not self._may_speak(now, message.source):
+            self.refused += 1
+            return False
+        if not self._measure(now, message):
+            return False
+        self._heard = now
+        return True
+
+    def at(self, now: int) -> State | None:
+        """The target at ``now`` (µs); None before the first message, and when it is unheard of for too
+        long."""
+        return self.fresh(self.last(now))
+
+    def last(self, now: int) -> State | None:
+        """The same however long it is unheard of: carried on for a bounded time, it may well be there."""
+        return self._known.at(now) if self._fixed is None else self._fixed
+
+    def fresh(self, state: State | None) -> State | None:
+        """``state`` where it is no older than a target may be that is followed."""
+        old = state is not None and state.age > self._config.guard.target_stale_us
+        return None if old else state
+
+    def age(self, now: int) -> int | None:
+        """Age (µs) of what is known; None before the first message."""
+        if self._fixed is not None:
+            return 0
+        time = self._known.time
+        return None if time is None else now - time
+
+    @property
+    def _known(self) -> Track:
+        """The speaker's track, or the last one's until anything has come of the new one's messages."""
+        return self._before if self._track.time is None else self._track
+
+    def _may_speak(self, now: int, source: Source) -> bool:
+        """Two components of one system may both tell of a target, each with its own clock and errors: who has
+        been heard goes on, until silent for as long as a target may be."""
+        if source.system == 0 or (self._believed is not None and source.system != self._believed):
+            return False
+        if self._believed is None and source.system == self._system:
+            return False
+        if source == self._speaker:
+            return True
+        if self._speaker is not None:
+            if now - self._heard <= self._config.guard.target_stale_us:
+                return False
+            # Another clock, other errors.
+            self._before, self._track = self._known, Track(self._config.target)
+        self._speaker, self._heard = source, now
+        return True
+
+    def _measure(self, now: int, message: Message) -> bool:
+        velocity: Array | None
+        if isinstance(message, GlobalPosition):
+            velocity, stamp = ned_to_enu(message.velocity_ned), message.time_boot
+        elif isinstance(message, FollowTarget):
+            # Three zeros stand for an unknown velocity too.
+            told = message.velocity if message.velocity is not None and any(message.velocity) else None
+            velocity, stamp = None if told is None else ned_to_enu(told), message.time_boot
+        elif isinstance(message, CameraTrackingGeo) and message.status == _TRACKING:
+            velocity = None if message.velocity_ned is None else ned_to_enu(message.velocity_ned)
+            stamp = 0
+        else:
+            self.refused += 1
+            return False
+        position = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
+        return self._track.measure(now, position, velocity, stamp)

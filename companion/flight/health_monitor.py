@@ -1,0 +1,264 @@
+"""What is wrong, for how long, and what follows: one table for all that a flight may have to react to.
+
+Each concern has a limit, an age or a share, in ``GuardConfig``; a reaction, which is never undone by the
+concern's end but by an order; and a sentence for the ground, said when it begins and when it ends.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from enum import Enum
+from typing import NamedTuple
+
+from companion.config import CompanionConfig
+from companion.flight.guard import Holding
+from companion.flight.vehicle import CRITICAL, Vehicle
+from companion.telemetry.status_text import Severity
+from companion.values.phase import Phase
+from companion.world import View
+
+
+class Reaction(Enum):
+    """What the companion does; the later in this list the graver."""
+
+    TELL = "tell"
+    RETURN = "come back and land"
+    LAND = "come to a hover clear of the others and land"
+
+
+class Concern(NamedTuple):
+    """One thing that is wrong now."""
+
+    name: str
+    text: str
+    reaction: Reaction = Reaction.TELL
+    severity: Severity = Severity.WARNING
+
+
+class Situation(NamedTuple):
+    """What concerns are judged by. ``late``: µs by which this step comes after the last one's due time;
+    ``neighbours``: age (µs) by system id; ``holding``: what is flown; ``failing``: since when (µs) no plan
+    could be solved, None while they can; ``clock_steps``: how often the autopilot's clock has been set;
+    ``moves``: how often its origin has moved, the last time with the vehicle by ``displaced`` m;
+    ``clock_lost``: µs that its clock has lost in all; ``unanswered``: its messages come late, and it does
+    not tell whether that is its clock; ``error``: how far (m) the vehicle is from its set-points;
+    ``nearest``: the neighbour that is nearest to it, and how near (m)."""
+
+    now: int
+    view: View
+    phase: Phase
+    vehicle: Vehicle
+    holding: Holding
+    neighbours: Mapping[int, int]
+    failing: int | None
+    late: int
+    clock_steps: int
+    moves: int = 0
+    displaced: float = 0.0
+    clock_lost: int = 0
+    unanswered: bool = False
+    error: float = 0.0
+    nearest: tuple[int, float] | None = None
+
+
+class Change(NamedTuple):
+    """A concern that began or ended."""
+
+    concern: Concern
+    begins: bool
+
+
+class _Lately:
+    """What happens at one moment stays a concern for a while."""
+
+    def __init__(self) -> None:
+        self._until = 0
+
+    def after(self, now: int, happens: bool) -> bool:
+        """Whether it does, or did lately."""
+        if happens:
+            self._until = now + _REMEMBERED
+        return now < self._until
+
+
+class Watch:
+    """Judges each situation. ``concerns`` are those of now, by name."""
+
+    def __init__(self, config: CompanionConfig) -> None:
+        self._config = config
+        self.concerns: dict[str, Concern] = {}
+        self._late, self._clock_set, self._origin_moved = _Lately(), _Lately(), _Lately()
+        self._astray = _Lately()
+        self._clock_steps = self._moves = 0
+        self._lost: deque[tuple[int, int]] = deque()
+        self._target_seen = False
+
+    def look(self, s: Situation) -> list[Change]:
+        """What has changed since the last look."""
+        found = {concern.name: concern for concern in self._judge(s)}
+        changes = [Change(concern, True) for name, concern in found.items() if name not in self.concerns]
+        changes += [Change(concern, False) for name, concern in self.concerns.items() if name not in found]
+        self.concerns = found
+        return changes
+
+    @property
+    def blinkered(self) -> bool:
+        """Whether what it knows of the others, or of itself, may be old, or what it does late."""
+        vague = not _VAGUE.isdisjoint(self.concerns)
+        return vague or any(name.startswith((_NEIGHBOUR, _CLOSE)) for name in self.concerns)
+
+    # Each: a concern, or nothing
+
+    def _judge(self, s: Situation) -> list[Concern]:
+        found = [
+            self._own(s),
+            self._positioning(s),
+            self._target(s),
+            self._solver(s),
+            self._battery(s),
+            self._autopilot(s),
+            self._fence(s),
+            self._tracking(s),
+            self._near(s),
+            self._lateness(s),
+            self._clock(s),
+            self._slow_clock(s),
+            self._late_messages(s),
+            self._origin(s),
+            *self._others(s),
+        ]
+        return [concern for concern in found if concern is not None]
+
+    def _own(self, s: Situation) -> Concern | None:
+        guard, age = self._config.guard, s.view.own_age
+        if s.phase in _ON_THE_GROUND or age <= guard.own_stale_us:
+            return None
+        lost = age > guard.own_lost_us
+        text = "Own position is lost: landing" if lost else "Own position is old: braking"
+        return Concern(f"own state {lost}", text, Reaction.LAND if lost else Reaction.TELL)
+
+    def _positioning(self, s: Situation) -> Concern | None:
+        trouble = s.vehicle.positioning.trouble
+        if not trouble or s.phase in _ON_THE_GROUND:
+            return None
+        return Concern("positioning", f"{trouble}: dead reckoning", severity=Severity.CRITICAL)
+
+    def _target(self, s: Situation) -> Concern | None:
+        if s.view.target is not None:
+            self._target_seen = True
+            return None
+        if not self._target_seen or self._config.task != "escort" or s.phase in _ON_THE_GROUND:
+            return None
+        return Concern("target", "Target lost: holding")
+
+    def _solver(self, s: Situation) -> Concern | None:
+        guard = self._config.guard
+        if s.failing is None or s.now - s.failing <= guard.hold_us or s.phase in _ON_THE_GROUND:
+            return None
+        lost = s.now - s.failing > guard.unsolved_us
+        text = "No plan can be found: landing" if lost else "No plan can be found: braking"
+        return Concern(f"solver {lost}", text, Reaction.LAND if lost else Reaction.TELL)
+
+    def _battery(self, s: Situation) -> Concern | None:
+        guard = self._config.guard
+        left = None if s.vehicle.status is None else s.vehicle.status.battery_remaining
+        if left is None or left >= guard.battery_low or s.phase in _ON_THE_GROUND:
+            return None
+        if left < guard.battery_critical:
+            return Concern(
+                "battery critical", f"Battery {100 * left:.0f} %: landing", Reaction.LAND, Severity.CRITICAL
+            )
+        return Concern("battery low", f"Battery {100 * left:.0f} %: coming back", Reaction.RETURN)
+
+    def _autopilot(self, s: Situation) -> Concern | None:
+        beat = s.vehicle.heartbeat
+        if beat is None or s.phase in _ON_THE_GROUND:
+            return None
+        if not s.vehicle.alive:
+            return Concern("heartbeat", "Autopilot is not heard: no set-points")
+        if s.phase is Phase.YIELDED:
+            return Concern(
+                "custody", "Vehicle taken over: no set-points until a go", severity=Severity.NOTICE
+            )
+        if beat.system_status >= CRITICAL:
+            return Concern("failsafe", "Autopilot reports a failsafe")
+        return None
+
+    def _tracking(self, s: Situation) -> Concern | None:
+        alarm = self._config.tracking.alarm
+        if alarm is None or s.phase in _ON_THE_GROUND:
+            return None
+        return (
+            Concern("tracking", "Vehicle is beside its set-points: slower")
+            if self._astray.after(s.now, s.error > alarm)
+            else None
+        )
+
+    def _near(self, s: Situation) -> Concern | None:
+        near = self._config.guard.near
+        if near is None or s.nearest is None or s.phase in _ON_THE_GROUND or s.nearest[1] >= near:
+            return None
+        return Concern(f"near {s.nearest[0]}", f"Neighbour {s.nearest[0]} is near: slower")
+
+    def _fence(self, s: Situation) -> Concern | None:
+        guard, own = self._config.guard, s.view.own
+        if own is None or s.phase in _ON_THE_GROUND:
+            return None
+        x, y, z = own.position.tolist()
+        far = guard.fence_radius is not None and x * x + y * y > guard.fence_radius**2
+        high = guard.fence_height is not None and z > guard.fence_height
+        if not (far or high):
+            return None
+        which = "too far from the origin" if far else "too high"
+        return Concern("fence", f"Fence: {which}, coming back", Reaction.RETURN, Severity.CRITICAL)
+
+    def _lateness(self, s: Situation) -> Concern | None:
+        late = self._late.after(s.now, s.late > self._config.guard.late_us)
+        return Concern("lateness", "Deadlines are missed") if late else None
+
+    def _clock(self, s: Situation) -> Concern | None:
+        jumped = self._clock_set.after(s.now, s.clock_steps != self._clock_steps)
+        self._clock_steps = s.clock_steps
+        return Concern("clock", "The autopilot's clock has jumped") if jumped else None
+
+    def _slow_clock(self, s: Situation) -> Concern | None:
+        """Over some seconds; what is lost once is but a stall."""
+        lost = self._lost
+        lost.append((s.now, s.clock_lost))
+        while s.now - lost[0][0] > _LOSING:
+            lost.popleft()
+        most = _SLOW if "slow clock" not in self.concerns else 0.25 * _SLOW
+        if s.clock_lost - lost[0][1] <= most * _LOSING or s.phase in _ON_THE_GROUND:
+            return None
+        return Concern("slow clock", "Autopilot's clock is slow: followed")
+
+    def _late_messages(self, s: Situation) -> Concern | None:
+        if not s.unanswered or s.phase in _ON_THE_GROUND:
+            return None
+        return Concern("late messages", "Autopilot is heard late: slow link or clock")
+
+    def _origin(self, s: Situation) -> Concern | None:
+        moved = self._origin_moved.after(s.now, s.moves != self._moves)
+        self._moves = s.moves
+        if not moved or s.phase in _ON_THE_GROUND:
+            return None
+        if not s.displaced <= self._config.guard.displaced:
+            return Concern(
+                "origin True", "Own position has jumped: landing", Reaction.LAND, Severity.CRITICAL
+            )
+        return Concern("origin False", "The autopilot's origin has moved")
+
+    def _others(self, s: Situation) -> list[Concern]:
+        limit = self._config.guard.neighbour_lost_us
+        lost = sorted(system for system, age in s.neighbours.items() if age > limit)
+        return [Concern(f"{_NEIGHBOUR}{system}", f"Neighbour {system} is not heard") for system in lost]
+
+
+_NEIGHBOUR, _CLOSE = "neighbour ", "near "
+_VAGUE = frozenset(("lateness", "positioning", "tracking"))
+_ON_THE_GROUND = (Phase.CONNECT, Phase.DONE)
+_REMEMBERED = 5_000_000
+"""µs."""
+_SLOW, _LOSING = 0.01, 10_000_000
+"""Share of the time that a clock loses, over so many µs."""

@@ -1,0 +1,124 @@
+"""Configured limits, lowered to what the autopilot can follow by its parameters.
+
+What is beyond a firmware's limits is followed late: the vehicle is then not where its plan says, and plans
+keep apart in vain. Jerk bounds count where the firmware enforces them on set-points (``Limits.shaped``). A
+bound on a norm is divided between the two horizontal axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import degrees, hypot, inf
+from typing import NamedTuple
+
+from companion.config.planning import LimitsConfig
+from companion.flight.autopilots import Loop, Profile, Shaping
+from companion.flight.autopilots.limits import STOCK, Limits, deciding, limits_of
+
+_AXIS = 0.7
+"""Share of a norm that an axis may have where both have as much."""
+_TILT = 0.9
+"""Share of the acceleration at the largest tilt that plan and compensation may have; gusts have the rest."""
+_ALIKE = 1e-3
+"""Share by which a limit may be lower and counts as the same: float32 is a little off."""
+
+_JERK, _ACCELERATION, _TILT_DEG = 1.0, 1.0, 10.0
+"""The least with which an escort is flown: m/s³, m/s² and degrees. With 1 m/s³ a vehicle needs 1.9 m to stop
+from a walker's 1.5 m/s, and 6.6 m from 3.5 m/s."""
+_SPEED, _VERTICAL, _POSITION_GAIN, _VELOCITY_GAIN = 1.0, 0.3, 0.3, 0.5
+"""The same: m/s, m/s up and down, 1/s and 1/s. With gains that are lower an error of position lasts for more
+than three seconds, and one of velocity for two."""
+
+
+class Lowered(NamedTuple):
+    """``limits``: what plans keep. ``acceleration`` (m/s²): what plan and compensation may come to together,
+    horizontally. ``loop``: the autopilot's gains, None for the stock firmware's. ``changes``: what was
+    lowered, in words; ``lacking``: what no escort can do without, in words, empty if all is there."""
+
+    limits: LimitsConfig
+    acceleration: float = inf
+    loop: Loop | None = None
+    changes: tuple[str, ...] = ()
+    lacking: str = ""
+
+
+def lowered(limits: LimitsConfig, profile: Profile, parameters: Mapping[str, float]) -> Lowered:
+    """``limits`` as far as an autopilot with these ``parameters`` can follow; as they are where something is
+    lacking."""
+    able = limits_of(profile.autopilot, parameters)
+    lacking = "; ".join(_lacking(able, profile.autopilot, parameters))
+    if lacking:
+        return Lowered(limits, lacking=lacking)
+    room = _TILT * able.tilt_acceleration
+    a_total = min(limits.a_total, room)
+    u = min(able.acceleration, a_total)
+    speed = min(1.0, able.speed / hypot(*limits.v_max[:2]))
+    found = limits.model_copy(
+        update={
+            "u_max": (min(limits.u_max[0], u), min(limits.u_max[1], u), min(limits.u_max[2], a_total)),
+            "v_max": (
+                speed * limits.v_max[0],
+                speed * limits.v_max[1],
+                min(limits.v_max[2], able.climb, able.sink),
+            ),
+            "a_total": a_total,
+            "j_max": _jerk(limits, able),
+        }
+    )
+    told = tuple(
+        f"{what} ({' '.join((name, f'{value:g}'))})"
+        for what, limit in _changes(limits, found, able)
+        for name, value in (deciding(profile.autopilot, parameters, limit),)
+    )
+    # What is lower by rounding alone stays as it is configured.
+    return Lowered(found if told else limits, room, _loop(profile, able), told)
+
+
+def _jerk(limits: LimitsConfig, able: Limits) -> tuple[float, float, float] | None:
+    if not able.shaped:
+        return limits.j_max
+    x, y, z = limits.j_max or (inf, inf, _AXIS * able.jerk)
+    return min(x, _AXIS * able.jerk), min(y, _AXIS * able.jerk), z
+
+
+def _loop(profile: Profile, able: Limits) -> Loop:
+    """How it follows with these parameters. ArduPilot's trajectory corrects at rates that its limits make."""
+    loop = profile.loop._replace(position=able.position_gain, velocity=able.velocity_gain)
+    if not able.shaped:
+        return loop
+    rate = able.jerk / able.acceleration
+    slew = loop.slew * min(1.0, able.jerk / STOCK[profile.autopilot].jerk)
+    return loop._replace(slew=slew, shaping=Shaping(able.jerk, 0.5 * rate, rate))
+
+
+def _changes(before: LimitsConfig, after: LimitsConfig, able: Limits) -> Iterator[tuple[str, str]]:
+    """What is lower ``after``, and the field of ``able`` that makes it so."""
+    push = "acceleration" if able.acceleration < after.a_total else "tilt"
+    climb = "climb" if able.climb < able.sink else "sink"
+    jerks = before.j_max or (inf, inf, inf), after.j_max or (inf, inf, inf)
+    for name, unit, was, is_now, limit in (
+        ("j_max", "m/s³", min(jerks[0][:2]), min(jerks[1][:2]), "jerk"),
+        ("a_total", "m/s²", before.a_total, after.a_total, "tilt"),
+        ("u_max", "m/s²", max(before.u_max[:2]), max(after.u_max[:2]), push),
+        ("u_max up", "m/s²", before.u_max[2], after.u_max[2], "tilt"),
+        ("v_max", "m/s", max(before.v_max[:2]), max(after.v_max[:2]), "speed"),
+        ("v_max up", "m/s", before.v_max[2], after.v_max[2], climb),
+    ):
+        if is_now < (1.0 - _ALIKE) * was:
+            yield f"{name} {is_now:.3g} {unit}", limit
+
+
+def _lacking(able: Limits, autopilot: int, parameters: Mapping[str, float]) -> Iterator[str]:
+    for what, unit, limit, is_now, least in (
+        ("jerk", "m/s³", "jerk", able.jerk if able.shaped else inf, _JERK),
+        ("horizontal acceleration", "m/s²", "acceleration", able.acceleration, _ACCELERATION),
+        ("tilt", "°", "tilt", degrees(able.tilt), _TILT_DEG),
+        ("speed", "m/s", "speed", able.speed, _SPEED),
+        ("rate of climb", "m/s", "climb", able.climb, _VERTICAL),
+        ("rate of descent", "m/s", "sink", able.sink, _VERTICAL),
+        ("position gain", "1/s", "position_gain", able.position_gain, _POSITION_GAIN),
+        ("velocity gain", "1/s", "velocity_gain", able.velocity_gain, _VELOCITY_GAIN),
+    ):
+        if is_now < (1.0 - _ALIKE) * least:
+            name, value = deciding(autopilot, parameters, limit)
+            yield f"a {what} of {least:g} {unit} at least: {name} {value:g} gives {is_now:.2g}"

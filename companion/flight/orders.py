@@ -1,0 +1,65 @@
+"""What an operator may tell a companion: NAV_TAKEOFF is the go, DO_REPOSITION the goal, NAV_LOITER_UNLIM to
+stay, NAV_RETURN_TO_LAUNCH to come back, NAV_LAND the end."""
+
+from __future__ import annotations
+
+from companion.config import CompanionConfig
+from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF, Pilot
+from companion.goals.goals import Aims
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source
+
+NAV_LOITER_UNLIM, NAV_RETURN, DO_REPOSITION = 17, 20, 192
+ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
+_GLOBAL = (0, 5)
+"""MAV_FRAME_GLOBAL and its INT twin."""
+_HIGHEST = 1e5
+"""m; a NaN is not below it either."""
+
+
+class Orders:
+    """To the companion ``own``; each is answered by a COMMAND_ACK, what is for somebody else is not."""
+
+    def __init__(
+        self, config: CompanionConfig, own: Source, fleet: FleetFrame, pilot: Pilot, aims: Aims
+    ) -> None:
+        self._config = config
+        self._own = own
+        self._fleet = fleet
+        self._pilot = pilot
+        self._aims = aims
+
+    def obey(self, message: Message) -> list[Message]:
+        """The answers to ``message``."""
+        if not isinstance(message, CommandInt | CommandLong):
+            return []
+        if (message.target_system, message.target_component) != self._own:
+            return []
+        taken = self._taken(message)
+        result = UNSUPPORTED if taken is None else ACCEPTED if taken else DENIED
+        return [CommandAck(self._own, message.command, result, 0, 0, *message.source)]
+
+    def _taken(self, order: CommandInt | CommandLong) -> bool | None:
+        """Whether it is obeyed; None for one that is not known."""
+        pilot = self._pilot
+        if isinstance(order, CommandInt):
+            return self._reposition(order) if order.command == DO_REPOSITION else None
+        if order.command == NAV_TAKEOFF:
+            return pilot.go(order.params[6])
+        plain = {NAV_LAND: pilot.land, NAV_LOITER_UNLIM: pilot.hold, NAV_RETURN: pilot.come_back}
+        obey = plain.get(order.command)
+        return None if obey is None else obey()
+
+    def _reposition(self, order: CommandInt) -> bool:
+        """To a place on the globe, its altitude above mean sea level; others are refused."""
+        latitude, longitude = order.x * 1e-7, order.y * 1e-7
+        if order.frame not in _GLOBAL or abs(latitude) > 90.0 or abs(longitude) > 180.0:
+            return False
+        if not abs(order.z) < _HIGHEST:
+            return False
+        goal = self._fleet.to_enu(latitude, longitude, order.z)
+        limits = self._config.limits
+        if self._config.task != "goto" or (goal < limits.box_min).any() or (goal > limits.box_max).any():
+            return False
+        self._aims.goal = goal
+        return True

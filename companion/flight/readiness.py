@@ -1,0 +1,145 @@
+"""What a companion waits for before it starts, and what it asks the autopilot for so that it comes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from companion.config import CompanionConfig
+from companion.flight.autopilot_limits import AutopilotLimits
+from companion.flight.autopilots import Params
+from companion.flight.command_protocol import DO_SET_MODE, Calls
+from companion.flight.vehicle import UNDEFINED, Vehicle
+from companion.world import View
+from mavlink_bridge.messages import CommandAck, Message
+
+REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
+OPERATORS_GO = "the operator's go"
+"""What it waits for when all else is ready."""
+_BESIDE = 30.0
+"""m from the box, on each axis, from where a vehicle may start."""
+_FAR = 20_000.0
+"""m between the fleet origin and the autopilot's own: beyond, one of the two is wrong."""
+STREAMS: Mapping[int, int] = MappingProxyType({32: 20_000, 30: 100_000, 1: 1_000_000, 245: 500_000})
+"""Message ids and intervals (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
+EXTENDED_SYS_STATE. The attitude tells only where the nose points when the set-points begin."""
+GPS_RAW, HEALTH = 24, 500_000
+"""GPS_RAW_INT, and the interval (µs) of that and of the message in which the estimator tells how it is. No
+start waits for them: a vehicle may have neither."""
+
+
+def _interval(message: int, interval: int) -> tuple[int, Params]:
+    return SET_MESSAGE_INTERVAL, (float(message), float(interval), 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+_NEEDED = tuple(_interval(message, interval) for message, interval in STREAMS.items())
+
+
+class Readiness:
+    """Of one ``vehicle``, whose autopilot is asked by ``calls``."""
+
+    def __init__(self, config: CompanionConfig, vehicle: Vehicle, calls: Calls) -> None:
+        self._config = config
+        self._vehicle = vehicle
+        self._calls = calls
+        self._wishes = Calls(calls.own)
+        self.limits = AutopilotLimits(config, vehicle, calls.own)
+
+    def hear(self, ack: CommandAck) -> None:
+        """An answer of the autopilot."""
+        self._wishes.hear(ack)
+
+    def forget(self) -> None:
+        """Nothing was asked or answered."""
+        self._wishes.forget()
+        self.limits.forget()
+
+    @property
+    def heard(self) -> bool:
+        """Whether all that is needed was answered."""
+        return all(self._calls.answered(*call) for call in _NEEDED)
+
+    def wishes(self, now: int) -> list[Message]:
+        """For messages that tell how well the vehicle knows where it is; later than for those that are
+        needed, as an answer names the command alone."""
+        profile = self._vehicle.profile
+        if profile is None or not self._vehicle.alive:
+            return []
+        wanted = [_interval(message, HEALTH) for message in (GPS_RAW, profile.estimator_message)]
+        open_ = [call for call in wanted if not self._wishes.answered(*call)]
+        return self._wishes.call(now, *open_[0]) if open_ else []
+
+    def unseen(self, view: View) -> str:
+        """What has not been heard that every plan needs."""
+        vehicle = self._vehicle
+        if vehicle.heartbeat is None or not vehicle.alive:
+            return "a heartbeat of the autopilot"
+        if vehicle.profile is None:
+            kind = vehicle.heartbeat.autopilot
+            return f"an autopilot that is known (ArduPilot 3, PX4 12; this is {kind})"
+        if view.local is None:
+            return "GPS_GLOBAL_ORIGIN"
+        far = float(np.linalg.norm(view.local.origin_fleet))
+        if not far < _FAR:
+            return f"a fleet origin that is not {far / 1000.0:.0f} km away from the vehicle's"
+        if view.own is None or view.own.age > self._config.guard.own_stale_us:
+            return "LOCAL_POSITION_NED"
+        return "" if view.yaw is not None else "ATTITUDE"
+
+    def missing(self, view: View, *, go: bool) -> str:
+        """What is not yet as it has to be before the start; ``go``: whether one was given."""
+        vehicle = self._vehicle
+        if unseen := self.unseen(view):
+            return unseen
+        if astray := self._astray(view):
+            return astray
+        if vehicle.armed and vehicle.landed_state == UNDEFINED:
+            # A vehicle that may be flying must not be told to take off.
+            return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
+        if not vehicle.healthy:
+            return f"the autopilot's pre-arm checks{self._starving()}"
+        if not self.heard:
+            return "the autopilot's answers to SET_MESSAGE_INTERVAL"
+        if waiting := self.limits.waiting:
+            return waiting
+        return "" if go else OPERATORS_GO
+
+    def _starving(self) -> str:
+        """Why they fail, where its mode is the reason."""
+        profile = self._vehicle.profile
+        if profile is None or not self._vehicle.starved:
+            return ""
+        return f", which fail in {profile.guided_name} without set-points: {profile.hold_name} first"
+
+    def _astray(self, view: View) -> str:
+        """Whether it stands where nobody can mean it to start: then the fleet origin is wrong, or the
+        vehicle's."""
+        limits, guard = self._config.limits, self._config.guard
+        if view.own is None:
+            return ""
+        place = view.own.position
+        x, y, z = place.tolist()
+        off = np.maximum(np.array(limits.box_min) - place, place - np.array(limits.box_max))
+        far = guard.fence_radius is not None and x * x + y * y > guard.fence_radius**2
+        if far or not float(off.max()) <= _BESIDE:
+            return f"a start near the box: it is at {x:.0f} m east, {y:.0f} m north, {z:.0f} m up"
+        status, low = self._vehicle.status, guard.battery_low
+        left = None if status is None else status.battery_remaining
+        return "" if left is None or left >= low else f"a battery above {100 * low:.0f} %"
+
+    def requests(self, now: int) -> list[Message]:
+        """For the messages and parameters that are needed, which change nothing of what the vehicle does; and
+        for the mode in which a disarmed vehicle passes its checks."""
+        calls: list[Message] = []
+        profile, vehicle = self._vehicle.profile, self._vehicle
+        if profile is not None and vehicle.alive and vehicle.starved and not vehicle.healthy:
+            # With set-points that somebody else sends the checks pass, and the mode is theirs.
+            calls += self._calls.call(now, DO_SET_MODE, profile.hold_call)
+        if self._vehicle.heartbeat is not None:
+            for command, params in sorted(_NEEDED, key=lambda call: self._calls.sent_at(*call)):
+                calls += self._calls.call(now, command, params)
+            # Again from time to time: an autopilot that began anew elsewhere has another origin.
+            calls += self._calls.call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        return calls + self.limits.step(now)

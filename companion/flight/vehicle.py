@@ -1,0 +1,135 @@
+"""What the own autopilot has said of itself: mode, armed, on the ground, checks, warnings."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from companion.flight.autopilots import Profile, is_guided
+from companion.flight.autopilots.known import profile_of
+from companion.flight.positioning import Positioning
+from mavlink_bridge.messages import (
+    EkfStatus,
+    EstimatorStatus,
+    ExtendedSysState,
+    GpsRaw,
+    Heartbeat,
+    Message,
+    StatusText,
+    SysStatus,
+)
+
+WARNING = 4
+"""MAV_SEVERITY."""
+ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
+UNDEFINED, ON_GROUND, IN_AIR = 0, 1, 2
+"""MAV_LANDED_STATE; others are on the way up or down."""
+CRITICAL = 5
+"""MAV_STATE; it and what follows tell of a failsafe."""
+HEARTBEAT_LOST = 3_000_000
+"""µs without a heartbeat after which the autopilot's mode is not known."""
+_TEXTS = 16
+
+
+class Vehicle:
+    """One autopilot, as heard. Messages are dated by ``tick``: one that has come since the last came then."""
+
+    def __init__(self) -> None:
+        self.heartbeat: Heartbeat | None = None
+        self.profile: Profile | None = None
+        self.said = ""
+        """The last warning: usually why it refuses."""
+        self.texts: deque[StatusText] = deque(maxlen=_TEXTS)
+        """What it said last, of any severity; ``told`` counts all of it."""
+        self.told = 0
+        self.status: SysStatus | None = None
+        self.positioning = Positioning()
+        self._extended: ExtendedSysState | None = None
+        self._beaten: Heartbeat | None = None
+        self._extended_seen: ExtendedSysState | None = None
+        self.now = self._beat_at = self._extended_at = 0
+
+    def hear(self, message: Message) -> None:
+        """One of its messages."""
+        if isinstance(message, Heartbeat):
+            if message.autopilot != INVALID:
+                self.heartbeat = message
+                self.profile = profile_of(message)
+        elif isinstance(message, SysStatus):
+            self.status = message
+        elif isinstance(message, ExtendedSysState):
+            self._extended = message
+        elif isinstance(message, GpsRaw | EkfStatus | EstimatorStatus):
+            self.positioning.hear(message)
+        elif isinstance(message, StatusText):
+            self.texts.append(message)
+            self.told += 1
+            if message.severity <= WARNING:
+                self.said = message.text
+
+    def tick(self, now: int) -> None:
+        """It is ``now`` (µs)."""
+        self.now = now
+        self.positioning.tick(now)
+        if self.heartbeat is not self._beaten:
+            self._beaten, self._beat_at = self.heartbeat, now
+        if self._extended is not self._extended_seen:
+            self._extended_seen, self._extended_at = self._extended, now
+
+    @property
+    def beat_at(self) -> int:
+        """When (µs) the last heartbeat came, 0 before the first."""
+        return self._beat_at
+
+    @property
+    def alive(self) -> bool:
+        """Whether its heart beats: whether what it said of its mode still counts."""
+        return self.heartbeat is not None and self.now - self._beat_at <= HEARTBEAT_LOST
+
+    @property
+    def armed(self) -> bool:
+        """As last heard."""
+        return self.heartbeat is not None and bool(self.heartbeat.base_mode & ARMED)
+
+    @property
+    def guided(self) -> bool:
+        """Whether it follows our set-points now."""
+        return self.alive and self.armed and self.in_guided_mode
+
+    @property
+    def in_guided_mode(self) -> bool:
+        """Whether its mode, as last heard, is the one in which set-points steer."""
+        beat, profile = self.heartbeat, self.profile
+        return beat is not None and profile is not None and is_guided(profile, beat)
+
+    @property
+    def mode(self) -> int:
+        """Its custom_mode, as last heard; 0 before."""
+        return 0 if self.heartbeat is None else self.heartbeat.custom_mode
+
+    @property
+    def flies(self) -> bool:
+        """Whether it may be in the air."""
+        return self.armed and self.landed_state != ON_GROUND
+
+    @property
+    def left_by_us(self) -> bool:
+        """Whether it is in the mode in which our set-points steer, or in the one in which we leave it."""
+        return self.in_guided_mode or (self.profile is not None and self.mode == self.profile.hold_mode)
+
+    @property
+    def starved(self) -> bool:
+        """Whether it is disarmed in the mode in which its checks before arming fail without set-points."""
+        profile = self.profile
+        return profile is not None and profile.streams_first and self.in_guided_mode and not self.armed
+
+    @property
+    def healthy(self) -> bool:
+        """Whether its checks before arming have passed."""
+        return self.status is not None and bool(self.status.health & PREARM_OK)
+
+    @property
+    def landed_state(self) -> int:
+        """MAV_LANDED_STATE as last heard, UNDEFINED if that is too long ago."""
+        if self._extended is None or self.now - self._extended_at > HEARTBEAT_LOST:
+            return UNDEFINED
+        return self._extended.landed_state

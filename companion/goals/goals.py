@@ -1,0 +1,195 @@
+"""Where to: the surface around the target, an own goal, or where to stay, to land, or to come back to."""
+
+from __future__ import annotations
+
+from math import hypot, inf
+from typing import Protocol
+
+import numpy as np
+
+from companion.avoidance.field.planner import Aim, standing
+from companion.config import CompanionConfig
+from companion.config.formation import Spread
+from companion.config.planning import LimitsConfig
+from companion.estimation.tracks import State
+from companion.goals.formation import even_turn, outside, spacing, taking_part
+from companion.goals.settling import Settling
+from companion.values.bearings import turned
+from companion.values.horizon import Array, Motion
+from companion.values.obstacles import Obstacles
+from companion.values.phase import Phase
+from companion.world import View
+
+_BACK, _STILL = 0.5, 0.5
+"""m and m/s: so near to where it started, and so slow, it is back."""
+_BESIDE, _PATIENCE = 5.0, 10_000_000
+"""m and µs: who is so near and has come no nearer for so long is back too."""
+
+
+_NOBODY = np.empty((0, 3))
+_NOBODY.flags.writeable = False
+
+
+class Flight(Protocol):
+    """The state of the flight, as far as goals depend on it."""
+
+    @property
+    def phase(self) -> Phase:
+        """Phase of the flight."""
+        ...
+
+    @property
+    def start(self) -> Array | None:
+        """Position (3,) before take-off, m, fleet-local ENU."""
+        ...
+
+    @property
+    def planned_limits(self) -> LimitsConfig:
+        """Limits that plans keep."""
+        ...
+
+    def returned(self) -> None:
+        """Report that the vehicle is back above its start."""
+        ...
+
+    def settled(self) -> None:
+        """Report that the vehicle hovers and may land."""
+        ...
+
+
+class Aims:
+    """Of the vehicle of ``system``. The ``pilot`` is asked for its phase, and told when the vehicle is back,
+    and when it has settled. ``seconds``: how far ahead a plan ends."""
+
+    def __init__(self, config: CompanionConfig, system: int, pilot: Flight, seconds: float) -> None:
+        self._config = config
+        self._pilot = pilot
+        self._seconds = seconds
+        self._surface = config.surface_of(system)
+        self._settling = Settling(config)
+        self._phase: Phase | None = None
+        self._held: Array | None = None
+        self._began: Array | None = None
+        self._nearest, self._nearer_at = inf, 0
+        self._lane = 0.0
+        limits = config.limits.within(config.field.margin(1))
+        self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
+        self.spacing = inf
+        """How far (m) from each other those that share the surface are to be; ∞ where it is not shared."""
+        self.goal: Array | None = None
+        """(3,) m, fleet-local ENU: as ordered, of the task ``goto``; None for where it began to steer."""
+
+    def begin(self, place: Array) -> None:
+        """It steers from ``place`` (3,) on, the first time or again."""
+        self._began = place
+
+    def forget(self, view: View) -> None:
+        """What was for another phase, or for a target that was lost before, counts no more."""
+        phase = self._pilot.phase
+        if phase is not self._phase:
+            self._phase, self._held = phase, None
+            limits = self._pilot.planned_limits
+            self._settling = Settling(self._config.model_copy(update={"limits": limits}))
+            self._nearest = inf
+        elif phase is Phase.ESCORT and self._config.task == "escort" and view.target is not None:
+            self._held = None
+
+    def aim(
+        self,
+        now: int,
+        view: View,
+        measured: Motion,
+        obstacles: Obstacles,
+        mates: Array = _NOBODY,
+        below: int = 0,
+        *,
+        cautious: bool,
+    ) -> Aim:
+        """For a plan at ``now`` (µs) from ``measured`` on, ``cautious`` no further than that speed goes;
+        ``obstacles``: of which it settles clear; ``mates`` (M, 3): where the others are that share the
+        surface; ``below``: how many of the others have a smaller id. SurfaceError where the surface has no
+        nearest point."""
+        self._lane = self._config.guard.return_step * below
+        self.spacing = inf
+        aim = self._destination(now, view, measured, obstacles, mates)
+        speed = self._config.guard.cautious_speed
+        return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
+
+    def _shortened(self, aim: Aim, measured: Motion, speed: float) -> Aim:
+        """The same way, but no further in a horizon than ``speed`` goes."""
+        drift = aim.target_end - aim.target
+        way = aim.destination - drift - measured.position
+        far = float(np.linalg.norm(way))
+        most = speed * 1e-6 * self._config.horizon.dt_us * (self._config.horizon.steps + 1)
+        if far <= most:
+            return aim
+        return aim._replace(destination=measured.position + drift + most / far * way)
+
+    def _destination(self, now: int, view: View, measured: Motion, obstacles: Obstacles, mates: Array) -> Aim:
+        target, phase, task = view.target, self._pilot.phase, self._config.task
+        if phase is Phase.RETURN:
+            place = self._way_back(now, measured)
+        elif phase is Phase.SETTLE:
+            place = self._settling.rest(now, measured, obstacles)
+            if self._settling.clear:
+                self._pilot.settled()
+        elif phase is not Phase.HOLD and task == "goto":
+            began = measured.position if self._began is None else self._began
+            place = began if self.goal is None else self.goal
+        elif phase is not Phase.HOLD and target is not None:
+            return self._around(target, measured, mates)
+        else:
+            # Told to, or because nobody is there to be stood around: where it is, clear of the others.
+            place = self._place_to_hold(measured)
+        return standing(place, None if target is None else target.position)
+
+    def _around(self, target: State, measured: Motion, mates: Array) -> Aim:
+        """The surface around the target where that will be at the end of the horizon."""
+        ahead, rate, surface = self._seconds, self._config.turn_rate, self._surface
+        (end,), (velocity,) = target.ahead(np.array([ahead]))
+        here = measured.position - target.position
+        turn = self._turn(here, mates - target.position)
+        offset = surface.nearest(turned(here, turn) if turn else here)
+        if rate:
+            offset = surface.nearest(turned(offset, rate * ahead))
+            velocity = velocity + rate * np.array([-offset[1], offset[0], 0.0])
+        if turn:
+            offset = outside(offset, turn)
+        return Aim(end + offset, velocity, target.position, end, surface)
+
+    def _turn(self, offset: Array, mates: Array) -> float:
+        """By how much (rad) the vehicle goes round, from its ``offset`` (3,) from the target towards its
+        place among ``mates`` (M, 3)."""
+        formation = self._config.formation
+        if not isinstance(formation, Spread) or not len(mates):
+            return 0.0
+        here = self._surface.nearest(offset)
+        others = taking_part(formation, mates, float(np.linalg.norm(here)))
+        turn = even_turn(offset, others)
+        if 0 < len(others) == len(mates):
+            self.spacing = spacing(hypot(here[0], here[1]), len(others), turn)
+        return max(-formation.turn, min(formation.turn, turn))
+
+    def _place_to_hold(self, measured: Motion) -> Array:
+        """Where it was when it was told to stay or to come back, or when the target was lost."""
+        if self._held is None:
+            self._held = measured.position.copy()
+        return self._held
+
+    def _way_back(self, now: int, measured: Motion) -> Array:
+        """Above where it started, as high as it flies now and its lane is above that, or as near to that as
+        it is allowed; told to the pilot when it is there, or beside it and comes no nearer."""
+        start = self._pilot.start
+        if start is None:
+            return measured.position
+        height = float(self._place_to_hold(measured)[2]) + self._lane
+        above: Array = np.clip(np.array([start[0], start[1], height]), self._low, self._high)
+        off = above - measured.position
+        far = hypot(off[0], off[1])
+        if far >= _BESIDE or far < self._nearest - _BACK:
+            self._nearest, self._nearer_at = far, now
+        there = far < _BACK and float(measured.velocity @ measured.velocity) < _STILL**2
+        # Who finds the place taken may go round it for ever.
+        if there or (far < _BESIDE and now - self._nearer_at > _PATIENCE):
+            self._pilot.returned()
+        return above

@@ -1,0 +1,113 @@
+"""The yaw that faces the target, planned over the horizon like a fourth axis.
+
+The paper sends the bearing of the target (Algorithm 1, line 4). Close by, that bearing turns faster than a
+multirotor can: its yaw torque is weak. Knowing the planned path, the yaw starts to turn beforehand: the QP
+keeps the yaw nearest to the bearings ahead, in the sense of least squares, within the vehicle's yaw rate and
+acceleration.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.avoidance.solver import QpSolver
+from companion.config.planning import HeadingConfig, HorizonConfig
+from companion.errors import SolverError
+from companion.values.horizon import Array
+from companion.values.prediction import prediction
+
+_EVERY = 2
+
+
+class Yaw(NamedTuple):
+    """ENU yaw (rad, not wrapped), its rate (rad/s) and acceleration (rad/s²)."""
+
+    yaw: float
+    rate: float
+    acceleration: float
+
+
+class Heading:
+    """Plans the yaw of one vehicle; each plan starts from the last one's state."""
+
+    def __init__(self, config: HeadingConfig, horizon: HorizonConfig) -> None:
+        # Half as many steps of twice the length as the path has: yaw is slow.
+        n, dt = (horizon.steps + 1) // _EVERY, _EVERY * horizon.dt_us * 1e-6
+        self._config, self._dt, self._n = config, dt, n
+        self._S_v, self._S_x, self._ahead = prediction(n, dt)
+        P: Array = 2.0 * (self._S_x.T @ self._S_x + config.effort * np.eye(n))
+        self._minimiser: Array = -np.asarray(np.linalg.inv(P), dtype=np.float64)
+        self._bounded, self._limited = QpSolver(P), QpSolver(P, self._S_v)
+        self._limit: Array = np.full(n, config.acceleration_max)
+        self._swing = config.acceleration_max * float(self._ahead[-1])
+        self._start: int | None = None
+        self._state = Yaw(0.0, 0.0, 0.0)
+        self._accelerations: Array = np.zeros(n)
+
+    def reset(self, measured: float) -> None:
+        """Forget the plan and stand at the ``measured`` yaw."""
+        self._start = None
+        self._state = Yaw(measured, 0.0, 0.0)
+
+    def plan(self, now: int, positions: Array, targets: Array) -> None:
+        """Plan from ``now`` (µs) along own ``positions`` (N + 1, 3) at n = 1…N + 1 facing ``targets`` (N + 1,
+        3).
+
+        Without a solution the yaw planned before is kept.
+        """
+        state = self.at(now)
+        last = _EVERY * self._n
+        offset = targets[_EVERY - 1 : last : _EVERY] - positions[_EVERY - 1 : last : _EVERY]
+        bearings = np.arctan2(offset[:, 1], offset[:, 0])
+        # Above or below the target no bearing is better than another.
+        blind = np.abs(offset[:, :2]).max(axis=1) < self._config.blind
+        if blind.any():
+            bearings[blind] = state.yaw
+        free = state.yaw + self._ahead * state.rate
+        c = self._S_x.T @ (2.0 * (free - _unwrapped(state.yaw, bearings)))
+        try:
+            self._accelerations = self._solve(c, state.rate)
+        except SolverError:
+            return
+        self._start, self._state = now, state
+
+    def at(self, time: int) -> Yaw:
+        """The planned yaw at ``time`` (µs); after the horizon it stands."""
+        if self._start is None:
+            return self._state
+        elapsed = max(time - self._start, 0) * 1e-6
+        index = min(int(elapsed / self._dt), self._n)
+        a = self._accelerations
+        rate, yaw = self._state.rate, self._state.yaw
+        if index:
+            yaw += index * self._dt * rate + float(self._S_x[index - 1] @ a)
+            rate += float(self._S_v[index - 1] @ a)
+        if index == self._n:
+            return Yaw(yaw, 0.0, 0.0)
+        s = elapsed - index * self._dt
+        acceleration = float(a[index])
+        return Yaw(yaw + s * rate + 0.5 * s * s * acceleration, rate + s * acceleration, acceleration)
+
+    def _solve(self, c: Array, rate: float) -> Array:
+        """The free minimiser if it keeps all bounds, or else by PIQP."""
+        limit, bound = self._limit, self._config.rate_max
+        a: Array = self._minimiser @ c
+        largest = float(np.abs(a).max())
+        if largest <= limit[0] and abs(rate) + largest * float(self._ahead[-1]) <= bound:
+            return a
+        if abs(rate) + self._swing <= bound:
+            return self._bounded.solve(c, -limit, limit)
+        # A rate that is too high already must be allowed, or there is no solution.
+        rows = np.full(self._n, max(bound, abs(rate)))
+        return self._limited.solve(c, -limit, limit, -rows - rate, rows - rate)
+
+
+def _unwrapped(start: float, angles: Array) -> Array:
+    """The angles (n,) without jumps of 2π, beginning with the turn nearest to ``start``."""
+    steps = np.empty_like(angles)
+    steps[0] = angles[0] - start
+    np.subtract(angles[1:], angles[:-1], out=steps[1:])
+    steps -= (2.0 * np.pi) * np.round(steps * (0.5 / np.pi))
+    return start + np.cumsum(steps)

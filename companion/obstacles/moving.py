@@ -1,0 +1,64 @@
+"""Obstacles that move: spheres and posts that say on the swarm link where they are, each with a system id of
+its own.
+
+Where they are, and will be, is heard as of a neighbour: a track, and a horizon if they share one. How large
+they are stands in the settings. Where one says that it is counts as exact, as the place of a fixed one does,
+so that one at rest acts as a fixed one of its size does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.config.obstacles import MovingPost, MovingSphere
+from companion.obstacles.static import to_surface
+from companion.values.horizon import Array
+from companion.values.obstacles import Obstacles
+
+
+class MovingObstacles:
+    """The sizes of M moving obstacles: which of them are balls (M,), radii (M,) and tops of the posts (M,),
+    m."""
+
+    def __init__(self, moving: tuple[MovingSphere | MovingPost, ...]) -> None:
+        self._rows = {one.system: k for k, one in enumerate(moving)}
+        self._ball = np.array([isinstance(one, MovingSphere) for one in moving], dtype=bool)
+        self._radius: Array = np.array([one.radius for one in moving], dtype=np.float64)
+        self._top: Array = np.array([one.height if isinstance(one, MovingPost) else np.inf for one in moving])
+
+    def __len__(self) -> int:
+        return len(self._radius)
+
+    def among(
+        self,
+        others: Obstacles,
+        prediction: Array,
+        d_min: float,
+        d_safe: float,
+        margin: float,
+        vehicles: float,
+    ) -> Obstacles:
+        """``others`` with the sizes of those that are no vehicles: ``d_min``, ``d_safe`` (m, of a point) grow
+        by radius and ``margin``, and a post is at the point of its axis nearest to the own ``prediction`` (N
+        + 1, 3). By what the radius of one is more than the margin of ``vehicles`` (m) nobody knows where it
+        is: as much larger is it here."""
+        found = [(j, self._rows[name]) for j, name in enumerate(others.ids) if name in self._rows]
+        if not found:
+            return others
+        here, rows = (list(part) for part in zip(*found, strict=True))
+        positions, least, safe = others.positions.copy(), others.d_min.copy(), others.d_safe.copy()
+        radius = np.broadcast_to(others.radius, len(others.ids)).copy()
+        radius[here] = self._radius[rows] + margin + (radius[here] - vehicles)
+        least[here], safe[here] = d_min + radius[here], d_safe + radius[here]
+        for j, row in found:
+            if not self._ball[row]:
+                positions[j, :, 2] = np.minimum(prediction[:, 2], self._top[row])
+        return Obstacles(others.ids, positions, least, safe, radius)
+
+    def distance(self, points: Array, places: Array) -> Array:
+        """From ``points`` (…, K, 3) to the surfaces of obstacles at ``places`` (…, M, 3), (…, K, M) m:
+        negative inside."""
+        off = points[..., :, None, :2] - places[..., None, :, :2]
+        top = np.where(self._ball, places[..., 2], self._top)
+        above = points[..., :, None, 2] - top[..., None, :]
+        return to_surface(np.sqrt(np.vecdot(off, off)), above, self._ball, self._radius)

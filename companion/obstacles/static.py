@@ -1,0 +1,74 @@
+"""Fixed obstacles that every companion knows: spheres, and posts that stand on the ground.
+
+For the field and its methods each is a point at its axis (a sphere: its centre) that is ``radius`` larger:
+the point of the axis nearest to where the vehicle will be, so that the force is horizontal beside a post and
+points up above it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.config.obstacles import Post, Sphere
+from companion.values.horizon import Array
+
+FIRST_ID = 1000
+"""Ids of fixed obstacles begin here: above every system id."""
+
+
+class Axes(NamedTuple):
+    """Obstacles near a vehicle: ids (M,), the nearest points of their axes (M, N + 1, 3) and radii (M,),
+    m."""
+
+    ids: tuple[int, ...]
+    positions: Array
+    radius: Array
+
+
+class FixedObstacles:
+    """All fixed obstacles as arrays: x, y of the axis (M, 2), the z that it spans (M,), radius (M,)."""
+
+    def __init__(self, obstacles: tuple[Sphere | Post, ...]) -> None:
+        self._ids = np.arange(FIRST_ID, FIRST_ID + len(obstacles))
+        self._xy: Array = np.array([o.at[:2] for o in obstacles]).reshape(-1, 2)
+        self._low: Array = np.array([o.at[2] if isinstance(o, Sphere) else -np.inf for o in obstacles])
+        self._high: Array = np.array([o.at[2] if isinstance(o, Sphere) else o.height for o in obstacles])
+        self._ball = np.array([isinstance(o, Sphere) for o in obstacles], dtype=bool)
+        self._radius: Array = np.array([o.radius for o in obstacles], dtype=np.float64)
+
+    def __len__(self) -> int:
+        return len(self._radius)
+
+    def around(self, prediction: Array, reach: float) -> Axes:
+        """Those with their surface within ``reach`` (m, horizontally) of some predicted position (N + 1,
+        3)."""
+        low, high = prediction[:, :2].min(axis=0) - reach, prediction[:, :2].max(axis=0) + reach
+        off = np.maximum(np.maximum(low - self._xy, self._xy - high), 0.0)
+        near = np.flatnonzero((off * off).sum(axis=1) <= self._radius**2)
+        positions = np.empty((len(near), len(prediction), 3))
+        positions[..., :2] = self._xy[near, None]
+        positions[..., 2] = np.clip(prediction[None, :, 2], self._low[near, None], self._high[near, None])
+        return Axes(tuple(self._ids[near].tolist()), positions, self._radius[near])
+
+    def distance(self, positions: Array) -> Array:
+        """From points (…, 3) to every surface (…, M), m; negative inside."""
+        off = positions[..., None, :2] - self._xy
+        above = positions[..., 2, None] - self._high
+        return to_surface(np.sqrt(np.vecdot(off, off)), above, self._ball, self._radius)
+
+
+def to_surface(across: Array, above: Array, ball: NDArray[np.bool_], radius: Array) -> Array:
+    """Distances (…, M) of points from the surfaces of spheres (where ``ball`` (M,)) and posts of ``radius``
+    (M,), m; negative inside.
+
+    The points are ``across`` (…, M) from the axes and ``above`` (…, M) a sphere's centre or a post's top,
+    which is flat.
+    """
+    beside = across - radius
+    outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(above, 0.0) ** 2)
+    post = np.where((beside < 0.0) & (above < 0.0), np.maximum(beside, above), outside)
+    result: Array = np.where(ball, np.sqrt(across**2 + above**2) - radius, post)
+    return result

@@ -1,0 +1,111 @@
+"""What the others need to know: own GLOBAL_POSITION_INT and horizon on the swarm link, a heartbeat on both
+links.
+
+The position is always sent besides the horizon: any MAVLink listener understands it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from companion.config import CompanionConfig
+from companion.values.horizon import Array, Horizon
+from companion.world import View
+from mavlink_bridge.doubt_wire import PAYLOAD_TYPE as DOUBT
+from mavlink_bridge.doubt_wire import pack as pack_doubt
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.frames import FleetFrame, enu_to_ned, yaw_to_ned
+from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, Source, Tunnel
+from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
+
+ONBOARD_CONTROLLER, AUTOPILOT_INVALID, ACTIVE = 18, 8, 4
+_SECOND = 1_000_000
+_TAKES_BACK = 3_000_000
+"""µs for which it is said that there is no doubt any more."""
+
+
+class Shared(NamedTuple):
+    """Messages by link."""
+
+    autopilot: list[Message]
+    swarm: list[Message]
+
+
+class Sharing:
+    """Sends each kind at its own period, on its own schedule."""
+
+    def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
+        self._config = config
+        self._own = own
+        self._fleet = fleet
+        self._boot: int | None = None
+        self._next = [0, 0, 0]
+        self._doubted: int | None = None
+
+    @property
+    def next_due(self) -> int:
+        """When (µs) there is something to share again."""
+        return min(self._next)
+
+    def due(self, now: int, view: View, horizon: Horizon | None, doubt: float = 0.0) -> Shared:
+        """What is due at ``now`` (µs). Without a flown ``horizon`` none is shared. ``doubt``: how far (m) the
+        vehicle may be from where it says that it is."""
+        if self._boot is None:
+            self._boot = now
+            self._next = [now, now, now]
+        rates = self._config.rates
+        shared = Shared([], [])
+        if self._passes(0, now, _SECOND):
+            beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+            shared.autopilot.append(beat)
+            shared.swarm.append(beat)
+        fresh = view.own is not None and view.own.age <= self._config.guard.own_stale_us
+        if self._passes(1, now, rates.state_us) and fresh:
+            shared.swarm.append(self._position(now - self._boot, view))
+            if doubt > 0.0:
+                self._doubted = now
+            if self._doubted is not None and now - self._doubted <= _TAKES_BACK:
+                # GLOBAL_POSITION_INT has no field for it.
+                shared.swarm.append(Tunnel(self._own, 0, 0, DOUBT, pack_doubt(doubt)))
+        if self._passes(2, now, rates.plan_us) and horizon is not None and self._config.shares_plan:
+            plan = plan_message(horizon, self._own, self._fleet)
+            if plan is not None:
+                shared.swarm.append(plan)
+        return shared
+
+    def _passes(self, kind: int, now: int, period: int) -> bool:
+        if now < self._next[kind]:
+            return False
+        self._next[kind] += period * (1 + (now - self._next[kind]) // period)
+        return True
+
+    def _position(self, since_boot: int, view: View) -> GlobalPosition:
+        if view.own is None:
+            raise ValueError("no own state to share")
+        yaw = None if view.yaw is None else yaw_to_ned(view.yaw)
+        return position_message(self._own, since_boot, self._fleet, view.own.position, view.own.velocity, yaw)
+
+
+def position_message(
+    source: Source, since_boot: int, fleet: FleetFrame, position: Array, velocity: Array, yaw: float | None
+) -> GlobalPosition:
+    """Where ``source`` is, as it tells it: position (3,), velocity (3,), fleet-local ENU; NED yaw; µs since
+    boot."""
+    latitude, longitude, altitude = fleet.to_geodetic(position)
+    north, east, down = enu_to_ned(velocity).tolist()
+    return GlobalPosition(
+        source, since_boot, latitude, longitude, altitude, float(position[2]), (north, east, down), yaw
+    )
+
+
+def plan_message(horizon: Horizon, source: Source, fleet: FleetFrame) -> Tunnel | None:
+    """A horizon as ``source`` tells it; None for one that does not fit the wire: neighbours then see the
+    position alone."""
+    knots = horizon.knots
+    try:
+        plan = quantise(
+            horizon.epoch, horizon.dt, knots[0, 0:3], knots[0, 3:6], knots[:-1, 6:9], fleet.fingerprint
+        )
+    except PlanWireError:
+        return None
+    return Tunnel(source, 0, 0, PAYLOAD_TYPE, pack(plan))

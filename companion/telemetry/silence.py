@@ -1,0 +1,15 @@
+"""Events for the ground: a source of messages falls silent, or is heard again."""
+
+from __future__ import annotations
+
+from companion.telemetry.status_text import Voice
+from companion.world import World
+
+
+def report_silence(now: int, world: World, voice: Voice) -> None:
+    """Report target and distance sensors of ``world`` that are silent at ``now`` (µs), and their return."""
+    if world.config.task == "escort" and world.target.age(now) is not None:
+        voice.watch(world.target.at(now) is None, "Target lost", "Target is back")
+    if world.sensed.proximity is not None:
+        silent = world.sensed.proximity.silent(now)
+        voice.watch(silent, "Obstacle sensor silent", "Obstacle sensor is back")

@@ -1,0 +1,30 @@
+"""Bearings seen from above: ENU, rad, from east towards north."""
+
+from __future__ import annotations
+
+from math import atan2, cos, pi, sin
+
+import numpy as np
+
+from companion.values.horizon import Array
+
+
+def bearing(origin: Array, point: Array) -> float:
+    """Horizontal bearing of ``point`` seen from ``origin``.
+
+    Two arguments, not the paper's quotient, which loses the half plane. Zero if the points coincide.
+    """
+    return atan2(point[1] - origin[1], point[0] - origin[0])
+
+
+def wrapped(angles: Array) -> Array:
+    """The same angles in [−π, π)."""
+    result: Array = (angles + pi) % (2.0 * pi) - pi
+    return result
+
+
+def turned(vector: Array, angle: float) -> Array:
+    """A vector (3,) turned about the vertical, counter-clockwise from above."""
+    c, s = cos(angle), sin(angle)
+    x, y, z = vector
+    return np.array([c * x - s * y, s * x + c * y, z])

@@ -1,0 +1,10 @@
+"""MAVLink component ids of a vehicle's computers."""
+
+from __future__ import annotations
+
+COMPONENT = 195
+"""MAV_COMP_ID_PATHPLANNER."""
+
+
+AUTOPILOT = 1
+"""MAV_COMP_ID_AUTOPILOT1: other components of the vehicle have no say in where it is."""

@@ -1,0 +1,53 @@
+"""What is to be avoided, aligned in time with the own horizon."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.values.horizon import Array
+
+_VEHICLES = np.zeros(1)
+_VEHICLES.flags.writeable = False
+
+
+class Obstacles(NamedTuple):
+    """What is to be avoided, M of them, aligned in time with the own horizon (fleet-local ENU, m).
+
+    ``positions`` (M, N + 1, 3) at n = 0…N; ``d_min``, ``d_safe`` (M,) between centres, ``radius`` (M,) or
+    (1,) included, which is what an obstacle is larger than a vehicle: its own size, and a margin for not
+    knowing where it is; ``ids`` name them for latches and logs.
+    """
+
+    ids: tuple[int, ...]
+    positions: Array
+    d_min: Array
+    d_safe: Array
+    radius: Array = _VEHICLES
+
+    def joined(self, others: Obstacles) -> Obstacles:
+        """These and the others."""
+        if not others.ids:
+            return self
+        return Obstacles(
+            self.ids + others.ids,
+            np.concatenate([self.positions, others.positions]),
+            np.concatenate([self.d_min, others.d_min]),
+            np.concatenate([self.d_safe, others.d_safe]),
+            np.concatenate([np.broadcast_to(part.radius, len(part.ids)) for part in (self, others)]),
+        )
+
+    def shared(self, systems: Collection[int], spacing: float) -> Obstacles:
+        """The same, where those of ``systems`` and the own vehicle are to be ``spacing`` m apart: at that
+        distance they push no more."""
+        if not any(id_ in systems for id_ in self.ids):
+            return self
+        theirs = np.array([id_ in systems for id_ in self.ids])
+        nearest = np.maximum(self.d_min + _WIDTH, spacing)
+        return self._replace(d_safe=np.where(theirs, np.minimum(self.d_safe, nearest), self.d_safe))
+
+
+_WIDTH = 1.0
+"""m, at least, between d_min and d_safe."""
