@@ -65,7 +65,7 @@ _SILENT = 4
 _HEARTBEAT, _SETPOINT, _ORIGIN, _COMMAND, _TUNNEL = 0, 84, 49, 76, 385
 
 
-class Helm:
+class BackupNode:
     """A ``Node`` beside the companion of ``system``, on the same clock. Links: ``autopilot``, ``swarm``.
     ``signing``: its own, with the companion's key."""
 

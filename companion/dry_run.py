@@ -9,7 +9,7 @@ from __future__ import annotations
 from companion.config import CompanionConfig
 from companion.flight.readiness import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
 from companion.node import Companion
-from companion.shadow import Onlooker, Understudy
+from companion.shadow import Onlooker, ShadowCompanion
 from companion.world import View
 from mavlink_bridge.messages import (
     CommandLong,
@@ -45,7 +45,7 @@ class _Asking(Onlooker):
         return [*self._readiness.requests(now), *wishes]
 
 
-class DryRun(Understudy):
+class DryRun(ShadowCompanion):
     """As ``Companion``; nothing leaves it that would change what the vehicle or anybody else does."""
 
     pilot: _Asking

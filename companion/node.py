@@ -14,18 +14,18 @@ from companion.config import CompanionConfig
 from companion.config.planning import MethodName
 from companion.estimation.time_sync import RoundTrips
 from companion.flight.guard import Guard
-from companion.flight.health_monitor import Situation, Watch
+from companion.flight.health_monitor import HealthMonitor, Situation
 from companion.flight.orders import Orders
 from companion.flight.reactions import Reactions
 from companion.flight.setpoint import is_finite, setpoint
 from companion.flight.state_machine import Pilot
-from companion.goals.goals import Aims
+from companion.goals.goals import Goals
 from companion.planning import Planning, Tally
-from companion.telemetry.metrics import Dials
+from companion.telemetry.metrics import Metrics
 from companion.telemetry.reception import LINKS, accepts
 from companion.telemetry.sharing import Sharing
 from companion.telemetry.silence import report_silence
-from companion.telemetry.status_text import Severity, Voice
+from companion.telemetry.status_text import Severity, StatusReporter
 from companion.values.components import COMPONENT
 from companion.values.horizon import Horizon
 from companion.values.phase import Phase
@@ -67,16 +67,16 @@ class Companion:
         self.world = World(config, system, target_system, fleet)
         self.pilot = self.pilots(config, self._source, fleet.altitude)
         self._sharing = Sharing(config, self._source, fleet)
-        self.voice = Voice(config.voice, self._source)
-        self._dials = Dials(config, self._source)
+        self.voice = StatusReporter(config.voice, self._source)
+        self._metrics = Metrics(config, self._source)
         self._signing = signing
         neighbours = self.world.neighbours
-        self._earshot = neighbours.earshot
+        self._relevance = neighbours.relevance
         self._codecs = {
             link: Codec(accepts(link, system, target_system, config, neighbours.ignores), signing, number)
             for number, link in enumerate(LINKS)
         }
-        self.watch = Watch(config)
+        self.watch = HealthMonitor(config)
         self._reactions = Reactions()
         self._round_trips = RoundTrips(self._source)
         self._next_look = self._looked_late = self._remarked = 0
@@ -85,10 +85,10 @@ class Companion:
         )
         ahead = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
         certified = self._certified
-        self._aims = Aims(config, system, self.pilot, ahead if certified is None else certified.seconds)
-        self._orders = Orders(config, self._source, fleet, self.pilot, self._aims)
+        self._goals = Goals(config, system, self.pilot, ahead if certified is None else certified.seconds)
+        self._orders = Orders(config, self._source, fleet, self.pilot, self._goals)
         self._planning = Planning(
-            config, self.world, self.pilot, self._aims, certified, stopwatch, self._dials.note
+            config, self.world, self.pilot, self._goals, certified, stopwatch, self._metrics.note
         )
         self._boot: int | None = None
         self._next_setpoint = 0
@@ -139,7 +139,7 @@ class Companion:
     def use(self, methods: tuple[MethodName, ...]) -> None:
         """From the next plan on."""
         self.planner.use(methods)
-        self._earshot.use(methods)
+        self._relevance.use(methods)
 
     def shed(self) -> Sequence[int]:
         """Take the stopwatch's readings (ns) away, and the plan log with them: for who runs for days."""
@@ -174,7 +174,7 @@ class Companion:
         self.world.doubt = self.pilot.vehicle.positioning.radius + self._planning.tracking.excess
         asked = self._round_trips.due(now, self.world.late)
         self._look(now, view)
-        self._aims.forget(view)
+        self._goals.forget(view)
         self._planning.fly(now, view, cautious=self.watch.blinkered)
         setpoints = self._setpoints(now, view)
         certified = self._certified
@@ -194,7 +194,7 @@ class Companion:
             return _NOTHING
         report_silence(now, self.world, self.voice)
         said: list[Message] = [*self.voice.due(now)]
-        said += self._dials.due(now, self.held, self.world.target.age(now))
+        said += self._metrics.due(now, self.held, self.world.target.age(now))
         return {link: said if link in self.config.voice.links else [] for link in ("autopilot", "ground")}
 
     def _has_to_act(self, now: int) -> bool:
@@ -207,26 +207,26 @@ class Companion:
 
     def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
         answers: list[Message] = []
-        self._earshot.now = now
+        self._relevance.now = now
         for link, data in inbox:
             for message in self._codecs[link].feed(data, whole=True):
                 if link == "ground":
                     answers += self._orders.obey(message)
                     continue
                 if link == "autopilot":
-                    self.pilot.hear(message)
+                    self.pilot.receive(message)
                     if isinstance(message, Timesync):
-                        self._hear_time(now, message)
+                        self._receive_time(now, message)
                         continue
                 if self._certified is not None and link == "swarm" and isinstance(message, Tunnel | Timesync):
-                    self._certified.hear(now, message)
+                    self._certified.receive(now, message)
                 else:
-                    self.world.hear(now, link, message)
+                    self.world.receive(now, link, message)
         return answers
 
-    def _hear_time(self, now: int, message: Timesync) -> None:
+    def _receive_time(self, now: int, message: Timesync) -> None:
         """What may be the autopilot's answer to what it was asked for the time."""
-        answer = self._round_trips.hear(message)
+        answer = self._round_trips.receive(message)
         if answer is not None:
             self.world.answered(now, answer)
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.avoidance.certified.commitment import Why
+from companion.avoidance.certified.commitment import HoldReason
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.field.plan_log import PlanLog
 from companion.avoidance.field.planner import Aim, Plan, Planner
@@ -20,7 +20,7 @@ from companion.flight.guard import Guard
 from companion.flight.lowering import Lowered
 from companion.flight.state_machine import Pilot
 from companion.flight.tracking import Tracking
-from companion.goals.goals import Aims
+from companion.goals.goals import Goals
 from companion.goals.heading import Heading, Yaw
 from companion.obstacles.neighbours import fading
 from companion.values.horizon import Array, Horizon, Motion, roll_out
@@ -50,7 +50,7 @@ class Tally(NamedTuple):
 
 
 class Planning:
-    """Of one vehicle, among what ``world`` knows, towards what ``aims`` says, while ``pilot`` has the
+    """Of one vehicle, among what ``world`` knows, towards what ``goals`` says, while ``pilot`` has the
     vehicle. ``certified`` makes plans, committed ones; without it ``planner`` does. ``stopwatch`` (ns) only
     measures how long planning takes, and ``took`` is told of each plan (ns); nothing depends on it."""
 
@@ -59,7 +59,7 @@ class Planning:
         config: CompanionConfig,
         world: World,
         pilot: Pilot,
-        aims: Aims,
+        goals: Goals,
         certified: CertifiedFlight | None,
         stopwatch: Callable[[], int],
         took: Callable[[int], None],
@@ -67,7 +67,7 @@ class Planning:
         self._config = config
         self._world = world
         self._pilot = pilot
-        self._aims = aims
+        self._goals = goals
         self._certified = certified
         self._stopwatch, self._told = stopwatch, took
         self.planner = Planner(config)
@@ -97,8 +97,8 @@ class Planning:
         """Counters for the summary."""
         failures, anchored = self.guard.failures, self.guard.anchored_anew
         if self._certified is not None:
-            keeper = self._certified.keeper
-            failures, anchored = keeper.held[Why.UNSOLVED], keeper.anchored_anew
+            commitment = self._certified.commitment
+            failures, anchored = commitment.held[HoldReason.UNSOLVED], commitment.anchored_anew
         return Tally(
             self._plans, self._relaxed, failures, self.held, anchored, self._plan_ns[:], self._plan_at[:]
         )
@@ -107,7 +107,7 @@ class Planning:
     def held(self) -> int:
         """How often an old plan was kept."""
         certified = self._certified
-        return self.guard.held if certified is None else sum(certified.keeper.held.values())
+        return self.guard.held if certified is None else sum(certified.commitment.held.values())
 
     @property
     def spent(self) -> Sequence[int]:
@@ -201,7 +201,7 @@ class Planning:
     def _begin(self, now: int, yaw: float, measured: Motion) -> None:
         """To steer, from the ``measured`` state on."""
         self._heading.reset(yaw)
-        self._aims.begin(measured.position)
+        self._goals.begin(measured.position)
         self.guard.start(now, measured)
         if self._certified is not None:
             self._certified.stand(now, measured.position)
@@ -223,9 +223,9 @@ class Planning:
             started = self._stopwatch()
             aim = None if stale else self._aim(now, view, measured, cautious=cautious)
             if aim is None:
-                flight.keeper.carry_on(Why.MISSING)
+                flight.commitment.carry_on(HoldReason.MISSING)
             elif flight.lost:
-                flight.keeper.anchor(now, measured)
+                flight.commitment.anchor(now, measured)
             else:
                 self._plans += flight.plan(now, aim, self._world, view)
             self._took(now, started)
@@ -253,8 +253,8 @@ class Planning:
                 # The others avoid the vehicle, not its plan.
                 prediction = prediction + self._fading * self.tracking.error
             obstacles = self._world.obstacles(now, view, prediction)
-            if self._aims.spacing < inf:
-                obstacles = obstacles.shared(self._world.neighbours.mate_ids(now), self._aims.spacing)
+            if self._goals.spacing < inf:
+                obstacles = obstacles.shared(self._world.neighbours.mate_ids(now), self._goals.spacing)
             self._obstacles = obstacles
             self.plan = self.planner.plan(
                 now, state.position, state.velocity, prediction, aim, obstacles, state.acceleration
@@ -294,7 +294,7 @@ class Planning:
         try:
             mates = self._world.neighbours.mates(now) if self._shares_surface else _NOBODY
             below = self._world.neighbours.below if self._config.guard.return_step else 0
-            aim = self._aims.aim(now, view, measured, self._obstacles, mates, below, cautious=cautious)
+            aim = self._goals.aim(now, view, measured, self._obstacles, mates, below, cautious=cautious)
         except SurfaceError:
             return None
         if self._config.traffic is None:

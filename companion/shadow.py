@@ -60,7 +60,7 @@ class Onlooker(Pilot):
         return []
 
 
-class Understudy(Companion):
+class ShadowCompanion(Companion):
     """As ``Companion``, on the vehicle of ``system``. ``would``: the set-points that it would have sent since
     they were last taken away.
 

@@ -103,21 +103,21 @@ class World:
         self.stamp = 0
         """The last time (µs since its boot) that the own autopilot told, 0 before the first."""
 
-    def hear(self, now: int, link: str, message: Message) -> None:
+    def receive(self, now: int, link: str, message: Message) -> None:
         """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
         if link == "swarm" and isinstance(message, GlobalPosition):
-            self.neighbours.hear_position(now, message)
+            self.neighbours.receive_position(now, message)
         elif link == "swarm" and isinstance(message, Tunnel):
-            self.neighbours.hear_plan(now, message)
+            self.neighbours.receive_plan(now, message)
         elif link == "target" or isinstance(message, CameraTrackingGeo):
-            self.target.hear(now, link, message)
+            self.target.receive(now, link, message)
         elif isinstance(message, ObstacleDistance):
-            self._hear_distances(now, message)
+            self._receive_distances(now, message)
         elif isinstance(message, AdsbVehicle):
             own = self._own.at(now)
-            self.sensed.hear_traffic(now, message, _ORIGIN if own is None else own.position)
+            self.sensed.receive_traffic(now, message, _ORIGIN if own is None else own.position)
         elif link == "autopilot" and message.source.system == self._system:
-            self._hear_own(now, message)
+            self._receive_own(now, message)
 
     def at(self, now: int) -> View:
         """The view at ``now`` (µs)."""
@@ -198,7 +198,7 @@ class World:
             )
         return obstacles
 
-    def _hear_distances(self, now: int, message: ObstacleDistance) -> None:
+    def _receive_distances(self, now: int, message: ObstacleDistance) -> None:
         """Of a sensor of the own system, placed where the vehicle was, and looked, when that was true."""
         config, own, local = self.config, self._own.at(now), self._local
         if config.proximity is None or message.source.system != self._system:
@@ -219,9 +219,9 @@ class World:
         known = np.array(
             [x + 1e-6 * min(when - time, most) * v for _, time, x, v in self.neighbours.last_heard()]
         ).reshape(-1, 3)
-        self.sensed.hear_distances(now, message, Stance(when, place, yaw, local.yaw_to_fleet(0.0)), known)
+        self.sensed.receive_distances(now, message, Stance(when, place, yaw, local.yaw_to_fleet(0.0)), known)
 
-    def _hear_own(self, now: int, message: Message) -> None:
+    def _receive_own(self, now: int, message: Message) -> None:
         if isinstance(message, LocalPosition | Attitude):
             self.stamp = message.time_boot
         if isinstance(message, LocalPosition):

@@ -57,7 +57,7 @@ class Following:
         self._offset = None
         self._heard = -math.inf
 
-    def hear(self, message: FollowTarget | GlobalPosition, here: Pose, now: int) -> None:
+    def receive(self, message: FollowTarget | GlobalPosition, here: Pose, now: int) -> None:
         """Someone says where he is, at ``now`` (µs); followed if it is the one."""
         if not self._is_meant(message):
             return

@@ -67,7 +67,7 @@ class Reception:
                     self._obey(message, now)
             case FollowTarget() | GlobalPosition():
                 if self._commander.follows and message.source.system != self._source.system:
-                    self._following.hear(message, estimate.pose, now)
+                    self._following.receive(message, estimate.pose, now)
             case Timesync(tc1=0):
                 # Zero would make the reply a request.
                 self._outbox.append(Timesync(self._source, max(1, now * 1000), message.ts1))

@@ -13,7 +13,7 @@ from companion.estimation.estimator import Belief, Estimator, Measured
 from companion.estimation.sender_clock import Dated
 
 
-class Rewind:
+class OutOfSequenceBuffer:
     """Measurements of the last ``window`` µs, and for a while some older ones, and what was believed before
     them."""
 

@@ -36,7 +36,7 @@ class Target:
         self._heard = 0
         self.refused = 0
 
-    def hear(self, now: int, link: str, message: Message) -> bool:
+    def receive(self, now: int, link: str, message: Message) -> bool:
         """Take a message that arrived by ``link`` at ``now`` (µs); whether it became part of the track."""
         if self._kind is None or not isinstance(message, self._kind) or link not in self._links:
             return False

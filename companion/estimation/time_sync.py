@@ -54,7 +54,7 @@ class RoundTrips:
         self._asked.append(question)
         return [Timesync(self._own, 0, question)]
 
-    def hear(self, message: Timesync) -> Answer | None:
+    def receive(self, message: Timesync) -> Answer | None:
         """An answer to one of the questions, once; None for anything else on the link."""
         if message.tc1 <= 0 or message.ts1 not in self._asked:
             return None

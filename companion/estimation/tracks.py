@@ -14,7 +14,7 @@ import numpy as np
 from companion.config.estimation import TrackConfig
 from companion.estimation.estimator import Belief, Measured, Six, estimator
 from companion.estimation.kalman_gains import model
-from companion.estimation.out_of_sequence import Rewind
+from companion.estimation.out_of_sequence import OutOfSequenceBuffer
 from companion.estimation.sender_clock import SenderClock
 from companion.estimation.turn_rate import Path, carried
 from companion.values.horizon import Array
@@ -55,7 +55,7 @@ class Track:
     def __init__(self, config: TrackConfig) -> None:
         self._config = config
         self._clock = SenderClock(config.delay_us, config.rewind_us)
-        self._rewind = Rewind(estimator(config), config.rewind_us)
+        self._rewind = OutOfSequenceBuffer(estimator(config), config.rewind_us)
         self._absurd = self._undated = 0
 
     @property

@@ -33,11 +33,11 @@ class AutopilotLimits:
         self.unread: tuple[str, ...] = ()
         self._found: dict[str, float] | None = None
 
-    def hear(self, message: ParamValue) -> None:
+    def receive(self, message: ParamValue) -> None:
         """A parameter of the autopilot, whoever asked for it."""
         profile = self._vehicle.profile
         if self._on and profile is not None:
-            self._parameters.hear(message, profile)
+            self._parameters.receive(message, profile)
 
     def forget(self) -> None:
         """Nothing was asked or heard."""

@@ -17,7 +17,7 @@ _REFUSALS = 16
 _Call = tuple[int, tuple[float, ...]]
 
 
-class Calls:
+class Commands:
     """What was asked of the autopilot of ``own``'s system, and what it answered; ``refusals``: the last, in
     words."""
 
@@ -32,7 +32,7 @@ class Calls:
         self._sent: dict[_Call, int] = {}
         self._asked: dict[int, _Call] = {}
 
-    def hear(self, message: CommandAck) -> None:
+    def receive(self, message: CommandAck) -> None:
         """An answer, unless it is to somebody else; it names the command alone and is taken for the last one
         of that kind. MAVLink 1 does not say whom it answers."""
         own = self._own

@@ -29,7 +29,7 @@ class Owner(Enum):
     UNKNOWN = "not known"
 
 
-class Custody:
+class ControlAuthority:
     """To be told of every set-point that leaves, and asked in every step of an escort."""
 
     def __init__(self, vehicle: Vehicle) -> None:

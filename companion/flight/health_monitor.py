@@ -82,7 +82,7 @@ class _Lately:
         return now < self._until
 
 
-class Watch:
+class HealthMonitor:
     """Judges each situation. ``concerns`` are those of now, by name."""
 
     def __init__(self, config: CompanionConfig) -> None:

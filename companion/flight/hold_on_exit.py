@@ -47,7 +47,7 @@ class LastWord:
         self._own = Source(system, COMPONENT)
         self._vehicle = Vehicle()
         if heartbeat is not None:
-            self._vehicle.hear(heartbeat)
+            self._vehicle.receive(heartbeat)
         self._signing = signing
         self._codec = Codec(
             lambda identifier, sender, component: (
@@ -77,7 +77,7 @@ class LastWord:
         for datagram in inbox:
             for message in self._codec.feed(datagram.data, whole=True):
                 if not isinstance(message, CommandAck):
-                    self._vehicle.hear(message)
+                    self._vehicle.receive(message)
                     self._fresh = True
                 elif message.command == DO_SET_MODE and message.result == ACCEPTED and self._asked:
                     self._next = now + _GRANTED

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from companion.config import CompanionConfig
 from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF, Pilot
-from companion.goals.goals import Aims
+from companion.goals.goals import Goals
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source
 
@@ -21,13 +21,13 @@ class Orders:
     """To the companion ``own``; each is answered by a COMMAND_ACK, what is for somebody else is not."""
 
     def __init__(
-        self, config: CompanionConfig, own: Source, fleet: FleetFrame, pilot: Pilot, aims: Aims
+        self, config: CompanionConfig, own: Source, fleet: FleetFrame, pilot: Pilot, goals: Goals
     ) -> None:
         self._config = config
         self._own = own
         self._fleet = fleet
         self._pilot = pilot
-        self._aims = aims
+        self._goals = goals
 
     def obey(self, message: Message) -> list[Message]:
         """The answers to ``message``."""
@@ -61,5 +61,5 @@ class Orders:
         limits = self._config.limits
         if self._config.task != "goto" or (goal < limits.box_min).any() or (goal > limits.box_max).any():
             return False
-        self._aims.goal = goal
+        self._goals.goal = goal
         return True

@@ -35,7 +35,7 @@ class Parameters:
         self._values.clear()
         self._since = None
 
-    def hear(self, message: ParamValue, profile: Profile) -> None:
+    def receive(self, message: ParamValue, profile: Profile) -> None:
         """A value, whoever asked for it or set it."""
         if message.name in stock_parameters(profile.autopilot):
             value = number_of(message, bytewise=profile.bytewise)

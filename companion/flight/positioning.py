@@ -37,7 +37,7 @@ class Positioning:
         self._worst = 0.0
         self._now = 0
 
-    def hear(self, message: Message) -> None:
+    def receive(self, message: Message) -> None:
         """One of its messages."""
         if isinstance(message, GpsRaw):
             fix = message.fix_type >= _FIX_3D

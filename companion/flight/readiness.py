@@ -10,7 +10,7 @@ import numpy as np
 from companion.config import CompanionConfig
 from companion.flight.autopilot_limits import AutopilotLimits
 from companion.flight.autopilots import Params
-from companion.flight.command_protocol import DO_SET_MODE, Calls
+from companion.flight.command_protocol import DO_SET_MODE, Commands
 from companion.flight.vehicle import UNDEFINED, Vehicle
 from companion.world import View
 from mavlink_bridge.messages import CommandAck, Message
@@ -40,16 +40,16 @@ _NEEDED = tuple(_interval(message, interval) for message, interval in STREAMS.it
 class Readiness:
     """Of one ``vehicle``, whose autopilot is asked by ``calls``."""
 
-    def __init__(self, config: CompanionConfig, vehicle: Vehicle, calls: Calls) -> None:
+    def __init__(self, config: CompanionConfig, vehicle: Vehicle, calls: Commands) -> None:
         self._config = config
         self._vehicle = vehicle
-        self._calls = calls
-        self._wishes = Calls(calls.own)
+        self._commands = calls
+        self._wishes = Commands(calls.own)
         self.limits = AutopilotLimits(config, vehicle, calls.own)
 
-    def hear(self, ack: CommandAck) -> None:
+    def receive(self, ack: CommandAck) -> None:
         """An answer of the autopilot."""
-        self._wishes.hear(ack)
+        self._wishes.receive(ack)
 
     def forget(self) -> None:
         """Nothing was asked or answered."""
@@ -59,7 +59,7 @@ class Readiness:
     @property
     def heard(self) -> bool:
         """Whether all that is needed was answered."""
-        return all(self._calls.answered(*call) for call in _NEEDED)
+        return all(self._commands.answered(*call) for call in _NEEDED)
 
     def wishes(self, now: int) -> list[Message]:
         """For messages that tell how well the vehicle knows where it is; later than for those that are
@@ -136,10 +136,12 @@ class Readiness:
         profile, vehicle = self._vehicle.profile, self._vehicle
         if profile is not None and vehicle.alive and vehicle.starved and not vehicle.healthy:
             # With set-points that somebody else sends the checks pass, and the mode is theirs.
-            calls += self._calls.call(now, DO_SET_MODE, profile.hold_call)
+            calls += self._commands.call(now, DO_SET_MODE, profile.hold_call)
         if self._vehicle.heartbeat is not None:
-            for command, params in sorted(_NEEDED, key=lambda call: self._calls.sent_at(*call)):
-                calls += self._calls.call(now, command, params)
+            for command, params in sorted(_NEEDED, key=lambda call: self._commands.sent_at(*call)):
+                calls += self._commands.call(now, command, params)
             # Again from time to time: an autopilot that began anew elsewhere has another origin.
-            calls += self._calls.call(now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            calls += self._commands.call(
+                now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            )
         return calls + self.limits.step(now)

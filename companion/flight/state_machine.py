@@ -14,8 +14,8 @@ from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig
 from companion.flight.autopilot_limits import AutopilotLimits
 from companion.flight.autopilots import Loop, Profile, Step
-from companion.flight.command_protocol import DO_SET_MODE, Calls
-from companion.flight.control_authority import Custody, Owner, Passage
+from companion.flight.command_protocol import DO_SET_MODE, Commands
+from companion.flight.control_authority import ControlAuthority, Owner, Passage
 from companion.flight.landing import Landing, landed
 from companion.flight.readiness import Readiness
 from companion.flight.takeoff import NAV_TAKEOFF, Takeoff
@@ -56,12 +56,12 @@ class Pilot:
         self._height: float | None = None
         self._go_at: int | None = None
         self._passage = Passage(0)
-        self._calls = Calls(own)
-        self._readiness = Readiness(config, self.vehicle, self._calls)
-        self._custody = Custody(self.vehicle)
+        self._commands = Commands(own)
+        self._readiness = Readiness(config, self.vehicle, self._commands)
+        self._authority = ControlAuthority(self.vehicle)
         self._owner = Owner.OURS
         self._arming = 0
-        self._takeoff = Takeoff(self.vehicle, self._calls, origin_altitude)
+        self._takeoff = Takeoff(self.vehicle, self._commands, origin_altitude)
 
     @property
     def profile(self) -> Profile | None:
@@ -87,12 +87,12 @@ class Pilot:
     @property
     def refusals(self) -> list[str]:
         """Commands that the autopilot refused last, in words."""
-        return list(self._calls.refusals)
+        return list(self._commands.refusals)
 
     @property
     def refused(self) -> int:
         """How many refusals there were."""
-        return self._calls.refused
+        return self._commands.refused
 
     @property
     def guided(self) -> bool:
@@ -105,7 +105,7 @@ class Pilot:
         profile = self.profile
         if self.guided or profile is None or self.phase is not Phase.PREPARE or not self.streaming:
             return self.guided
-        return self._calls.taken(now, DO_SET_MODE, profile.mode_call, _BEATS)
+        return self._commands.taken(now, DO_SET_MODE, profile.mode_call, _BEATS)
 
     @property
     def streaming(self) -> bool:
@@ -121,15 +121,15 @@ class Pilot:
             and self._takeoff.step(profile) is Step.MODE
         )
 
-    def hear(self, message: Message) -> None:
+    def receive(self, message: Message) -> None:
         """A message of the own autopilot."""
         if isinstance(message, CommandAck):
-            self._calls.hear(message)
-            self._readiness.hear(message)
+            self._commands.receive(message)
+            self._readiness.receive(message)
         elif isinstance(message, ParamValue):
-            self.limits.hear(message)
+            self.limits.receive(message)
         else:
-            self.vehicle.hear(message)
+            self.vehicle.receive(message)
 
     def _floor(self, view: View) -> float:
         """Above which height (m, fleet-local) an escort may begin on the way up; ∞ without a target, where it
@@ -177,7 +177,7 @@ class Pilot:
 
     def streamed(self, now: int) -> None:
         """A set-point leaves at ``now`` (µs)."""
-        self._custody.streamed(now)
+        self._authority.streamed(now)
 
     @property
     def start(self) -> Array | None:
@@ -231,7 +231,7 @@ class Pilot:
     def _alight(self) -> None:
         self.phase, self._landed_at = Phase.LAND, None
         self._arming = self._takeoff.asked_to_arm
-        self._calls.forget()
+        self._commands.forget()
         self._passage = Passage(self.vehicle.mode)
 
     def step(self, now: int, view: View) -> list[Message]:
@@ -276,7 +276,7 @@ class Pilot:
                 return []
         if self._passage.entered:
             return []
-        return self._calls.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
+        return self._commands.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
 
     def _leave(self, now: int, view: View) -> list[Message]:
         """Disarmed. PX4 is then in the mode in which it was steered, where its checks before the next flight
@@ -284,42 +284,42 @@ class Pilot:
         vehicle, profile = self.vehicle, self.profile
         if self._landed_at is None:
             self._landed_at = now
-            self._calls.forget()
+            self._commands.forget()
             doubt, returning = vehicle.positioning.radius, self._returning
             self.landing = landed(self._config, self.start, view.own, doubt, returning=returning)
         if profile is not None and profile.streams_first and now - self._landed_at <= _LEAVES:
             if not vehicle.alive:
                 return []
             if vehicle.mode in profile.land_modes | {profile.guided_custom_mode}:
-                return self._calls.call(now, DO_SET_MODE, profile.hold_call)
+                return self._commands.call(now, DO_SET_MODE, profile.hold_call)
         self.phase = Phase.DONE
         return []
 
     def _yield(self) -> None:
         """Somebody has it."""
         self._owner, self.phase = Owner.OURS, Phase.YIELDED
-        self._calls.forget()
+        self._commands.forget()
 
     def _keep(self, now: int) -> None:
         """See whose the vehicle is. Somebody who took it over keeps it: nothing is ordered against them."""
-        before, self._owner = self._owner, self._custody.owner(now)
+        before, self._owner = self._owner, self._authority.owner(now)
         if self._owner is Owner.TAKEN:
             self._yield()
         elif self._owner is Owner.LOST and before is not Owner.LOST:
-            self._calls.forget()
+            self._commands.forget()
 
     def _ask_back(self, now: int) -> list[Message]:
         """For the mode that nobody but the time-out has ended."""
         if self.profile is None:
             return []
-        return self._calls.call(now, DO_SET_MODE, self.profile.mode_call)
+        return self._commands.call(now, DO_SET_MODE, self.profile.mode_call)
 
     def _start_anew(self) -> None:
         """As at the beginning: a new go is needed."""
         self.phase, self._owner, self._settling_since = Phase.CONNECT, Owner.OURS, None
         self._returning = False
         self._height = None
-        self._calls.forget()
+        self._commands.forget()
         self._readiness.forget()
 
     def _settle(self, now: int, view: View) -> None:
@@ -375,7 +375,7 @@ class Pilot:
         sent = takeoff.advance(now, profile, view.own, height, self._floor(view))
         if takeoff.step(profile) is None:
             self.phase = Phase.ESCORT
-            self._custody.begin()
+            self._authority.begin()
         elif step is not None and takeoff.step(profile) is step:
             self.waiting_for = step.value
         return sent

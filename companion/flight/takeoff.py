@@ -6,7 +6,7 @@ from math import inf
 
 from companion.estimation.tracks import State
 from companion.flight.autopilots import Profile, Step
-from companion.flight.command_protocol import DO_SET_MODE, Calls
+from companion.flight.command_protocol import DO_SET_MODE, Commands
 from companion.flight.vehicle import IN_AIR, ON_GROUND, UNDEFINED, Vehicle
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Message
@@ -27,10 +27,10 @@ _NAN = float("nan")
 class Takeoff:
     """The steps of one way up. ``start``: where the last of them began, (3,) m, fleet-local ENU."""
 
-    def __init__(self, vehicle: Vehicle, calls: Calls, origin_altitude: float) -> None:
+    def __init__(self, vehicle: Vehicle, calls: Commands, origin_altitude: float) -> None:
         """``origin_altitude``: of the fleet frame's zero, m above mean sea level."""
         self._vehicle = vehicle
-        self._calls = calls
+        self._commands = calls
         self._origin_altitude = origin_altitude
         self.start: Array | None = None
         self._ground = 0.0
@@ -70,10 +70,10 @@ class Takeoff:
         step = profile.steps[self._step]
         if step is Step.MODE:
             done = vehicle.in_guided_mode
-            call = self._calls.call(now, DO_SET_MODE, profile.mode_call)
+            call = self._commands.call(now, DO_SET_MODE, profile.mode_call)
         elif step is Step.ARM:
             done = vehicle.armed
-            call = self._calls.call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            call = self._commands.call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
             if call:
                 self.asked_to_arm = now
         else:
@@ -83,11 +83,13 @@ class Takeoff:
             altitude = above_sea if profile.takeoff_absolute else height
             up = self._flying_already or vehicle.landed_state not in (UNDEFINED, ON_GROUND)
             call = (
-                [] if up else self._calls.call(now, NAV_TAKEOFF, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude))
+                []
+                if up
+                else self._commands.call(now, NAV_TAKEOFF, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude))
             )
         if done:
             self._step += 1
-            self._calls.forget()
+            self._commands.forget()
             return []
         return call
 

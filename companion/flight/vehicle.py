@@ -48,7 +48,7 @@ class Vehicle:
         self._extended_seen: ExtendedSysState | None = None
         self.now = self._beat_at = self._extended_at = 0
 
-    def hear(self, message: Message) -> None:
+    def receive(self, message: Message) -> None:
         """One of its messages."""
         if isinstance(message, Heartbeat):
             if message.autopilot != INVALID:
@@ -59,7 +59,7 @@ class Vehicle:
         elif isinstance(message, ExtendedSysState):
             self._extended = message
         elif isinstance(message, GpsRaw | EkfStatus | EstimatorStatus):
-            self.positioning.hear(message)
+            self.positioning.receive(message)
         elif isinstance(message, StatusText):
             self.texts.append(message)
             self.told += 1

@@ -57,7 +57,7 @@ class Flight(Protocol):
         ...
 
 
-class Aims:
+class Goals:
     """Of the vehicle of ``system``. The ``pilot`` is asked for its phase, and told when the vehicle is back,
     and when it has settled. ``seconds``: how far ahead a plan ends."""
 

@@ -20,9 +20,9 @@ from companion.estimation.estimator import Measured
 from companion.estimation.plan_clock import PlanClock
 from companion.estimation.tracks import State, Track, measured
 from companion.obstacles.reachable_ball import Ball, flown_on
-from companion.obstacles.relevance_filter import Ages, Earshot
-from companion.obstacles.trusted_peers import Familiars
-from companion.obstacles.uncertainty import Doubts
+from companion.obstacles.relevance_filter import Ages, RelevanceFilter
+from companion.obstacles.trusted_peers import TrustedPeers
+from companion.obstacles.uncertainty import ReportedUncertainty
 from companion.values.components import AUTOPILOT
 from companion.values.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.values.obstacles import Obstacles
@@ -103,9 +103,9 @@ class Neighbours:
         self._brief = False
         # What is larger than a vehicle, and flies by no limits.
         self._things = {one.system for one in config.moving}
-        self.earshot = Earshot(config)
-        self._familiars = Familiars()
-        self._doubts = Doubts()
+        self.relevance = RelevanceFilter(config)
+        self._trusted = TrustedPeers()
+        self._uncertainty = ReportedUncertainty()
 
     @property
     def brief(self) -> bool:
@@ -121,7 +121,7 @@ class Neighbours:
             for clock in self._clocks.values():
                 clock.brief = value
 
-    def hear_position(self, now: int, message: GlobalPosition) -> None:
+    def receive_position(self, now: int, message: GlobalPosition) -> None:
         """A neighbour's GLOBAL_POSITION_INT; the own echo is ignored."""
         system, component = message.source
         if system == self._system:
@@ -152,9 +152,9 @@ class Neighbours:
             self._arrivals = np.append(self._arrivals, now)
         self._tracks[system], self._by_autopilot[system] = track, by_autopilot
         self._fresh.add(system)
-        self._familiars.note(now, self._rows[system], track)
+        self._trusted.note(now, self._rows[system], track)
 
-    def hear_plan(self, now: int, message: Tunnel) -> None:
+    def receive_plan(self, now: int, message: Tunnel) -> None:
         """What a neighbour tells in a TUNNEL: its horizon, or how far it may be from where it says that it
         is. A horizon in another fleet frame, from the future or from long ago is refused, unless it is the
         sender's clock that is wrong."""
@@ -163,7 +163,7 @@ class Neighbours:
             return
         try:
             if message.payload_type == DOUBT:
-                self._doubts.hear(now, system, message.payload)
+                self._uncertainty.receive(now, system, message.payload)
                 return
             origin, horizon = _read(message.payload)
         except PlanWireError:
@@ -188,22 +188,22 @@ class Neighbours:
     def listen(self, now: int, own: State | None) -> None:
         """Find out whom to ignore for a while, the ``own`` state being what it is at ``now`` (µs)."""
         self._put_down()
-        self.earshot.look(own, self._ids, self._states, now - self._times, self._familiar)
+        self.relevance.look(own, self._ids, self._states, now - self._times, self._familiar)
 
     def ignores(self, system: int, component: int) -> bool:
         """Whether what this sender says of where it is and will be need not be decoded now."""
-        if not self.earshot.ignores(system):
+        if not self.relevance.ignores(system):
             return False
         if component != AUTOPILOT and not self._by_autopilot.get(system, True):
             # It goes on being its vehicle's voice.
-            self._spoken[system] = self.earshot.now
+            self._spoken[system] = self.relevance.now
         return True
 
     def _familiar(self) -> NDArray[np.bool_]:
         """Whose word counts for a while, as of vehicles that fly by plans and limits like ours."""
         plans = self._table.at(self._ids, self._times)
-        trusted = self._familiars.trusted(self.earshot.now, self._states, plans)
-        for system in self._things | self._doubts.systems(self.earshot.now):
+        trusted = self._trusted.trusted(self.relevance.now, self._states, plans)
+        for system in self._things | self._uncertainty.systems(self.relevance.now):
             if system in self._rows:
                 trusted[self._rows[system]] = False
         return trusted
@@ -223,9 +223,9 @@ class Neighbours:
         self._put_down()
         age = now - self._times
         ids, states, times, since = self._ids, self._states, self._times, now - self._arrivals
-        doubtful = self._doubts.systems(now)
+        doubtful = self._uncertainty.systems(now)
         if places is not None and ids:
-            near = self.earshot.near(places, states, age)
+            near = self.relevance.near(places, states, age)
             for system in self._things | doubtful:
                 if system in self._rows:
                     near[self._rows[system]] = True
@@ -272,7 +272,7 @@ class Neighbours:
         further[trusted] = 0.0
         if doubtful:
             # Plans, too, lead from where it believes to be.
-            further += self._doubts.radii(ids)
+            further += self._uncertainty.radii(ids)
         if not further.any():
             return found
         return found._replace(

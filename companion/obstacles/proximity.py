@@ -96,7 +96,7 @@ class Proximity:
         self._lately: dict[_Look, int] = {}
         self.refused = 0
 
-    def hear(
+    def receive(
         self, now: int, when: int, scan: ObstacleDistance, place: Array, zero: float, known: Array
     ) -> None:
         """A message that arrived at ``now`` and was true at ``when`` (µs), with the vehicle at ``place`` (3,)

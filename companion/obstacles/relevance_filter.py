@@ -38,7 +38,7 @@ _OFF_PLAN = 1.0
 """m by which a plan that counts may begin beside its sender's track."""
 
 
-class Earshot:
+class RelevanceFilter:
     """Of one companion. All times µs on its clock; ``now`` has to be set before headers are asked about."""
 
     def __init__(self, config: CompanionConfig) -> None:

@@ -38,19 +38,19 @@ class Sensed:
         self.proximity = None if config.proximity is None else Proximity(config.proximity)
         self.traffic = None if config.traffic is None else Traffic(config.traffic)
 
-    def hear_distances(self, now: int, message: ObstacleDistance, stance: Stance, known: Array) -> None:
+    def receive_distances(self, now: int, message: ObstacleDistance, stance: Stance, known: Array) -> None:
         """OBSTACLE_DISTANCE of an own sensor, with the vehicle as it was when that was true; ``known`` (K,
         3): where neighbours are."""
         zero = stance.yaw if message.frame == BODY else stance.north
         if self.proximity is not None and zero is not None:
-            self.proximity.hear(now, stance.time, message, stance.place, zero, known)
+            self.proximity.receive(now, stance.time, message, stance.place, zero, known)
 
-    def hear_traffic(self, now: int, message: AdsbVehicle, here: Array) -> None:
+    def receive_traffic(self, now: int, message: AdsbVehicle, here: Array) -> None:
         """ADSB_VEHICLE, while the own vehicle is ``here`` (3,)."""
         if self.traffic is not None:
             height = self._fleet.altitude if message.altitude is None else message.altitude
             place = self._fleet.to_enu(message.latitude, message.longitude, height)
-            self.traffic.hear(now, message, place, here)
+            self.traffic.receive(now, message, place, here)
 
     def around(self, now: int, prediction: Array, reach: float) -> Axes:
         """All of them within ``reach`` (m) of some predicted position (n, 3): the points nearest to these."""

@@ -51,7 +51,7 @@ class Traffic:
     def __len__(self) -> int:
         return len(self._heard)
 
-    def hear(self, now: int, message: AdsbVehicle, place: Array, here: Array) -> bool:
+    def receive(self, now: int, message: AdsbVehicle, place: Array, here: Array) -> bool:
         """A message that arrived at ``now`` (µs), of traffic at ``place`` (3,) m, fleet-local ENU, while the
         own vehicle is ``here`` (3,); whether it counts."""
         self._forget(now)

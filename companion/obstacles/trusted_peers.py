@@ -28,7 +28,7 @@ class _Story(NamedTuple):
     refused: int
 
 
-class Familiars:
+class TrustedPeers:
     """Those of one companion, row by row as it keeps their last states."""
 
     def __init__(self) -> None:

@@ -15,13 +15,13 @@ _MOST = 10.0
 """m; nobody keeps further away because somebody says so."""
 
 
-class Doubts:
+class ReportedUncertainty:
     """By system id."""
 
     def __init__(self) -> None:
         self._told: dict[int, tuple[int, float]] = {}
 
-    def hear(self, now: int, system: int, payload: bytes) -> None:
+    def receive(self, now: int, system: int, payload: bytes) -> None:
         """What came in a TUNNEL at ``now`` (µs). Raises PlanWireError for what is none."""
         radius = min(unpack(payload), _MOST)
         if radius > 0.0:

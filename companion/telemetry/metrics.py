@@ -8,7 +8,7 @@ from mavlink_bridge.messages import NamedValue, Source
 _SECOND = 1_000_000
 
 
-class Dials:
+class Metrics:
     """Of the companion ``own``. ``plan_ms``: the longest plan since the last time; ``misses``: plans so far
     that took longer than their period; ``held``: times that an old plan was kept; ``target_s``: age of what
     is known of the target, absent before it is heard."""

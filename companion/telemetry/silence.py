@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from companion.telemetry.status_text import Voice
+from companion.telemetry.status_text import StatusReporter
 from companion.world import World
 
 
-def report_silence(now: int, world: World, voice: Voice) -> None:
+def report_silence(now: int, world: World, voice: StatusReporter) -> None:
     """Report target and distance sensors of ``world`` that are silent at ``now`` (µs), and their return."""
     if world.config.task == "escort" and world.target.age(now) is not None:
         voice.watch(world.target.at(now) is None, "Target lost", "Target is back")

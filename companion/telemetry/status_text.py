@@ -23,7 +23,7 @@ class Severity(IntEnum):
     INFO = 6
 
 
-class Voice:
+class StatusReporter:
     """Of the companion ``own``. Texts wait here until ``due``; without ``texts`` in ``config`` none does."""
 
     def __init__(self, config: VoiceConfig, own: Source) -> None:

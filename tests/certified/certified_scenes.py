@@ -9,7 +9,7 @@ import numpy as np
 from certified_plans import DT, EPOCH, STEPS, later, random_plan
 
 from companion.avoidance.certified.committed import carried_on, controls
-from companion.avoidance.certified.qp import Program, State, Wish
+from companion.avoidance.certified.qp import Objective, SeparationQp, State
 from companion.avoidance.certified.separating_planes import Others, Planes, planes
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import LimitsConfig
@@ -31,10 +31,10 @@ class Scene(NamedTuple):
     start: WirePlan
     state: State
     planes: Planes
-    wishes: tuple[Wish, ...]
+    wishes: tuple[Objective, ...]
 
-    def program(self) -> Program:
-        return Program(STEPS, self.limits, CONFIG)
+    def program(self) -> SeparationQp:
+        return SeparationQp(STEPS, self.limits, CONFIG)
 
 
 def scene(seed: int, limits: LimitsConfig = WIDE, *, wishes: int = 1) -> Scene:
@@ -76,11 +76,11 @@ def jam(seed: int) -> Scene:
     return Scene(WIDE, start, state, planes(own, apart, CONFIG.spare), (wish(rng, here),))
 
 
-def wish(rng: np.random.Generator, here: Array) -> Wish:
+def wish(rng: np.random.Generator, here: Array) -> Objective:
     """Any place within some metres, at any speed."""
     places = np.broadcast_to(here + rng.normal(size=3) * 10.0 ** rng.uniform(-1, 1.2), (STEPS, 3))
     velocities = np.broadcast_to(rng.uniform(-3, 3, 3) * rng.integers(0, 2), (STEPS, 3))
-    return Wish(places, velocities, rng.normal(size=(STEPS, 3)) * rng.integers(0, 2))
+    return Objective(places, velocities, rng.normal(size=(STEPS, 3)) * rng.integers(0, 2))
 
 
 def flown(scene: Scene, accelerations: Array) -> tuple[Array, Array]:
@@ -92,7 +92,7 @@ def flown(scene: Scene, accelerations: Array) -> tuple[Array, Array]:
     return np.stack([positions[:-1], between, positions[1:]], axis=1), velocities[1:]
 
 
-def residuals(scene: Scene, wish: Wish, accelerations: Array) -> Array:
+def residuals(scene: Scene, wish: Objective, accelerations: Array) -> Array:
     """What the plan with ``accelerations`` (n, 3) costs, as the settings say it, is the sum of their
     squares."""
     points, velocities = flown(scene, accelerations)
@@ -109,7 +109,7 @@ def residuals(scene: Scene, wish: Wish, accelerations: Array) -> Array:
     return np.concatenate([part.ravel() for part in parts])
 
 
-def cost(scene: Scene, wish: Wish, accelerations: Array) -> float:
+def cost(scene: Scene, wish: Objective, accelerations: Array) -> float:
     """Of the plan with ``accelerations`` (n, 3)."""
     return float((residuals(scene, wish, accelerations) ** 2).sum())
 

@@ -94,18 +94,18 @@ class Vehicle:
 
     def step(self, since: int, goal: Array) -> list[Tunnel]:
         now = EPOCH + since + self.habits.ahead
-        flight, ledger, keeper = self.flight, self.flight.ledger, self.flight.keeper
+        flight, peers, commitment = self.flight, self.flight.peers, self.flight.commitment
         while self.inbox and self.inbox[0][0] <= since:
-            flight.hear(now, heappop(self.inbox)[2])
-        for system, filed in ledger.plans(keeper.epoch(now)).items():
-            self.believed[system, keeper.epoch(now)] = filed.plan
+            flight.receive(now, heappop(self.inbox)[2])
+        for system, filed in peers.plans(commitment.epoch(now)).items():
+            self.believed[system, commitment.epoch(now)] = filed.plan
         leaving = self.habits.leaves <= since < self.habits.returns
         if leaving or within(since, self.habits.released):
             self._flying = False
         else:
             self._fly(now, since, goal)
         messages = flight.messages(now, farewell=leaving)
-        for plan in (keeper.current, keeper.following):
+        for plan in (commitment.current, commitment.following):
             if plan is not None and (self.plans or messages):
                 self.contradictions += self.plans.setdefault(plan.epoch, plan) != plan
         return [message for message in messages if isinstance(message, Tunnel)]
@@ -116,13 +116,13 @@ class Vehicle:
             flight.stand(now, self._here(now, since))
         self._flying = True
         if steers and flight.due(now):
-            epoch = flight.keeper.epoch(now)
-            beside = {system: filed.plan for system, filed in flight.ledger.plans(epoch).items()}
+            epoch = flight.commitment.epoch(now)
+            beside = {system: filed.plan for system, filed in flight.peers.plans(epoch).items()}
             found = flight.plan(now, standing(goal, None), self.world, _NOTHING)
             self.made.append(Made(self.system, since, epoch, beside, found))
 
     def _here(self, now: int, since: int) -> Array:
-        epoch = self.flight.keeper.epoch(now)
+        epoch = self.flight.commitment.epoch(now)
         there = horizon_of(self.plan(epoch)).at(now).position if self.plans else self.place
         result: Array = there + self.habits.wanders * np.sin(1e-6 * since * np.array([7.0, 5.0, 3.0]))
         return result

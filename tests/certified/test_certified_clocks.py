@@ -21,8 +21,8 @@ def asked(
 ) -> None:
     """One round trip, ``there`` and ``back`` µs long, to a clock that is ``ahead`` (µs)."""
     (request,) = watch.due(now)
-    (reply,) = ClockWatch(of, BOUND).hear(now + there + ahead, request)
-    assert watch.hear(now + there + back, reply) == []
+    (reply,) = ClockWatch(of, BOUND).receive(now + there + ahead, request)
+    assert watch.receive(now + there + back, reply) == []
 
 
 @given(st.integers(-2 * BOUND, 2 * BOUND), st.lists(st.tuples(delays, delays), min_size=1, max_size=4))

@@ -45,15 +45,15 @@ def way(heard: Callable[[int], Array | None], *, whom: int = LEFT, end: Array = 
     """Where the other flies (k, 3), every 20 ms, from 6 m before to 6 m behind the origin: one said farewell
     at ``end``, and ``whom`` is heard at ``heard`` by µs since, from 0.1 s before its last plan begins on."""
     flight, world = CertifiedFlight(CONFIG, Source(OWN, 195), FLEET), World(CONFIG, OWN, 0, FLEET)
-    flight.ledger.hear_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
-    flight.ledger.hear_roster(EPOCH, LEFT, Roster(EPOCH, frozenset({OWN}), farewell=True))
+    flight.peers.receive_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
+    flight.peers.receive_roster(EPOCH, LEFT, Roster(EPOCH, frozenset({OWN}), farewell=True))
     flight.stand(EPOCH, np.array([-6.0, 0.0, 5.0]))
     places = []
     for since in range(-100_000, 6_000_000, 20_000):
         now, place = EPOCH + since, heard(since)
         if place is not None:
             boot = since + 1_000_000
-            world.hear(
+            world.receive(
                 now, "swarm", position_message(Source(whom, 195), boot, FLEET, place, np.zeros(3), None)
             )
         if since < 0:
@@ -109,11 +109,11 @@ def test_who_was_carried_aside_after_landing_and_switched_off_keeps_nobody_away_
     end, goal = np.array([0.0, 12.0, 5.0]), np.array([6.0, 0.0, 5.0])
     place = end + np.array([0.0, off * LEAST, -5.0])
     flight, world = CertifiedFlight(CONFIG, Source(OWN, 195), FLEET), World(CONFIG, OWN, 0, FLEET)
-    flight.ledger.hear_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
-    flight.ledger.hear_roster(EPOCH, LEFT, Roster(EPOCH, frozenset({OWN}), farewell=True))
+    flight.peers.receive_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
+    flight.peers.receive_roster(EPOCH, LEFT, Roster(EPOCH, frozenset({OWN}), farewell=True))
     for since in range(0, 1_000_000, 20_000):
         said = position_message(Source(LEFT, 195), 1_000_000 + since, FLEET, place, np.zeros(3), None)
-        world.hear(EPOCH + since, "swarm", said)
+        world.receive(EPOCH + since, "swarm", said)
     begin = EPOCH + 60_000_000
     flight.stand(begin, np.array([-6.0, 0.0, 5.0]))
     for now in range(begin, begin + 8_000_000, 20_000):

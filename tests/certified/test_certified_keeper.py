@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from companion.avoidance.certified.commitment import Keeper, Why
+from companion.avoidance.certified.commitment import Commitment, HoldReason
 from companion.avoidance.certified.committed import carried_on, committed, controls, resting, rests, rounding
-from companion.avoidance.certified.deadlock import StallTurn
+from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.flight import CertifiedFlight
-from companion.avoidance.certified.qp import Program, Wish
+from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.separating_planes import Others, hull_distance
 from companion.config import CompanionConfig
 from companion.config.certified import CertifiedConfig
@@ -35,9 +35,9 @@ seeds = st.integers(0, 2**32 - 1)
 choices = st.lists(st.sampled_from(["plan", "hold", "wait", "sleep"]), max_size=12)
 
 
-def keeper() -> Keeper:
-    program = Program(STEPS, LimitsConfig(), CONFIG)
-    kept = Keeper(CONFIG, program, StallTurn(CONFIG.stall, program.pull), 7)
+def commitment() -> Commitment:
+    program = SeparationQp(STEPS, LimitsConfig(), CONFIG)
+    kept = Commitment(CONFIG, program, DeadlockTurn(CONFIG.stall, program.pull), 7)
     kept.begin(EPOCH, HERE)
     return kept
 
@@ -46,19 +46,19 @@ def vector(x: float, y: float, z: float) -> Array:
     return np.array([x, y, z])
 
 
-def towards(goal: Array) -> Wish:
+def towards(goal: Array) -> Objective:
     places = np.broadcast_to(goal, (STEPS, 3))
-    return Wish(places, np.zeros((STEPS, 3)), np.zeros((STEPS, 3)))
+    return Objective(places, np.zeros((STEPS, 3)), np.zeros((STEPS, 3)))
 
 
-def replan(kept: Keeper, goal: Array, others: Others = NOBODY) -> bool:
+def replan(kept: Commitment, goal: Array, others: Others = NOBODY) -> bool:
     return kept.replan(towards(goal), goal, others)
 
 
 @given(choices, st.integers(0, 2**16))
 def test_what_is_told_for_an_epoch_is_flown_in_it(ways: list[str], seed: int) -> None:
     """Whatever is done in each, and where whole epochs pass by."""
-    kept, rng, now = keeper(), np.random.default_rng(seed), EPOCH
+    kept, rng, now = commitment(), np.random.default_rng(seed), EPOCH
     told = {}
     for way in ways:
         now += LENGTH * (4 if way == "sleep" else 1) - int(rng.integers(0, 1000))
@@ -66,7 +66,7 @@ def test_what_is_told_for_an_epoch_is_flown_in_it(ways: list[str], seed: int) ->
             if way == "plan":
                 replan(kept, HERE + rng.normal(size=3))
             elif way == "hold":
-                kept.carry_on(Why.MISSING)
+                kept.carry_on(HoldReason.MISSING)
         current = kept.current
         assert current is not None
         assert current.epoch == kept.epoch(now)
@@ -82,7 +82,7 @@ def test_what_is_told_for_an_epoch_is_flown_in_it(ways: list[str], seed: int) ->
 
 
 def test_the_horizon_is_this_plan_and_then_the_next() -> None:
-    kept = keeper()
+    kept = commitment()
     replan(kept, HERE + vector(4.0, 2.0, 1.0))
     kept.turn(EPOCH + LENGTH)
     replan(kept, HERE + vector(-4.0, 2.0, 1.0))
@@ -97,18 +97,18 @@ def test_the_horizon_is_this_plan_and_then_the_next() -> None:
 
 
 def test_a_plan_that_is_not_found_is_the_old_one() -> None:
-    kept = keeper()
+    kept = commitment()
     replan(kept, HERE + vector(4.0, 2.0, 1.0))
     kept.turn(EPOCH + LENGTH)
     expected = kept.start()
     assert not replan(kept, HERE * np.nan)
     assert kept.following == expected
-    assert (kept.held[Why.UNSOLVED], sum(kept.held.values())) == (1, 1)
+    assert (kept.held[HoldReason.UNSOLVED], sum(kept.held.values())) == (1, 1)
 
 
 def test_anew_from_where_it_is_is_to_rest_and_from_the_next_epoch_on() -> None:
     """No step of the proof, but a plan like all others."""
-    kept = keeper()
+    kept = commitment()
     now = EPOCH + 100_000
     measured = Motion(HERE + vector(1.0, 2.0, 0.0), np.array([1.5, -1.0, 0.5]), np.zeros(3))
     kept.anchor(now, measured)
@@ -133,7 +133,7 @@ def test_pulled_through_one_that_is_near_it_makes_plans_and_never_comes_nearer(
     seed: int, near: float, shares: bool
 ) -> None:
     """Nearer than it is, if that is too near; nor does rounding freeze it where it has no room."""
-    kept, rng = keeper(), np.random.default_rng(seed)
+    kept, rng = commitment(), np.random.default_rng(seed)
     way = rng.normal(size=3)
     way /= np.linalg.norm(way)
     other, goal = standing(near * way, shares=shares), HERE + 6.0 * way + rng.normal(size=3)
@@ -187,12 +187,12 @@ class TestStanding:
     def test_within_its_tube_it_stands_by_its_plan(self) -> None:
         flight = self.flight()
         flight.stand(EPOCH, HERE)
-        stood = flight.keeper.current
+        stood = flight.commitment.current
         assert stood is not None
         for step in range(1, 60):
             wandered = HERE + 0.9 * CONFIG.tube * np.array([np.sin(step), np.cos(step), 0.0])
             flight.stand(EPOCH + step * 50_000, wandered)
-            current = flight.keeper.current
+            current = flight.commitment.current
             assert current is not None
             assert current.position == stood.position
 
@@ -202,15 +202,15 @@ class TestStanding:
         flight.stand(EPOCH, HERE)
         flight.due(EPOCH)
         flight.messages(EPOCH)
-        told = flight.keeper.told()
+        told = flight.commitment.told()
         assert told is not None
         for now in (EPOCH + LENGTH - 4, EPOCH + LENGTH):
             flight.stand(now, away)
-            assert (flight.keeper.following or flight.keeper.current) == told
+            assert (flight.commitment.following or flight.commitment.current) == told
         now = told.epoch + LENGTH
         flight.stand(now, away)
         origin = FLEET.fingerprint
-        assert flight.keeper.current == resting(now, DT, STEPS, away, origin)
+        assert flight.commitment.current == resting(now, DT, STEPS, away, origin)
         assert not tunnels(flight, now)
 
     def test_to_leave_a_plan_that_was_told_is_to_plan_anew_and_counted_once(self) -> None:
@@ -218,15 +218,15 @@ class TestStanding:
         flight = self.flight()
         for step in range(10):
             flight.stand(EPOCH + step * LENGTH, HERE + vector(step, 0.0, 0.0))
-        assert flight.keeper.anchored_anew == 0
+        assert flight.commitment.anchored_anew == 0
         now = EPOCH + 10 * LENGTH
         flight.due(now)
         flight.messages(now)
         flight.stand(now + LENGTH, HERE + vector(9.0, 0.0, 0.0))
-        assert flight.keeper.anchored_anew == 0
+        assert flight.commitment.anchored_anew == 0
         for step in range(3, 6):
             flight.stand(now + step * LENGTH, HERE + vector(0.0, step, 0.0))
-        assert flight.keeper.anchored_anew == 1
+        assert flight.commitment.anchored_anew == 1
 
     def test_who_steers_no_more_tells_nothing_but_a_farewell(self) -> None:
         """It may be flown by hand: nobody is to take its last plan for what it flies."""

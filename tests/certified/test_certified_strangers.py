@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from companion.avoidance.certified.committed import controls, resting
 from companion.avoidance.certified.flight import CertifiedFlight
-from companion.avoidance.certified.noncooperative import Strangers
+from companion.avoidance.certified.noncooperative import NonCooperative
 from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
 from companion.estimation.tracks import State
@@ -37,7 +37,7 @@ def told(world: World, place: Array, velocity: Array, link: str = "swarm") -> No
     latitude, longitude, altitude = FLEET.to_geodetic(place)
     ned = (float(velocity[1]), float(velocity[0]), float(-velocity[2]))
     message = GlobalPosition(Source(OTHER, 1), NOW // 1000, latitude, longitude, altitude, 0.0, ned, None)
-    world.hear(NOW, link, message)
+    world.receive(NOW, link, message)
 
 
 def hovering(of: CompanionConfig, place: Array, velocity: Array) -> Array:
@@ -45,10 +45,10 @@ def hovering(of: CompanionConfig, place: Array, velocity: Array) -> Array:
     flight, world = CertifiedFlight(of, Source(OWN, 195), FLEET), World(of, OWN, 10, FLEET)
     told(world, place, velocity)
     flight.stand(NOW, HERE)
-    flight.keeper.following = None
+    flight.commitment.following = None
     assert flight.plan(NOW, standing(HERE), world, world.at(NOW))
-    assert flight.keeper.following is not None
-    return controls(flight.keeper.following)[-1, 2]
+    assert flight.commitment.following is not None
+    return controls(flight.commitment.following)[-1, 2]
 
 
 @given(angles, st.floats(2.5, 4.5), st.floats(0.8, 3.0))
@@ -84,7 +84,7 @@ def test_a_thing_is_where_it_says_and_a_vehicle_only_nearly() -> None:
     for of in (config("sphere"), config()):
         world = World(of, OWN, 10, FLEET)
         told(world, HERE, np.zeros(3))
-        strangers = Strangers(of, STEPS)
+        strangers = NonCooperative(of, STEPS)
         least.append(strangers.seen(NOW + 200_000, frozenset(), world)[0].least)
     own = config().certified
     clock = 1e-6 * own.clock_us * np.linalg.norm(config().limits.v_max)
@@ -97,7 +97,7 @@ def test_a_target_that_falls_silent_is_kept_clear_of_where_it_was_last() -> None
     of = config().model_copy(update={"target_d_min": 1.0, "target_d_safe": 4.0})
     world, place = World(of, OWN, OTHER, FLEET), HERE + np.array([3.0, 0.0, 0.0])
     told(world, place, np.zeros(3), "target")
-    strangers, silence = Strangers(of, STEPS), 10 * of.guard.target_stale_us
+    strangers, silence = NonCooperative(of, STEPS), 10 * of.guard.target_stale_us
     (heard,), (silent,) = (
         strangers.target(now, now + 200_000, world.at(now)) for now in (NOW, NOW + silence)
     )
@@ -110,7 +110,7 @@ def test_a_target_that_falls_silent_is_kept_clear_of_where_it_was_last() -> None
 def test_a_member_is_no_stranger() -> None:
     world = World(config(), OWN, 10, FLEET)
     told(world, HERE, np.zeros(3))
-    strangers = Strangers(config(), STEPS)
+    strangers = NonCooperative(config(), STEPS)
     assert strangers.seen(NOW, frozenset({OTHER}), world) == []
     own = controls(resting(NOW, 200_000, STEPS, HERE, FLEET.fingerprint))
     assert (strangers.field([], own) == 0.0).all()
@@ -125,7 +125,7 @@ def test_the_target_is_where_it_will_be_whenever_in_an_epoch_it_is_asked_for(lat
     velocity = np.array([speed, 0.0, 0.0])
     seen = State(HERE + 1e-6 * late * velocity, velocity, 0)
     view = View(None, None, seen, None, seen)
-    (centres, _), *others = Strangers(of, STEPS).target(NOW + late, NOW + 1_000_000, view)
+    (centres, _), *others = NonCooperative(of, STEPS).target(NOW + late, NOW + 1_000_000, view)
     knots = 1.0 + 1e-6 * of.certified.dt_us * np.arange(STEPS)
     np.testing.assert_allclose(centres[:, 0], HERE + knots[:, None] * velocity, atol=1e-9)
     assert not others

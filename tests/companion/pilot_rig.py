@@ -66,7 +66,7 @@ class Rig:
         """One step: the commands sent, as (command, parameters without NaN)."""
         for message in heard:
             # As a codec makes it: a new one each time.
-            self.pilot.hear(message._replace())
+            self.pilot.receive(message._replace())
         sent = [
             (m.command, tuple(p for p in m.params if p == p)) for m in self.pilot.step(self.now, self.view)
         ]

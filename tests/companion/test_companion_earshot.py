@@ -72,21 +72,21 @@ class Listener:
 
     def __init__(self, config=CONFIG):
         self.world = World(config, OWN, 1, FLEET)
-        self.earshot = self.world.neighbours.earshot
+        self.relevance = self.world.neighbours.relevance
         self.codec = Codec(accepts("swarm", OWN, 1, config, self.world.neighbours.ignores))
         self._speakers = Codec()
         self._delay = config.neighbour.delay_us
         self.heard_at = NOW
 
-    def hear(self, now, *messages):
-        self.earshot.now = now + self._delay
+    def receive(self, now, *messages):
+        self.relevance.now = now + self._delay
         for message in messages:
             for heard in self.codec.feed(self._speakers.encode(message)):
                 self.heard_at = now
-                self.world.hear(now + self._delay, "swarm", heard)
+                self.world.receive(now + self._delay, "swarm", heard)
 
     def look(self, now, place=ZERO, velocity=ZERO):
-        self.earshot.now = now
+        self.relevance.now = now
         self.world.neighbours.listen(now, State(place, velocity, 0))
 
     def decoded(self):
@@ -101,7 +101,7 @@ def after_seconds(place, velocity, config=CONFIG, *, plan=True, own=ZERO):
     listener = Listener(config)
     for now in range(NOW, END, PERIOD):
         there = place + 1e-6 * (now - END) * velocity
-        listener.hear(now, *told(OTHER, there, velocity, now, plan=plan))
+        listener.receive(now, *told(OTHER, there, velocity, now, plan=plan))
         listener.look(now + PERIOD // 2, velocity=own)
     listener.look(END, velocity=own)
     return listener
@@ -114,10 +114,10 @@ def test_of_whom_its_autopilot_tells_nobody_else_becomes_the_voice_unheard():
     for now in range(NOW, END + 20 * PERIOD, PERIOD):
         state, plan = told(OTHER, place, ZERO, now)
         lost = state._replace(source=nothing, latitude=0.0, longitude=0.0)
-        listener.hear(now, lost, state._replace(source=Source(OTHER, 1)), plan)
+        listener.receive(now, lost, state._replace(source=Source(OTHER, 1)), plan)
         listener.look(now + PERIOD // 2)
         age = listener.world.neighbours.ages(now)[OTHER]
-        assert age <= listener.earshot._longest * 1e6 + PERIOD
+        assert age <= listener.relevance._longest * 1e6 + PERIOD
     assert listener.decoded() < 3 * (END + 20 * PERIOD - NOW) // PERIOD
 
 
@@ -133,10 +133,10 @@ def planned(config, now, position, velocity, prediction, aim, obstacles):
 def test_who_is_ignored_can_act_on_no_plan_until_it_is_heard_again(config, direction, beyond, speed):
     """Not even if both make for each other as fast as they may from the moment that it was last heard."""
     fastest = hypot(*config.limits.v_max)
-    place = (Listener(config).earshot._certainly + beyond) * direction
+    place = (Listener(config).relevance._certainly + beyond) * direction
     velocity = -speed * fastest * direction
     listener = after_seconds(place, velocity, config)
-    until = listener.earshot._until.get(OTHER, END)
+    until = listener.relevance._until.get(OTHER, END)
     if until == END:
         return
     assert until - END < 1_000_000
@@ -148,7 +148,7 @@ def test_who_is_ignored_can_act_on_no_plan_until_it_is_heard_again(config, direc
     attentive = Listener(config)
     for told_at in range(last - 10 * PERIOD, last, PERIOD):
         way = 1e-6 * (last - told_at) * fastest * direction
-        attentive.hear(told_at, *told(OTHER, other + way, -fastest * direction, told_at))
+        attentive.receive(told_at, *told(OTHER, other + way, -fastest * direction, told_at))
     prediction = own + AHEAD * fastest * direction
     obstacles = attentive.world.neighbours.obstacles(last)
     aim = standing(own + 100.0 * direction, ZERO)
@@ -226,7 +226,7 @@ def test_two_things_said_of_where_one_is_make_nobody_deaf():
         place = far if k in (45, 46, 60, 61, 68, 69) else near
         before = listener.decoded()
         # Whoever speaks in its name has no plan of it.
-        listener.hear(now, *told(OTHER, place, ZERO, now, plan=place is near))
+        listener.receive(now, *told(OTHER, place, ZERO, now, plan=place is near))
         assert listener.decoded() > before, k
         listener.look(now + PERIOD // 2)
 
@@ -235,9 +235,9 @@ def test_who_is_not_where_its_plan_is_is_heard():
     listener = Listener()
     place, plan = np.array([FAR, 0.0, 0.0]), np.array([FAR - 3.0, 0.0, 0.0])
     for now in range(NOW, END, PERIOD):
-        listener.hear(now, told(OTHER, place, ZERO, now)[0], told(OTHER, plan, ZERO, now)[1])
+        listener.receive(now, told(OTHER, place, ZERO, now)[0], told(OTHER, plan, ZERO, now)[1])
         listener.look(now + PERIOD // 2)
-        assert not listener.earshot.ignores(OTHER)
+        assert not listener.relevance.ignores(OTHER)
 
 
 @pytest.mark.parametrize("loss", [0.1, 0.3])
@@ -250,7 +250,7 @@ def test_an_ignored_companion_goes_on_being_its_vehicles_voice(loss):
     for now in range(NOW, NOW + 60_000_000, PERIOD):
         by_autopilot = position_message(Source(OTHER, 1), now - NOW + 77, FLEET, place, ZERO, None)
         said = [by_autopilot, *(told(OTHER, place, ZERO, now) if now // PERIOD % 2 else [])]
-        listener.hear(now, *(message for message in said if random.random() > loss))
+        listener.receive(now, *(message for message in said if random.random() > loss))
         listener.look(now + PERIOD // 2)
         if now > NOW + 2_000_000:
             tracks.add(listener.world.neighbours._tracks[OTHER])
@@ -266,7 +266,7 @@ def test_nobody_comes_near_unheard(direction, speed):
     now = NOW
     while float(np.linalg.norm(place)) > CERTAINLY and now < NOW + 45_000_000:
         before = listener.decoded()
-        listener.hear(now, *told(OTHER, place, velocity, now))
+        listener.receive(now, *told(OTHER, place, velocity, now))
         heard = listener.decoded() > before
         silences.append(now - last)
         last = now if heard else last
@@ -279,7 +279,7 @@ def test_nobody_comes_near_unheard(direction, speed):
         place = place + 1e-6 * PERIOD * velocity
     for k in range(5):
         before = listener.decoded()
-        listener.hear(now + k * PERIOD, *told(OTHER, place, velocity, now + k * PERIOD))
+        listener.receive(now + k * PERIOD, *told(OTHER, place, velocity, now + k * PERIOD))
         listener.look(now + k * PERIOD + PERIOD // 2)
         assert k == 0 or listener.decoded() == before + 2
     assert max(silences) < 1_000_000
@@ -300,30 +300,30 @@ def test_always_heard_is(who, config, changes):
     arguments = {"velocity": ZERO, **changes}
     place = np.array([FAR, 0.0, 0.0])
     listener = after_seconds(place, arguments.pop("velocity"), config, **arguments)
-    assert not listener.earshot.ignores(OTHER), who
+    assert not listener.relevance.ignores(OTHER), who
 
 
 def test_methods_may_change_in_flight():
     listener = after_seconds(np.array([FAR, 0.0, 0.0]), ZERO)
-    assert listener.earshot.ignores(OTHER)
-    listener.earshot.use(("tangential", "swivel"))
-    assert not listener.earshot.ignores(OTHER)
+    assert listener.relevance.ignores(OTHER)
+    listener.relevance.use(("tangential", "swivel"))
+    assert not listener.relevance.ignores(OTHER)
     assert listener.world.neighbours.obstacles(END, ZERO[None]).ids == (OTHER,)
     listener.look(END)
-    assert not listener.earshot.ignores(OTHER)
-    listener.earshot.use(("tangential",))
+    assert not listener.relevance.ignores(OTHER)
+    listener.relevance.use(("tangential",))
     listener.look(END)
-    assert listener.earshot.ignores(OTHER)
+    assert listener.relevance.ignores(OTHER)
 
 
 def test_a_familiar_one_far_away_is_ignored_and_the_own_place_has_to_be_known():
     listener = after_seconds(np.array([FAR, 0.0, 0.0]), ZERO)
-    assert listener.earshot.ignores(OTHER)
-    assert not listener.earshot.ignores(OTHER + 1)
+    assert listener.relevance.ignores(OTHER)
+    assert not listener.relevance.ignores(OTHER + 1)
     listener.world.neighbours.listen(END, None)
-    assert not listener.earshot.ignores(OTHER)
+    assert not listener.relevance.ignores(OTHER)
     listener.world.neighbours.listen(END, State(ZERO, ZERO, CONFIG.guard.own_stale_us + 1))
-    assert not listener.earshot.ignores(OTHER)
+    assert not listener.relevance.ignores(OTHER)
 
 
 THING, BESIDE, TWO_STORIES, OLD_PLAN, NO_PLAN = range(21, 26)
@@ -353,17 +353,17 @@ def test_among_many_only_those_are_ignored_whose_own_word_counts(order, later):
     for now in range(NOW, END, PERIOD):
         for k, system in enumerate(order[: len(order) if now > NOW + 5 * PERIOD else len(order) - later]):
             place = FAR * np.array([np.cos(k), np.sin(k), 0.0])
-            listener.hear(now, *strange(system, place, now))
+            listener.receive(now, *strange(system, place, now))
         listener.look(now + PERIOD // 2)
     listener.look(END)
-    assert {system for system in order if listener.earshot.ignores(system)} == FAMILIAR
+    assert {system for system in order if listener.relevance.ignores(system)} == FAMILIAR
 
 
 def test_ignoring_ends_by_itself():
     """A companion that hangs looks around no more."""
     listener = after_seconds(np.array([FAR, 0.0, 0.0]), ZERO)
-    listener.earshot.now += 1_000_000
-    assert not listener.earshot.ignores(OTHER)
+    listener.relevance.now += 1_000_000
+    assert not listener.relevance.ignores(OTHER)
 
 
 @pytest.mark.parametrize("far", [0, 8, 40])
@@ -377,7 +377,7 @@ def test_those_out_of_range_are_hardly_decoded_and_cost_the_planner_nothing(far)
     for tick in range(10 * seconds):
         now = NOW + tick * PERIOD
         for system, place in places.items():
-            listener.hear(now, *told(system, place, ZERO, now))
+            listener.receive(now, *told(system, place, ZERO, now))
         listener.look(now + PERIOD // 2)
     sent = 2 * 10 * seconds
     heard_of_the_far = listener.decoded() - sent

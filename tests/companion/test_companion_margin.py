@@ -38,8 +38,8 @@ def told(system, east):
 def seen(config):
     """A neighbour, the target and a sphere, as the planner is given them."""
     world = World(config, OWN, TARGET, FLEET)
-    world.hear(NOW, "swarm", told(OTHER, 2.0))
-    world.hear(NOW, "target", told(TARGET, -2.0))
+    world.receive(NOW, "swarm", told(OTHER, 2.0))
+    world.receive(NOW, "target", told(TARGET, -2.0))
     found = world.obstacles(NOW, world.at(NOW), HERE)
     assert found.ids[:2] == (OTHER, TARGET)
     assert len(found.ids) == 3

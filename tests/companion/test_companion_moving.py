@@ -57,7 +57,7 @@ def seen(prediction, *messages, now=NOW, **config):
     """What a companion with that ``config`` is told to avoid along its ``prediction``."""
     world = World(CompanionConfig.model_validate({"field": FIELD, **config}), OWN, TARGET, FLEET)
     for message in messages:
-        world.hear(now + DELAY, "swarm", message)
+        world.receive(now + DELAY, "swarm", message)
     return world.obstacles(now, world.at(now), prediction)
 
 
@@ -147,7 +147,7 @@ def test_who_falls_silent_may_be_as_far_off_as_a_vehicle_and_keeps_its_size(kind
     for things in ((), (moving(kind, radius),)):
         settings = {"field": FIELD, "guard": {"flown_on_us": 3_000_000}, "moving": things}
         world = World(CompanionConfig.model_validate(settings), OWN, TARGET, FLEET)
-        world.hear(NOW + DELAY, "swarm", told(ZERO, v))
+        world.receive(NOW + DELAY, "swarm", told(ZERO, v))
         found.append(world.obstacles(now, world.at(now), prediction))
     vehicle, thing = found
     field = world.config.field

@@ -44,9 +44,9 @@ def hearing(*messages, now=NOW, config=CONFIG):
     neighbours = Neighbours(config, OWN, FLEET)
     for message in messages:
         if isinstance(message, Tunnel):
-            neighbours.hear_plan(now, message)
+            neighbours.receive_plan(now, message)
         else:
-            neighbours.hear_position(now + config.neighbour.delay_us, message)
+            neighbours.receive_position(now + config.neighbour.delay_us, message)
     return neighbours
 
 
@@ -64,9 +64,9 @@ def test_a_neighbour_round_the_earth_is_none():
     absurd = position(X)._replace(latitude=-47.0, longitude=-171.0)
     neighbours = hearing(absurd, absurd, plan(X, V))
     assert neighbours.obstacles(NOW).ids == ()
-    neighbours.hear_position(NOW + DELAY, position(X, V))
+    neighbours.receive_position(NOW + DELAY, position(X, V))
     assert neighbours.obstacles(NOW).ids == (OTHER,)
-    neighbours.hear_position(NOW + DELAY, absurd)
+    neighbours.receive_position(NOW + DELAY, absurd)
     np.testing.assert_allclose(neighbours.obstacles(NOW).positions[0, 0], X, atol=GRAIN)
 
 
@@ -111,8 +111,8 @@ def test_a_plan_is_aligned_by_time_however_late_it_comes(x, v, a, delay):
     now = NOW + delay
     motion = horizon.at(now)
     neighbours = Neighbours(CONFIG, OWN, FLEET)
-    neighbours.hear_plan(now, plan(x, v, a))
-    neighbours.hear_position(now + DELAY, position(motion.position, motion.velocity))
+    neighbours.receive_plan(now, plan(x, v, a))
+    neighbours.receive_position(now + DELAY, position(motion.position, motion.velocity))
     obstacles = neighbours.obstacles(now)
     np.testing.assert_allclose(obstacles.positions[0], horizon.positions(now, N, DT), atol=0.01)
 
@@ -137,7 +137,7 @@ def test_an_old_plan_falls_back_to_the_position():
     stale = CONFIG.guard.plan_stale_us
     for late, held in ((stale, False), (stale + 1, True)):
         now = NOW + late
-        neighbours.hear_position(now + DELAY, position(X + V * late * 1e-6, V))
+        neighbours.receive_position(now + DELAY, position(X + V * late * 1e-6, V))
         positions = neighbours.obstacles(now).positions[0]
         assert (np.ptp(positions, axis=0) < 1e-12).all() == held
 
@@ -230,7 +230,7 @@ def test_who_is_silent_for_too_long_rests_over_the_whole_horizon(v, silence, mor
     later = neighbours.obstacles(NOW + bound + silence + more).positions[0]
     np.testing.assert_array_equal(silent, later)
     # One that is still heard moves on beside it.
-    neighbours.hear_position(NOW + bound + silence + DELAY, position(-X, V, 13))
+    neighbours.receive_position(NOW + bound + silence + DELAY, position(-X, V, 13))
     both = neighbours.obstacles(NOW + bound + silence).positions
     np.testing.assert_array_equal(both[0], silent)
     np.testing.assert_allclose(both[1], -X + AHEAD * V, atol=GRAIN + 0.02)
@@ -249,9 +249,9 @@ def test_who_says_nothing_of_use_keeps_no_autopilots_word_out(silent, v):
         now = NOW + k * 100_000
         heard = position(X + 0.1 * k * v, v)._replace(source=Source(OTHER, 1))
         if not quiet:
-            with_it.hear_position(now + DELAY, nowhere())
+            with_it.receive_position(now + DELAY, nowhere())
         for neighbours in (with_it, without):
-            neighbours.hear_position(now + DELAY, heard)
+            neighbours.receive_position(now + DELAY, heard)
         one, other = (neighbours.obstacles(now).positions for neighbours in (with_it, without))
         np.testing.assert_array_equal(one, other)
         np.testing.assert_allclose(one[0, 0], X + 0.1 * k * v, atol=2 * GRAIN)
@@ -261,10 +261,10 @@ def test_of_a_companion_that_loses_its_fix_the_autopilot_is_heard_after_a_second
     neighbours, off = Neighbours(CONFIG, OWN, FLEET), np.array([0.0, 1.0, 0.0])
     for k in range(100):
         now, x = NOW + k * 100_000, X + 0.1 * k * V
-        neighbours.hear_position(now + DELAY, position(x, V) if k < 50 else nowhere(195))
+        neighbours.receive_position(now + DELAY, position(x, V) if k < 50 else nowhere(195))
         # Its autopilot is a metre off, by another filter.
         apart = position(x + off, V)._replace(source=Source(OTHER, 1))
-        neighbours.hear_position(now + DELAY, apart)
+        neighbours.receive_position(now + DELAY, apart)
         there = neighbours.obstacles(now).positions[0, 0]
         np.testing.assert_allclose(there, x if k < 59 else x + off, atol=0.1)
 
@@ -276,8 +276,8 @@ def test_the_plans_of_a_wrong_clock_are_laid_where_their_sender_is(off):
     for k in range(30):
         made = NOW + k * 100_000
         x = 1e-7 * k * 1e6 * v
-        neighbours.hear_plan(made + DELAY, plan(x, v, epoch=(made + round(off * 1e6)) // 4 * 4))
-        neighbours.hear_position(made + DELAY, position(x, v))
+        neighbours.receive_plan(made + DELAY, plan(x, v, epoch=(made + round(off * 1e6)) // 4 * 4))
+        neighbours.receive_position(made + DELAY, position(x, v))
     expected = x + AHEAD * v + 1e-6 * DELAY * v
     np.testing.assert_allclose(neighbours.obstacles(made + DELAY).positions[0], expected, atol=0.05)
 
@@ -292,7 +292,7 @@ def test_positions_that_overtake_each_other_tell_the_same(order, v):
         for k in turn:
             heard = position(X + 0.1 * k * v, v)._replace(time_boot=10**7 + k * 100_000)
             # Quick ones and slow ones; the quickest took the least time that there is.
-            neighbours.hear_position(NOW + 5 * 100_000 + DELAY, heard)
+            neighbours.receive_position(NOW + 5 * 100_000 + DELAY, heard)
         results.append(neighbours)
     one, other = (neighbours.obstacles(NOW + 600_000).positions for neighbours in results)
     np.testing.assert_array_equal(one, other)
@@ -307,8 +307,8 @@ def test_only_differences_of_time_matter(shift, late, speed):
     results = []
     for epoch in (NOW, NOW + shift):
         neighbours = Neighbours(CONFIG, OWN, FLEET)
-        neighbours.hear_plan(epoch, plan(X, v, epoch=epoch))
-        neighbours.hear_position(epoch + DELAY, position(X, v))
+        neighbours.receive_plan(epoch, plan(X, v, epoch=epoch))
+        neighbours.receive_position(epoch + DELAY, position(X, v))
         results.append(neighbours.obstacles(epoch + late).positions)
     np.testing.assert_array_equal(results[0], results[1])
 
@@ -383,7 +383,7 @@ def test_what_came_lately_is_held_where_it_says_however_old_it_is_dated(v, delay
     came = NOW + 100_000 + delay
     neighbours = hearing(position(X, v)._replace(time_boot=10**7), config=config)
     told = position(X + 0.1 * v, v)._replace(time_boot=10**7 + 100_000)
-    neighbours.hear_position(came + DELAY, told)
+    neighbours.receive_position(came + DELAY, told)
     found = neighbours.obstacles(came + later)
     assert neighbours.ages(came)[OTHER] == pytest.approx(delay, abs=20_000)
     carried = 1e-6 * min(delay, FLOWN_ON if wary else config.neighbour.extrapolate_us)
@@ -391,7 +391,7 @@ def test_what_came_lately_is_held_where_it_says_however_old_it_is_dated(v, delay
         off = np.linalg.norm(found.positions[0, 0] - there)
         assert off + config.field.d_min <= found.d_min[0] + 2 * GRAIN + 0.05 * np.linalg.norm(v)
     # Which a fresh plan of the same place puts right.
-    neighbours.hear_plan(came + later, plan(X + 0.1 * v, v, epoch=came + 4 * (later // 4)))
+    neighbours.receive_plan(came + later, plan(X + 0.1 * v, v, epoch=came + 4 * (later // 4)))
     found = neighbours.obstacles(came + later)
     assert found.d_min == [config.field.d_min]
     np.testing.assert_allclose(found.positions[0], X + 0.1 * v + AHEAD * v, atol=0.01)

@@ -39,7 +39,7 @@ class Asker:
                 self.asked.append((self.now - START, one.name))
                 if one.name in self.answers:
                     value = stock_parameters(self.profile.autopilot)[one.name]
-                    self.parameters.hear(told(one.name, value), self.profile)
+                    self.parameters.receive(told(one.name, value), self.profile)
             self.now += TICK
         return self
 
@@ -72,14 +72,14 @@ def test_what_is_not_answered_is_asked_for_twice_a_second_until_time_is_over(mis
     assert set(asker.parameters.unread(ARDUPILOT)) == missing
     # One that comes after all counts.
     late = min(missing)
-    asker.parameters.hear(told(late, 1.5), ARDUPILOT)
+    asker.parameters.receive(told(late, 1.5), ARDUPILOT)
     assert asker.parameters.values[late] == 1.5
 
 
 def test_before_time_is_over_one_missing_parameter_keeps_it_open():
     asker = Asker(answers=set(stock_parameters(3)) - {"PSC_JERK_XY"}).run(1e-6 * PATIENCE - 0.1)
     assert not asker.settled
-    asker.parameters.hear(told("PSC_JERK_XY", 5.0), ARDUPILOT)
+    asker.parameters.receive(told("PSC_JERK_XY", 5.0), ARDUPILOT)
     assert asker.settled
 
 
@@ -97,15 +97,15 @@ def test_a_number_is_read_as_its_firmware_means_it(flavour):
     """ArduPilot casts an int16 to float32, PX4 sends the bytes of an integer."""
     parameters, profile = Parameters(OWN), PROFILES[flavour]
     if flavour == "px4":
-        parameters.hear(told("MPC_XY_P", 1, INT32, "<i"), profile)
+        parameters.receive(told("MPC_XY_P", 1, INT32, "<i"), profile)
         assert parameters.values == {"MPC_XY_P": 1.0}
     else:
-        parameters.hear(told("ANGLE_MAX", 3000.0, 4), profile)
+        parameters.receive(told("ANGLE_MAX", 3000.0, 4), profile)
         assert parameters.values == {"ANGLE_MAX": 3000.0}
 
 
 def test_what_is_not_finite_or_not_wanted_is_not_kept():
     parameters = Parameters(OWN)
     for name, value in (("PSC_JERK_XY", float("nan")), ("WPNAV_ACCEL", float("inf")), ("RTL_ALT", 3.0)):
-        parameters.hear(told(name, value), ARDUPILOT)
+        parameters.receive(told(name, value), ARDUPILOT)
     assert not parameters.values

@@ -37,7 +37,7 @@ from pilot_rig import (
 )
 
 from companion.config import CompanionConfig
-from companion.flight.command_protocol import Calls
+from companion.flight.command_protocol import Commands
 from companion.values.phase import Phase
 from companion.world import View
 from mavlink_bridge.messages import Message
@@ -394,13 +394,13 @@ def test_a_height_that_drifts_does_not_hold_up_the_take_off(flavour):
 
 
 def test_a_refusal_that_is_but_repeated_counts_once():
-    calls, now = Calls(OWN), 0
+    calls, now = Commands(OWN), 0
 
     def refused(result):
         nonlocal now
         now += 1_000_000
         assert calls.call(now, MODE, (1.0,) * 7)
-        calls.hear(ack(MODE, result))
+        calls.receive(ack(MODE, result))
         return calls.refused
 
     assert {refused(4) for _ in range(100)} == {1}

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.flight.positioning import Positioning
-from companion.obstacles.uncertainty import Doubts
+from companion.obstacles.uncertainty import ReportedUncertainty
 from mavlink_bridge.doubt_wire import pack
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.messages import EkfStatus, EstimatorStatus, GpsRaw
@@ -56,10 +56,10 @@ CASES = {
 def test_trouble_is_named_grows_with_time_and_is_over_two_seconds_after_it_ends(name):
     case, found = CASES[name], Positioning()
     for message in case.good:
-        found.hear(message)
+        found.receive(message)
     found.tick(SECOND)
     assert (found.trouble, found.radius) == ("", 0.0)
-    found.hear(case.bad)
+    found.receive(case.bad)
     found.tick(2 * SECOND)
     assert found.trouble == case.trouble
     radii = []
@@ -71,7 +71,7 @@ def test_trouble_is_named_grows_with_time_and_is_over_two_seconds_after_it_ends(
     assert radii == sorted(radii)
     assert radii[-1] == 10.0
     for message in case.good:
-        found.hear(message)
+        found.receive(message)
     found.tick(40 * SECOND)
     assert (found.trouble, found.radius) == ("", 10.0)
     found.tick(42 * SECOND)
@@ -89,7 +89,7 @@ def test_who_never_had_gps_misses_none(heard):
     """Cameras, or not ready yet."""
     found = Positioning()
     for k, message in enumerate(heard):
-        found.hear(message)
+        found.receive(message)
         found.tick(k * SECOND)
         assert (found.trouble, found.radius) == ("", 0.0)
 
@@ -99,10 +99,10 @@ def test_who_never_had_gps_misses_none(heard):
 def test_what_the_estimator_says_of_itself_counts_where_it_is_more(worse, after):
     found = Positioning()
     for message in (gps(3), estimator(accuracy=0.4)):
-        found.hear(message)
+        found.receive(message)
     found.tick(0)
     for message in (gps(1), estimator(accuracy=0.4 + worse)):
-        found.hear(message)
+        found.receive(message)
     found.tick(0)
     now = round(1e6 * after)
     found.tick(now)
@@ -112,7 +112,7 @@ def test_what_the_estimator_says_of_itself_counts_where_it_is_more(worse, after)
 def test_a_short_loss_begins_anew():
     found = Positioning()
     for k in range(40):
-        found.hear(gps(3 if k % 4 else 1))
+        found.receive(gps(3 if k % 4 else 1))
         found.tick(k * SECOND)
         # One second in four; where it has faded meanwhile nothing is left.
         assert found.radius <= 0.05
@@ -123,9 +123,9 @@ def test_a_short_loss_begins_anew():
     told=st.lists(st.tuples(st.integers(1, 255), numbers(0.0, 600.0), st.integers(0, 9 * SECOND)), max_size=9)
 )
 def test_what_others_say_counts_for_three_seconds_and_for_ten_metres_at_most(told):
-    doubts = Doubts()
+    doubts = ReportedUncertainty()
     for system, radius, when in sorted(told, key=lambda one: one[2]):
-        doubts.hear(when, system, pack(radius))
+        doubts.receive(when, system, pack(radius))
     now = 9 * SECOND
     last = {system: (when, radius) for system, radius, when in sorted(told, key=lambda one: one[2])}
     counts = {s for s, (when, radius) in last.items() if now - when <= 3 * SECOND and radius > 0.0}
@@ -135,4 +135,4 @@ def test_what_others_say_counts_for_three_seconds_and_for_ten_metres_at_most(tol
         expected = min(last[system][1], 10.0) if system in counts else 0.0
         assert expected - 1e-9 <= radius <= expected + 0.0101
     with pytest.raises(PlanWireError):
-        doubts.hear(now, 7, b"\x02\0\0\0")
+        doubts.receive(now, 7, b"\x02\0\0\0")

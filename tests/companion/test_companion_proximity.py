@@ -47,7 +47,7 @@ def scan(distances, frame=BODY, increment=STEP, offset=0.0, source=SENSOR, time=
 def sensed(message, place, yaw, north=math.pi / 2, known=NOBODY, now=START):
     """What a vehicle at ``place`` (3,) with its nose to ``yaw`` (ENU) knows after one message."""
     found = Sensed(CompanionConfig(proximity=CONFIG), FLEET)
-    found.hear_distances(now, message, Stance(now, np.asarray(place, float), yaw, north), known)
+    found.receive_distances(now, message, Stance(now, np.asarray(place, float), yaw, north), known)
     return found
 
 
@@ -150,7 +150,7 @@ def test_what_is_seen_again_keeps_its_name():
     found = sensed(scan({0: 5.0, 20: 7.0}), (0, 0, HEIGHT), 0.0)
     first = posts(found, (0, 0, HEIGHT))
     again = Stance(START + 100_000, np.array([0.1, 0.0, HEIGHT]), 0.0, math.pi / 2)
-    found.hear_distances(START + 100_000, scan({0: 5.0, 20: 7.0}), again, NOBODY)
+    found.receive_distances(START + 100_000, scan({0: 5.0, 20: 7.0}), again, NOBODY)
     later = posts(found, (0, 0, HEIGHT), START + 100_000)
     assert sorted(later.ids) == sorted(first.ids)
     assert not (later.positions == first.positions).all()
@@ -179,7 +179,7 @@ def test_of_sensors_that_speak_together_each_counts(looks, bursts):
             message = scan({0: 2.0 + row}, frame, increment, offset)
             # What each says once more at the same time is passed over.
             for told in (message, message._replace(distances=scan({0: 1.0}).distances)):
-                found.hear(now, now, told, place, 0.0, NOBODY)
+                found.receive(now, now, told, place, 0.0, NOBODY)
     axes = found.around(now, place[None], 1e3)
     far = np.linalg.norm(axes.positions[:, 0, :2], axis=1)
     np.testing.assert_allclose(np.sort(far), 2.0 + np.arange(len(looks)), atol=1e-9)
@@ -189,7 +189,7 @@ def test_of_sensors_that_speak_together_each_counts(looks, bursts):
 def test_one_sensor_that_says_ever_new_sectors_is_bounded_and_said_to_be_refused():
     found, place = Proximity(CONFIG), np.array([0.0, 0.0, HEIGHT])
     for k in range(1000):
-        found.hear(START + k, START + k, scan({0: 2.0 + 0.01 * k}, offset=1e-3 * k), place, 0.0, NOBODY)
+        found.receive(START + k, START + k, scan({0: 2.0 + 0.01 * k}, offset=1e-3 * k), place, 0.0, NOBODY)
     assert found.refused == 1000 - 8
 
 
@@ -202,7 +202,7 @@ def test_however_much_is_told_little_is_kept_and_the_nearest_of_it(seed):
         now = START + 21_000 * k
         told = dict(enumerate(random.uniform(1.0, 15.0, 72)))
         source = Source(SYSTEM, int(random.integers(0, 255)))
-        found.hear(now, now, scan(told, 0, source=source), place, math.pi / 2, NOBODY)
+        found.receive(now, now, scan(told, 0, source=source), place, math.pi / 2, NOBODY)
     axes = found.around(now, place[None], 1e3)
     assert len(axes.ids) == len(set(axes.ids)) == CONFIG.most
     assert found.refused > 0
@@ -212,16 +212,16 @@ def test_however_much_is_told_little_is_kept_and_the_nearest_of_it(seed):
 def told(*messages, config=None, link="autopilot"):
     """A world that flies north at 2 m/s and turns its nose clockwise at 1 rad/s, and hears ``messages``."""
     world = World(config or CompanionConfig(proximity=CONFIG), SYSTEM, 1, FLEET)
-    world.hear(START, "autopilot", GpsGlobalOrigin(AUTOPILOT, FLEET.latitude, FLEET.longitude, 488.0, 0))
+    world.receive(START, "autopilot", GpsGlobalOrigin(AUTOPILOT, FLEET.latitude, FLEET.longitude, 488.0, 0))
     for k in range(20):
         now, boot = START + 20_000 * k, 10**6 + 20_000 * k
         north = 2.0 * 0.02 * k
-        world.hear(now, "autopilot", LocalPosition(AUTOPILOT, boot, (north, 0.0, -5.0), (2.0, 0.0, 0.0)))
+        world.receive(now, "autopilot", LocalPosition(AUTOPILOT, boot, (north, 0.0, -5.0), (2.0, 0.0, 0.0)))
         yaw = 0.02 * k
         if k % 5 == 0:
-            world.hear(now, "autopilot", Attitude(AUTOPILOT, boot, 0.0, 0.0, yaw, (0.0, 0.0, 1.0)))
+            world.receive(now, "autopilot", Attitude(AUTOPILOT, boot, 0.0, 0.0, yaw, (0.0, 0.0, 1.0)))
     for message in messages:
-        world.hear(START + 400_000, link, message)
+        world.receive(START + 400_000, link, message)
     return world
 
 

@@ -65,7 +65,7 @@ class Sender:
             while telling and telling[0][0] <= now:
                 _, left, what = telling.popleft()
                 if isinstance(what, Timesync):
-                    answer = trips.hear(what)
+                    answer = trips.receive(what)
                     clock.answered(NOW + now, *answer)
                 else:
                     date = clock.date(NOW + now, what // 1000 * 1000)
@@ -210,10 +210,10 @@ def test_questions_are_asked_only_while_messages_are_late_and_each_answer_counts
         Timesync(AUTOPILOT, 77, question.ts1 + 1),
         Timesync(AUTOPILOT, -5, question.ts1),
     ):
-        assert trips.hear(other) is None
-    answer = trips.hear(Timesync(AUTOPILOT, 5_000_000_123, question.ts1))
+        assert trips.receive(other) is None
+    answer = trips.receive(Timesync(AUTOPILOT, 5_000_000_123, question.ts1))
     assert answer == (NOW + 3 * 200_000, 5_000_000)
-    assert trips.hear(Timesync(AUTOPILOT, 5_000_000_123, question.ts1)) is None
+    assert trips.receive(Timesync(AUTOPILOT, 5_000_000_123, question.ts1)) is None
 
 
 def test_who_does_not_answer_is_known_after_three_seconds():

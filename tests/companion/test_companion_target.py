@@ -50,7 +50,7 @@ def followed(kind, x, v, seconds=8.0, says_velocity=True, noise=None):
         place = x + 1e-6 * (now - START) * v + (0.0 if noise is None else noise.normal(0.0, 0.3, 3))
         delay = found._config.target.delay_us
         message = told(kind, place, v if says_velocity else None, 10**6 + k * PERIOD)
-        assert found.hear(now + delay, *message)
+        assert found.receive(now + delay, *message)
     return found, now
 
 
@@ -78,7 +78,7 @@ def test_a_velocity_that_nobody_tells_is_found_from_the_places(x, v, kind, seed)
 def test_three_zeros_are_no_velocity():
     moving, still = (followed("follow_target", np.zeros(3), np.array([2.0, 0.0, 0.0]))[0] for _ in range(2))
     link, message = told("follow_target", np.array([16.0, 0.0, 0.0]), np.zeros(3), 10**6 + 80 * PERIOD)
-    assert still.hear(START + 80 * PERIOD + 20_000, link, message)
+    assert still.receive(START + 80 * PERIOD + 20_000, link, message)
     at = START + 80 * PERIOD
     np.testing.assert_allclose(still.at(at).velocity, moving.at(at).velocity, atol=0.05)
 
@@ -101,9 +101,9 @@ def test_a_track_that_misses_velocities_knows_less_and_stays_sane(steps):
 def test_a_place_far_off_the_way_needs_a_witness():
     found, now = followed("camera", np.zeros(3), np.array([1.0, 0.0, 0.0]), says_velocity=False)
     far = told("camera", np.array([60.0, 0.0, 0.0]), None)
-    assert not found.hear(now + 120_000, *far)
+    assert not found.receive(now + 120_000, *far)
     assert found.at(now).position[0] == pytest.approx(7.9, abs=0.3)
-    assert found.hear(now + 220_000, *far)
+    assert found.receive(now + 220_000, *far)
     assert found.at(now + 200_000).position[0] == pytest.approx(60.0, abs=0.5)
 
 
@@ -113,7 +113,7 @@ def test_another_kind_changes_nothing(kind):
     before = found.at(now + PERIOD)
     for other in set(KINDS) - {kind}:
         speaker = Source(CAMERA.system if other == "camera" else TARGET, 7)
-        assert not found.hear(now + PERIOD, *told(other, np.ones(3), np.ones(3), source=speaker))
+        assert not found.receive(now + PERIOD, *told(other, np.ones(3), np.ones(3), source=speaker))
     after = found.at(now + PERIOD)
     np.testing.assert_array_equal(after.position, before.position)
 
@@ -124,30 +124,30 @@ def test_of_two_that_speak_the_first_counts_until_it_is_silent(anyone):
     found = target("follow_target", anyone=anyone)
     other = Source(7 if anyone else TARGET, 20)
     here, there = np.zeros(3), np.array([5.0, 0.0, 0.0])
-    assert found.hear(START, *told("follow_target", here, None))
+    assert found.receive(START, *told("follow_target", here, None))
     for k in range(1, 20):
         now = START + k * PERIOD
-        assert not found.hear(now, *told("follow_target", there, None, source=other))
-        assert found.hear(now, *told("follow_target", here, None))
+        assert not found.receive(now, *told("follow_target", there, None, source=other))
+        assert found.receive(now, *told("follow_target", here, None))
     assert found.refused == 19
     now += found._config.guard.target_stale_us + 1
     assert found.at(now) is None
-    assert found.hear(now, *told("follow_target", there, None, source=other))
+    assert found.receive(now, *told("follow_target", there, None, source=other))
     np.testing.assert_allclose(found.at(now).position, there, atol=1e-3)
 
 
 def test_what_was_known_last_stays_until_the_next_speaker_makes_sense():
     found = target("follow_target", anyone=True)
     here, there = np.zeros(3), np.array([5.0, 0.0, 0.0])
-    assert found.hear(START, *told("follow_target", here, None))
+    assert found.receive(START, *told("follow_target", here, None))
     link, sense = told("follow_target", there, None, source=Source(7, 20))
     for later in (10, 20):
         now = START + later * 10**6
-        assert not found.hear(now, link, sense._replace(latitude=-47.0, longitude=-171.0))
+        assert not found.receive(now, link, sense._replace(latitude=-47.0, longitude=-171.0))
         assert found.at(now) is None
         np.testing.assert_allclose(found.last(now).position, here, atol=1e-3)
         assert found.age(now) > later * 10**6
-    assert found.hear(now, link, sense)
+    assert found.receive(now, link, sense)
     np.testing.assert_allclose(found.last(now).position, there, atol=1e-3)
 
 
@@ -170,17 +170,19 @@ def test_nobody_flies_through_a_target_whether_it_is_heard_or_not(avoidance, sil
 
 @pytest.mark.parametrize("source", [Source(0, 1), Source(2, 1), Source(SYSTEM, 1)])
 def test_strangers_are_no_target(source):
-    assert not target("follow_target").hear(START, *told("follow_target", np.zeros(3), None, source=source))
+    assert not target("follow_target").receive(
+        START, *told("follow_target", np.zeros(3), None, source=source)
+    )
     stranger = source.system == 2
     anyone = target("follow_target", anyone=True)
-    assert anyone.hear(START, *told("follow_target", np.zeros(3), None, source=source)) == stranger
+    assert anyone.receive(START, *told("follow_target", np.zeros(3), None, source=source)) == stranger
 
 
 def test_a_camera_that_does_not_track_tells_nothing():
     link, message = told("camera", np.zeros(3), None)
     for status in (0, 2, 255):
-        assert not target("camera").hear(START, link, message._replace(status=status))
-    assert target("camera").hear(START, link, message)
+        assert not target("camera").receive(START, link, message._replace(status=status))
+    assert target("camera").receive(START, link, message)
 
 
 @given(numbers(-100.0, 100.0), st.integers(0, 10**9))
@@ -189,7 +191,7 @@ def test_a_fixed_target_is_always_there(x, later):
     state = found.at(START + later)
     np.testing.assert_array_equal(state.position, (x, 1.0, 2.0))
     assert (state.age, found.age(START + later)) == (0, 0)
-    assert not found.hear(START, *told("global_position", np.zeros(3), np.zeros(3)))
+    assert not found.receive(START, *told("global_position", np.zeros(3), np.zeros(3)))
 
 
 @given(

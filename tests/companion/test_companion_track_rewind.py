@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from companion.config.estimation import TrackConfig
 from companion.estimation.estimator import Estimator
-from companion.estimation.out_of_sequence import Rewind
+from companion.estimation.out_of_sequence import OutOfSequenceBuffer
 from companion.estimation.sender_clock import Dated
 from companion.estimation.tracks import Track
 
@@ -104,7 +104,7 @@ def test_any_order_of_insertion_within_the_window(data, x):
     far = data.draw(st.sets(st.sampled_from(times), max_size=4))
     results = []
     for turn in (times, order):
-        rewind = Rewind(Estimator(CONFIG), WINDOW)
+        rewind = OutOfSequenceBuffer(Estimator(CONFIG), WINDOW)
         for time in turn:
             z = (*(x + (TELEPORT if time in far else 0.0)).tolist(), 0.0, 0.0, 0.0)
             rewind.put(Dated(1000 * time, True), z)
@@ -116,7 +116,7 @@ def test_any_order_of_insertion_within_the_window(data, x):
 @LAWS
 @given(late=st.integers(1, 10**7), x=vectors(50.0))
 def test_older_than_the_window_is_refused_and_counted(late, x):
-    rewind = Rewind(Estimator(CONFIG), WINDOW)
+    rewind = OutOfSequenceBuffer(Estimator(CONFIG), WINDOW)
     for k in range(60):
         rewind.put(Dated(k * 100_000, True), STILL)
     before = rewind.belief
@@ -134,7 +134,7 @@ def test_a_late_message_can_be_the_first_of_all():
     z = [(k * 0.3, 0.0, 0.0, 3.0, 0.0, 0.0) for k in range(3)]
     beliefs = []
     for order in ((0, 1, 2), (1, 2, 0), (2, 1, 0)):
-        rewind = Rewind(Estimator(CONFIG), WINDOW)
+        rewind = OutOfSequenceBuffer(Estimator(CONFIG), WINDOW)
         for k in order:
             assert rewind.put(Dated(k * 100_000, True), z[k])
         beliefs.append(rewind.belief)
@@ -146,7 +146,7 @@ def test_a_late_message_can_be_the_oldest_that_is_remembered(missing):
     """What was believed before the window is what it is taken after."""
     random = np.random.default_rng(3)
     measured = [Dated(k * 100_000, True) for k in range(60)], random.normal(scale=0.02, size=(60, 6)).tolist()
-    in_order, late = (Rewind(Estimator(CONFIG), WINDOW) for _ in range(2))
+    in_order, late = (OutOfSequenceBuffer(Estimator(CONFIG), WINDOW) for _ in range(2))
     for k, (dated, z) in enumerate(zip(*measured, strict=True)):
         in_order.put(dated, tuple(z))
         if k != missing:
@@ -172,7 +172,7 @@ def test_a_late_witness_turns_the_verdict_on_those_after_it():
 @given(seed=st.integers(0, 2**32 - 1), window=st.integers(0, 3_000_000), spread=numbers(0.0, 4e6))
 def test_the_memory_stays_within_two_windows_whatever_comes(seed, window, spread):
     random = np.random.default_rng(seed)
-    rewind = Rewind(Estimator(CONFIG), window)
+    rewind = OutOfSequenceBuffer(Estimator(CONFIG), window)
     newest = None
     for k in range(100):
         time = int(k * 100_000 + spread * random.uniform(-1.0, 1.0))

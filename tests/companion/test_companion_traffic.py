@@ -35,7 +35,7 @@ def message(address=7, course=0.0, speed=60.0, climb=0.0, age=0, altitude=500.0,
 
 def heard(place, now=START, here=ZERO, traffic=None, **more):
     found = Traffic(CONFIG) if traffic is None else traffic
-    found.hear(now, message(**more), np.asarray(place, float), here)
+    found.receive(now, message(**more), np.asarray(place, float), here)
     return found
 
 
@@ -151,12 +151,12 @@ def test_it_is_heard_where_a_receiver_may_be(link, sender):
     assert accepts(link, SYSTEM, 1, on)(246, sender, 156)
     assert not accepts(link, SYSTEM, 1, off)(246, sender, 156)
     world = World(on, SYSTEM, 1, FLEET)
-    world.hear(START, link, message(place=(34.0, 0.0, 5.0))._replace(source=Source(sender, 156)))
+    world.receive(START, link, message(place=(34.0, 0.0, 5.0))._replace(source=Source(sender, 156)))
     seen = world.obstacles(START, world.at(START), HERE)
     assert seen.ids == (FIRST_ID + 7,)
     assert seen.radius[0] == CONFIG.radius + on.field.margin(1)
     world = World(off, SYSTEM, 1, FLEET)
-    world.hear(START, link, message(place=(34.0, 0.0, 5.0)))
+    world.receive(START, link, message(place=(34.0, 0.0, 5.0)))
     assert world.obstacles(START, world.at(START), HERE).ids == ()
 
 
@@ -228,7 +228,7 @@ def test_deep_in_its_room_the_field_pushes_gently(place, course):
     config = CompanionConfig(traffic=CONFIG)
     world = World(config, SYSTEM, 1, FLEET)
     told = message(place=place, course=course, altitude=FLEET.altitude + place[2])
-    world.hear(START, "autopilot", told)
+    world.receive(START, "autopilot", told)
     seen = world.obstacles(START, world.at(START), HERE)
     if seen.ids:
         force = repulsion(HERE, seen, config.field.gain, config.limits.a_total, None, 0.1)

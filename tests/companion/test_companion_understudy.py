@@ -8,14 +8,14 @@ from companion_bench import AUTOPILOT, FLEET, SYSTEM, TARGET, Bench, only, seen_
 
 from companion.dry_run import ONLOOKER, REQUESTS, DryRun
 from companion.flight.readiness import OPERATORS_GO
-from companion.shadow import Understudy
+from companion.shadow import ShadowCompanion
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandLong, GpsGlobalOrigin, Source
 
 
 def test_an_empty_battery_of_the_vehicle_it_looks_on_at_leaves_no_gap() -> None:
     bench, stopwatch = Bench(task="escort"), count()
-    bench.companion = Understudy(bench.config, SYSTEM, TARGET, FLEET, lambda: next(stopwatch))
+    bench.companion = ShadowCompanion(bench.config, SYSTEM, TARGET, FLEET, lambda: next(stopwatch))
     bench.autopilot.position[2], bench.autopilot.armed = 5.0, True
     bench.target = seen_at(TARGET, (15.0, 0.0, 0.0))
     origin = GpsGlobalOrigin(AUTOPILOT, FLEET.latitude, FLEET.longitude, FLEET.altitude, 0)

@@ -11,8 +11,8 @@ from test_companion_proximity import scan
 
 from companion.config import CompanionConfig
 from companion.config.flight import VoiceConfig
-from companion.telemetry.metrics import Dials
-from companion.telemetry.status_text import Severity, Voice
+from companion.telemetry.metrics import Metrics
+from companion.telemetry.status_text import Severity, StatusReporter
 from companion.values.components import COMPONENT
 from mavlink_bridge.messages import NamedValue, Source, StatusText
 
@@ -24,7 +24,7 @@ EVENTS = st.lists(st.tuples(st.integers(0, 3_000_000), severities, st.integers(0
 
 @given(EVENTS)
 def test_never_more_than_five_at_once_and_one_a_second(events):
-    voice, now, said = Voice(ON, OWN), START, []
+    voice, now, said = StatusReporter(ON, OWN), START, []
     for later, severity, text in events:
         now += later
         voice.say(severity, text)
@@ -36,7 +36,7 @@ def test_never_more_than_five_at_once_and_one_a_second(events):
 
 @given(EVENTS)
 def test_the_most_severe_is_said_first_and_lost_last(events):
-    voice = Voice(ON, OWN)
+    voice = StatusReporter(ON, OWN)
     for _, severity, text in events:
         voice.say(severity, text)
     said = [text for k in range(30) for text in voice.due(START + k * 10_000_000)]
@@ -53,7 +53,7 @@ def _first_of_each(events):
 
 @given(st.lists(st.booleans(), max_size=40))
 def test_what_goes_wrong_is_said_when_it_begins_and_when_it_ends(states):
-    voice, said = Voice(ON, OWN), []
+    voice, said = StatusReporter(ON, OWN), []
     for k, wrong in enumerate(states):
         voice.watch(wrong, "gone", "back")
         said += [text.text for text in voice.due(START + k * 1_000_000)]
@@ -62,7 +62,7 @@ def test_what_goes_wrong_is_said_when_it_begins_and_when_it_ends(states):
 
 
 def test_unless_asked_nothing_is_said():
-    voice = Voice(VoiceConfig(), OWN)
+    voice = StatusReporter(VoiceConfig(), OWN)
     voice.say(Severity.CRITICAL, "on fire")
     voice.watch(True, "gone", "back")
     assert voice.due(START) == []
@@ -140,7 +140,7 @@ def test_figures_are_the_same_whoever_takes_the_readings_away():
 
 
 def test_figures_are_those_of_the_plans():
-    dials = Dials(CompanionConfig(voice=VoiceConfig(values=True)), OWN)
+    dials = Metrics(CompanionConfig(voice=VoiceConfig(values=True)), OWN)
     period = CompanionConfig().rates.replan_us * 1000
     for reading in (2_000_000, period, 3_000_000):
         dials.note(reading)

@@ -23,7 +23,7 @@ from companion_bench import (
 from companion.config import CompanionConfig
 from companion.estimation.tracks import State
 from companion.flight.guard import Holding
-from companion.flight.health_monitor import Reaction, Situation, Watch
+from companion.flight.health_monitor import HealthMonitor, Reaction, Situation
 from companion.flight.vehicle import Vehicle
 from companion.values.phase import Phase
 from companion.world import View
@@ -47,8 +47,8 @@ GUARD = CONFIG.guard
 def vehicle(*, battery=None, state=4, now=SECOND):
     found = Vehicle()
     profile = PROFILES["ardupilot"]
-    found.hear(Heartbeat(AUTOPILOT, 2, profile.autopilot, 0x80, profile.guided_custom_mode, state))
-    found.hear(SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, 12.0, battery))
+    found.receive(Heartbeat(AUTOPILOT, 2, profile.autopilot, 0x80, profile.guided_custom_mode, state))
+    found.receive(SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, 12.0, battery))
     found.tick(now)
     return found
 
@@ -135,7 +135,7 @@ LIMITS = {
 @pytest.mark.parametrize("name", LIMITS)
 def test_a_concern_begins_at_its_limit_is_said_once_and_ends(name):
     concern, good, bad, reaction = LIMITS[name]
-    watch = Watch(FENCED)
+    watch = HealthMonitor(FENCED)
     before = watch.look(situation(**good))
     begun = [change for change in watch.look(situation(**bad)) if change.begins]
     assert [change.concern.name.split()[0] for change in begun] == [concern]
@@ -157,7 +157,7 @@ def test_a_concern_begins_at_its_limit_is_said_once_and_ends(name):
 
 @pytest.mark.parametrize("phase", [Phase.CONNECT, Phase.DONE])
 def test_on_the_ground_nothing_of_a_flight_concerns_it(phase):
-    watch = Watch(FENCED)
+    watch = HealthMonitor(FENCED)
     for _, _, bad, _ in LIMITS.values():
         if "phase" not in bad and not {"late", "clock_steps", "neighbours"} & set(bad):
             assert watch.look(situation(**{**bad, "phase": phase})) == []
@@ -165,7 +165,7 @@ def test_on_the_ground_nothing_of_a_flight_concerns_it(phase):
 
 def test_a_slow_clock_is_said_once_however_its_losses_are_spread():
     for share, every, said in ((0.06, 0.1, 1), (0.0101, 0.1, 1), (0.05, 7.0, 1), (0.002, 0.1, 0)):
-        watch, begun = Watch(CONFIG), 0
+        watch, begun = HealthMonitor(CONFIG), 0
         for k in range(900):
             lost = round(1e6 * share * every * (0.1 * k // every))
             at = SECOND + 100_000 * k

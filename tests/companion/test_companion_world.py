@@ -40,7 +40,7 @@ def world(*heard, config=CONFIG):
     """A world that heard (link, message) pairs at ``NOW``."""
     picture = World(config, AUTOPILOT.system, TARGET.system, FLEET)
     for link, message in heard:
-        picture.hear(NOW, link, message)
+        picture.receive(NOW, link, message)
     return picture
 
 
@@ -182,7 +182,7 @@ def test_an_origin_from_before_that_comes_late_or_again_changes_nothing(late, bo
     picture = world(*(("autopilot", origin_at(k, boot + k)) for k in range(6)))
     frame = picture.at(NOW).local
     for step, later in late:
-        picture.hear(NOW + later, "autopilot", origin_at(step, boot + step))
+        picture.receive(NOW + later, "autopilot", origin_at(step, boot + step))
         assert picture.at(NOW).local is frame
 
 
@@ -190,7 +190,7 @@ def test_an_origin_from_before_that_comes_late_or_again_changes_nothing(late, bo
 def test_an_autopilot_that_began_anew_or_says_no_time_has_the_origin_that_it_says(time):
     picture = world(("autopilot", origin_at(1, 10**9)))
     later = NOW + (2_000_001 if time else 0)
-    picture.hear(later, "autopilot", origin_at(2, time))
+    picture.receive(later, "autopilot", origin_at(2, time))
     expected = FLEET.local(*origin_at(2, time)[1:4])
     np.testing.assert_array_equal(
         picture.at(later).local.position_to_fleet(ZERO), expected.position_to_fleet(ZERO)
@@ -203,13 +203,13 @@ def test_another_origin_is_no_other_clock():
         for k in range(80):
             now += 20_000
             heard = local((1, 2, -3))._replace(time_boot=boot + 20_000 * k)
-            picture.hear(now, "autopilot", heard)
+            picture.receive(now, "autopilot", heard)
     assert picture.clock_steps == 1
-    picture.hear(now, "autopilot", AT_FLEET_ZERO._replace(latitude=FLEET.latitude + 1e-7))
+    picture.receive(now, "autopilot", AT_FLEET_ZERO._replace(latitude=FLEET.latitude + 1e-7))
     assert picture.clock_steps == 1
     for k in range(80, 90):
         now += 20_000
-        picture.hear(now, "autopilot", local((1, 2, -3))._replace(time_boot=1_000_000 + 20_000 * k))
+        picture.receive(now, "autopilot", local((1, 2, -3))._replace(time_boot=1_000_000 + 20_000 * k))
         assert picture.clock_steps == 1
 
 
@@ -220,9 +220,9 @@ def test_a_move_of_the_origin_is_noticed_however_many_come_before_a_position(ori
     was = picture.at(NOW).own.position
     for k in range(origins):
         latitude = FLEET.latitude + shift * (k + 1) / origins
-        picture.hear(NOW + k, "autopilot", AT_FLEET_ZERO._replace(latitude=latitude))
+        picture.receive(NOW + k, "autopilot", AT_FLEET_ZERO._replace(latitude=latitude))
     later = NOW + 20_000
-    picture.hear(later, "autopilot", local((1, 2, -3)))
+    picture.receive(later, "autopilot", local((1, 2, -3)))
     moved = float(np.linalg.norm(picture.at(later).own.position - was))
     assert moved > 3.0
     assert (picture.moves, picture.displaced) == (1, pytest.approx(moved, abs=1e-6))
@@ -237,7 +237,7 @@ def test_a_heading_that_is_too_old_is_none():
     heard = NOW - CONFIG.own.delay_us
     assert picture.at(heard + STALE).yaw == pytest.approx(math.pi / 2)
     assert picture.at(heard + STALE + 1).yaw is None
-    picture.hear(NOW + 10 * STALE, "autopilot", attitude(math.pi / 2))
+    picture.receive(NOW + 10 * STALE, "autopilot", attitude(math.pi / 2))
     assert picture.at(NOW + 10 * STALE).yaw == pytest.approx(0.0, abs=1e-9)
 
 
@@ -248,8 +248,8 @@ def test_a_heading_that_waited_is_as_old_as_its_stamp_says(late):
     picture = world(("autopilot", AT_FLEET_ZERO))
     for k in range(10):
         here = local((1, 2, -3))._replace(time_boot=10**7 + k * 20_000)
-        picture.hear(NOW + k * 20_000, "autopilot", here)
+        picture.receive(NOW + k * 20_000, "autopilot", here)
     sent = 9 * 20_000
-    picture.hear(NOW + sent + late, "autopilot", attitude(0.5)._replace(time_boot=10**7 + sent))
+    picture.receive(NOW + sent + late, "autopilot", attitude(0.5)._replace(time_boot=10**7 + sent))
     known = picture.at(NOW + sent + late).yaw is not None
     assert known == (late + CONFIG.own.delay_us <= STALE)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.avoidance.certified.committed import committed, horizon_of
-from companion.backup_node import Helm
+from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
 from companion.values.components import COMPONENT
 from mavlink_bridge.codec import Codec
@@ -45,7 +45,7 @@ class Bench:
 
     def __init__(self, key: Key | None = None, companions: Key | None = None) -> None:
         """``key``: the helm's; ``companions``: its companion's, and the autopilot's."""
-        self.helm = Helm(CONFIG, SYSTEM, FLEET, None if key is None else Signing(key))
+        self.helm = BackupNode(CONFIG, SYSTEM, FLEET, None if key is None else Signing(key))
         signing = Signing(companions)
         signing.present(BEGIN)
         self.codec, self.reader = Codec(None, signing), Codec()

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shipped import FIREFLY, scenario
 
-from companion.avoidance.certified.peer_plans import Ledger
+from companion.avoidance.certified.peer_plans import PeerPlans
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Message, Tunnel
 from mavlink_bridge.plan_wire import PAYLOAD_TYPE
@@ -221,8 +221,8 @@ def test_who_replans_without_the_other_s_plan_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, replay: Replay
 ) -> None:
     """Head-on, and nobody waits for anybody's plan or looks at one."""
-    monkeypatch.setattr(Ledger, "missing", lambda self, epoch: set())
-    monkeypatch.setattr(Ledger, "plans", lambda self, epoch: {})
+    monkeypatch.setattr(PeerPlans, "missing", lambda self, epoch: set())
+    monkeypatch.setattr(PeerPlans, "plans", lambda self, epoch: {})
     run = fly(tmp_path / "run", 2)
     ended = replay(run, "--certify", "--json")
     assert ended.status == 1

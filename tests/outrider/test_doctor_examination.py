@@ -78,7 +78,7 @@ def heard(
     codec, examination = Codec(), Examination(system, log=log)
     for now, message in records:
         for frame in leading_frames(codec.encode(message))[0]:
-            examination.hearing.hear(now, frame)
+            examination.hearing.receive(now, frame)
     return examination
 
 
@@ -95,7 +95,7 @@ def test_whatever_is_in_it_there_is_a_verdict(
     examination = Examination(system, log=log)
     for now, data in [(0, Codec().encode(beat)), *records]:
         for frame in leading_frames(data)[0]:
-            examination.hearing.hear(now, frame)
+            examination.hearing.receive(now, frame)
         if now % 7 == 0:
             sound(examination.verdict())
     sound(examination.verdict())
@@ -136,9 +136,9 @@ def test_copies_of_frames_change_nothing_but_that_they_are_told() -> None:
     once, twice = Examination(log=True), Examination(log=True)
     for now, data in told:
         for frame in leading_frames(data)[0]:
-            once.hearing.hear(now, frame)
-            twice.hearing.hear(now, frame)
-            twice.hearing.hear(now, frame)
+            once.hearing.receive(now, frame)
+            twice.hearing.receive(now, frame)
+            twice.hearing.receive(now, frame)
     extra = set(twice.verdict().findings) - set(once.verdict().findings)
     assert {finding.what.partition(" ")[2] for finding in extra} == {"frames came twice"}
     assert set(once.verdict().findings) <= set(twice.verdict().findings)
@@ -291,5 +291,5 @@ def test_whatever_happens_to_a_recorded_log(piece: Path, seed: int, log: bool) -
             source = chance.choice((0, 3, frame.system)), frame.component
             data = frame_v2(number, CRC_EXTRA[number], source, frame.sequence, bytes(payload))
             (frame,) = leading_frames(data)[0]
-        examination.hearing.hear(time + chance.choice((0, 0, 0, -10_000_000, 100_000_000)), frame)
+        examination.hearing.receive(time + chance.choice((0, 0, 0, -10_000_000, 100_000_000)), frame)
     sound(examination.verdict())

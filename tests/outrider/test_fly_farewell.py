@@ -32,7 +32,7 @@ def companion() -> Companion:
 def test_a_companion_that_gives_up_asks_where_it_had_the_vehicle(phase: Phase) -> None:
     """A ground station may fly it in the same mode, before a go and after a take-over."""
     node = companion()
-    node.pilot.hear(BEAT)
+    node.pilot.receive(BEAT)
     node.pilot.phase = phase
     cockpit = Cockpit(node, SimulatedClock(1), None, None)
     cockpit.give_up()

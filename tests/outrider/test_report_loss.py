@@ -25,10 +25,10 @@ def judged(run: Run) -> Losses:
 
 def in_order(run: Run, logs: Iterable[Log]) -> Losses:
     assert run.motions is not None
-    ledger = Ledger()
+    peers = Ledger()
     for log in logs:
-        ledger.take(log, clocks.offset(log, run.motions))
-    return ledger.close()
+        peers.take(log, clocks.offset(log, run.motions))
+    return peers.close()
 
 
 def ways(run: Run) -> dict[tuple[int, int], Way]:

@@ -76,7 +76,7 @@ def sitl(*options: str) -> Iterator[Sitl]:
             running.process.communicate()
 
 
-def hear(end: socket.socket, kind: type[Message], system: int, said: Message | None = None) -> Any:
+def receive(end: socket.socket, kind: type[Message], system: int, said: Message | None = None) -> Any:
     """The first message of that ``kind`` of that ``system``; ``said`` first, if anything."""
     codec = Codec()
     if said is not None:
@@ -116,13 +116,13 @@ def test_ardupilots_several_clients_and_a_shared_port(tmp_path: Path) -> None:
                 assert port_of(vehicle["pymavlink"]) == port_of(vehicle["mavsdk"]) == ports[0]
                 clients = [socket.create_connection((HOST, port)) for port in (*ports, ports[0])]
                 for client in clients:
-                    assert hear(client, Heartbeat, vehicle["system_id"]).autopilot == 3
+                    assert receive(client, Heartbeat, vehicle["system_id"]).autopilot == 3
                     client.close()
                 # All three on one port, too.
-                hear(shared, Heartbeat, vehicle["system_id"])
+                receive(shared, Heartbeat, vehicle["system_id"])
             value = ParamSet(GCS, b"\x00\x80\xa0\x43", 2, 1, "WPNAV_SPEED", 9)
             with socket.create_connection((HOST, port_of(running.vehicles[1]["pymavlink"]))) as client:
-                assert hear(client, ParamValue, 2, value).raw == value.raw
+                assert receive(client, ParamValue, 2, value).raw == value.raw
             status, out, err = running.end(signal.SIGINT)
         assert status == 0
         (summary,) = map(json.loads, out)
@@ -143,13 +143,13 @@ def test_px4s_speak_first_and_answer_who_calls() -> None:
         sitl("--flavour=px4", "--count=2", f"--port-base={base}", "--first-id=41", "--speedup=3") as running,
     ):
         for system, offboard in ((41, first), (42, second)):
-            assert hear(offboard, Heartbeat, system).autopilot == 12
-            hear(station, Heartbeat, system)
+            assert receive(offboard, Heartbeat, system).autopilot == 12
+            receive(station, Heartbeat, system)
         with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as caller:
             caller.connect((HOST, base + 41))
-            hear(caller, Heartbeat, 42, Heartbeat(GCS, 6, 8, 0, 0, 4))
+            receive(caller, Heartbeat, 42, Heartbeat(GCS, 6, 8, 0, 0, 4))
         # Whom others also speak to is still told.
-        hear(second, Heartbeat, 42)
+        receive(second, Heartbeat, 42)
         assert running.ready["speedup"] == 3.0
         status, out, _ = running.end()
         assert status == 0

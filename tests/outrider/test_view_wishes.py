@@ -67,7 +67,7 @@ def fly(pace: Pace, wall: Wall, seconds: float, wishes: Wishes | None, begin: in
 
     def say(now: int) -> None:
         if wishes is not None:
-            pace.hear(wishes, now)
+            pace.receive(wishes, now)
 
     for now in range(begin, begin + round(1e6 * seconds), 20_000):
         say(now)
@@ -93,7 +93,7 @@ def test_what_is_no_longer_said_no_longer_counts(wishes: Wishes) -> None:
     """A view that is killed or hangs while the flight is paused holds it for the lease, and no longer."""
     wall = Wall()
     pace = paced(wall)
-    pace.hear(wishes, 0)
+    pace.receive(wishes, 0)
     fly(pace, wall, 10.0, None)
     assert LEASE <= wall.now < LEASE + 0.1
 
@@ -101,8 +101,8 @@ def test_what_is_no_longer_said_no_longer_counts(wishes: Wishes) -> None:
 def test_a_step_goes_on_by_a_step() -> None:
     wall = Wall()
     pace = paced(wall)
-    pace.hear(Wishes(paused=True), 0)
-    pace.hear(Wishes(paused=True, steps=2), 0)
+    pace.receive(Wishes(paused=True), 0)
+    pace.receive(Wishes(paused=True, steps=2), 0)
     for now in range(0, 2 * STEP, 20_000):
         pace.wait(now, lambda: None)
     assert wall.now == 0.0

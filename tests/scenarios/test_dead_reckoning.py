@@ -75,9 +75,9 @@ def test_those_who_hear_it_keep_as_much_further_away_on_both_sides():
         if link != "swarm":
             continue
         if isinstance(message, GlobalPosition):
-            near.hear_position(time, message)
+            near.receive_position(time, message)
         elif isinstance(message, Tunnel):
-            near.hear_plan(time, message)
+            near.receive_plan(time, message)
         if before is None and near.ages(time):
             before = near.obstacles(time)
     after = near.obstacles(vehicle.now, vehicle.place[None] + 8.0)
@@ -93,7 +93,7 @@ def test_those_who_hear_it_keep_as_much_further_away_on_both_sides():
     world = vehicle.companion.world
     world.doubt = 0.0
     view = world.at(vehicle.now)
-    world.neighbours.hear_position(vehicle.now, position(12, [3.0, 0.0, 5.0], vehicle.now))
+    world.neighbours.receive_position(vehicle.now, position(12, [3.0, 0.0, 5.0], vehicle.now))
     ahead = np.broadcast_to(view.own.position, (world.config.horizon.steps + 1, 3))
     usual = world.obstacles(vehicle.now, view, ahead)
     world.doubt = 0.5

@@ -10,7 +10,7 @@ import pytest
 from lockstep_flights import FIREFLY, scenario
 
 from companion.obstacles.neighbours import Neighbours
-from companion.obstacles.relevance_filter import Earshot
+from companion.obstacles.relevance_filter import RelevanceFilter
 from outrider.flight import Flight
 from outrider.resources import config_root
 
@@ -46,12 +46,12 @@ def all_are(near: bool) -> Callable[..., np.ndarray]:
 def test_who_hears_all_flies_the_same_flight(monkeypatch: pytest.MonkeyPatch) -> None:
     one = flown()
     monkeypatch.setattr(Neighbours, "ignores", lambda *_: False)
-    monkeypatch.setattr(Earshot, "near", all_are(True))
+    monkeypatch.setattr(RelevanceFilter, "near", all_are(True))
     other = flown()
     assert decoded(one) < 0.9 * decoded(other)
     np.testing.assert_array_equal(one.truth.samples().position, other.truth.samples().position)
     # They do meet: who saw nobody would fly elsewhere.
-    monkeypatch.setattr(Earshot, "near", all_are(False))
+    monkeypatch.setattr(RelevanceFilter, "near", all_are(False))
     blind = flown().truth.samples().position
     assert len(blind) != len(one.truth.samples().position) or (
         np.abs(blind - one.truth.samples().position).max() > 0.5

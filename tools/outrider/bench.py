@@ -177,7 +177,7 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
         place = position + reach[k] * np.array([np.cos(around[k]), np.sin(around[k]), 0.0])
         speed = random.normal(0.0, 1.0, 3) * (1.0, 1.0, 0.1)
         source = Source(20 + k, 195)
-        world.hear(980_000, "swarm", position_message(source, 0, fleet, place, speed, None))
+        world.receive(980_000, "swarm", position_message(source, 0, fleet, place, speed, None))
         shared = quantise(
             960_000,
             config.horizon.dt_us,
@@ -186,7 +186,7 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
             random.normal(0.0, 1.0, (config.horizon.steps + 1, 3)) * (1.0, 1.0, 0.1),
             fleet.fingerprint,
         )
-        world.hear(980_000, "swarm", Tunnel(source, 0, 0, PAYLOAD_TYPE, pack(shared)))
+        world.receive(980_000, "swarm", Tunnel(source, 0, 0, PAYLOAD_TYPE, pack(shared)))
     angle = random.uniform(0.0, 2.0 * np.pi)
     goal = position + 8.0 * np.array([np.cos(angle), np.sin(angle), 0.0])
     velocity = 1.5 * np.array([np.cos(angle), np.sin(angle), 0.0])

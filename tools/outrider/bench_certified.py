@@ -49,7 +49,7 @@ def plan_step(rounds: int) -> Array:
     spent, unsolved = [], 0
     for turn in range(rounds + 1):
         for flight, world, plan, aim in scenes:
-            flight.keeper.current, flight.keeper.following = plan, None
+            flight.commitment.current, flight.commitment.following = plan, None
             heading = Heading(config.heading, config.horizon)
             heading.reset(bearing(plan.position_m, aim.target))
             started = time.thread_time_ns()
@@ -83,7 +83,7 @@ def _scene(config: CompanionConfig, seed: int, epoch: int) -> Scene:
         place = here + reach[k] * np.array([np.cos(around[k]), np.sin(around[k]), 0.0])
         speed = course + random.uniform(-0.15, 0.15, 3) * (1.0, 1.0, 0.1)
         plan = _braking(config, epoch, place, speed, fleet.fingerprint)
-        flight.hear(epoch, Tunnel(Source(20 + k, 195), 0, 0, PAYLOAD_TYPE, pack(plan)))
+        flight.receive(epoch, Tunnel(Source(20 + k, 195), 0, 0, PAYLOAD_TYPE, pack(plan)))
     own = _braking(config, epoch, here, course, fleet.fingerprint)
     return Scene(flight, world, own, standing(here + 8.0 * course, np.array([2.0, 2.0, 0.0])))
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.backup_node import Helm
+from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
 from companion.node import Companion
 from companion.values.bearings import bearing
@@ -113,9 +113,9 @@ class Fleet:
         certified = self.scenario.companion.avoidance == "certified"
         return list(range(self.scenario.vehicles)) if certified else []
 
-    def helm(self, k: int) -> Helm:
+    def helm(self, k: int) -> BackupNode:
         """The helm of vehicle ``k``."""
-        return Helm(self.companion_config_of(k), self.systems[k], self.frame)
+        return BackupNode(self.companion_config_of(k), self.systems[k], self.frame)
 
     def autopilot(self, k: int) -> Autopilot:
         """The autopilot and vehicle ``k``: on the ground below its start, or hovering there."""

@@ -44,7 +44,7 @@ class ClockWatch:
         self._next = now + _PERIOD
         return [Timesync(self._own, 0, now * _NS + self._own.system)]
 
-    def hear(self, now: int, message: Timesync) -> list[Timesync]:
+    def receive(self, now: int, message: Timesync) -> list[Timesync]:
         """A request, and the reply to it; or a reply, which is noted if it is to one of ours and from a
         companion: an autopilot may answer as well, by the time since it was switched on."""
         if message.tc1 == 0:

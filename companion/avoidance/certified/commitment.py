@@ -20,8 +20,8 @@ from companion.avoidance.certified.committed import (
     resting,
     rounding,
 )
-from companion.avoidance.certified.deadlock import StallTurn
-from companion.avoidance.certified.qp import Program, State, Wish
+from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.qp import Objective, SeparationQp, State
 from companion.avoidance.certified.separating_planes import Others, planes
 from companion.config.certified import CertifiedConfig
 from companion.errors import CertificateError, CompanionError, SolverError
@@ -29,7 +29,7 @@ from companion.values.horizon import Array, Horizon, Motion
 from mavlink_bridge.plan_wire import WirePlan, quantise
 
 
-class Why(Enum):
+class HoldReason(Enum):
     """Why a plan was carried on instead of made anew."""
 
     MISSING = "a plan of somebody who counts has not arrived"
@@ -37,7 +37,7 @@ class Why(Enum):
     UNSOLVED = "no plan that keeps all planes was found"
 
 
-class Keeper:
+class Commitment:
     """Owns ``current``, the plan that is flown, and ``following``, that of the next epoch once it is made.
 
     ``epoch`` (µs): a whole number of knots. ``program`` and ``stall`` make plans; what they must keep away
@@ -47,8 +47,8 @@ class Keeper:
     def __init__(
         self,
         config: CertifiedConfig,
-        program: Program,
-        stall: StallTurn,
+        program: SeparationQp,
+        stall: DeadlockTurn,
         origin: int,
         *,
         planar: bool = False,
@@ -63,7 +63,7 @@ class Keeper:
         self._ahead: tuple[WirePlan, WirePlan, Array] | None = None
         self._flown: tuple[WirePlan, WirePlan | None, Horizon] | None = None
         self.following: WirePlan | None = None
-        self.held: dict[Why, int] = dict.fromkeys(Why, 0)
+        self.held: dict[HoldReason, int] = dict.fromkeys(HoldReason, 0)
         self.anchored_anew = 0
 
     def epoch(self, now: int) -> int:
@@ -92,7 +92,7 @@ class Keeper:
         """Whether the epoch is so nearly over that nothing is waited for any more."""
         return now + self._config.last_call_us >= self.epoch(now) + self._config.epoch_us
 
-    def carry_on(self, why: Why) -> None:
+    def carry_on(self, why: HoldReason) -> None:
         """Fly on in the next epoch as committed."""
         self.following = self.start()
         self.held[why] += 1
@@ -106,7 +106,7 @@ class Keeper:
         one."""
         return self._carried()[0]
 
-    def replan(self, wish: Wish, goal: Array, others: Others) -> bool:
+    def replan(self, wish: Objective, goal: Array, others: Others) -> bool:
         """Make the next epoch's plan; False if none was found and the old one is carried on."""
         start, own = self._carried()
         corridor = planes(own, others, self._config.spare, upright=self._planar)
@@ -127,7 +127,7 @@ class Keeper:
                 self._stall.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
                 self.following = plan
                 return True
-        self.carry_on(Why.UNSOLVED)
+        self.carry_on(HoldReason.UNSOLVED)
         return False
 
     def anchor(self, now: int, measured: Motion) -> None:

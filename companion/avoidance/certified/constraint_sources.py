@@ -9,8 +9,8 @@ import numpy as np
 
 from companion.avoidance.certified.committed import horizon_of
 from companion.avoidance.certified.margins import beside, between, fastest, margin
-from companion.avoidance.certified.noncooperative import Strangers
-from companion.avoidance.certified.peer_plans import Ledger
+from companion.avoidance.certified.noncooperative import NonCooperative
+from companion.avoidance.certified.peer_plans import PeerPlans
 from companion.avoidance.certified.separating_planes import Others
 from companion.config import CompanionConfig
 from companion.config.obstacles import Post
@@ -22,7 +22,7 @@ _STEPS_OF_SIGHT = 1.0
 """m beyond what matters for certain, so that nothing comes into sight in the middle of a plan."""
 
 
-class Surroundings:
+class ConstraintSources:
     """Of one vehicle; ``around`` for each plan."""
 
     def __init__(self, config: CompanionConfig, steps: int) -> None:
@@ -35,28 +35,31 @@ class Surroundings:
         self._lost = config.guard.neighbour_lost_us
         self._posts = FixedObstacles(tuple(o for o in config.obstacles if isinstance(o, Post)))
         self._balls = FixedObstacles(tuple(o for o in config.obstacles if not isinstance(o, Post)))
-        self._strangers = Strangers(config, steps)
+        self._noncooperative = NonCooperative(config, steps)
         self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + self.between + _STEPS_OF_SIGHT
 
     def around(
-        self, now: int, epoch: int, own: Array, ledger: Ledger, world: World, view: View
+        self, now: int, epoch: int, own: Array, peers: PeerPlans, world: World, view: View
     ) -> tuple[Others, Array]:
         """All that counts for the plan that begins one epoch after ``epoch``, as known at ``now`` (µs), and
         the field f (n, 3), m/s², that it would rather yield to; ``own`` (n, 3, 3): the committed control
         points from there on."""
-        plans = [filed.controls for filed in ledger.plans(epoch).values()]
-        aside = self._aside(now, ledger, world)
+        plans = [filed.controls for filed in peers.plans(epoch).values()]
+        aside = self._aside(now, peers, world)
         # On the way down it drifts; who is further off may be flown by somebody, at any height. Once silent
         # it counts as down where it was: what stands switched off on the ground is no danger that grows.
         taken = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
-        members = ledger.members.union(ledger.left.keys() - taken)
+        members = peers.members.union(peers.left.keys() - taken)
         begins = epoch + self._config.certified.epoch_us
-        seen = self._strangers.seen(begins, members, world)
-        strangers = [*self._strangers.balls(seen, own), *self._strangers.target(now, begins, view)]
+        seen = self._noncooperative.seen(begins, members, world)
+        noncooperative = [
+            *self._noncooperative.balls(seen, own),
+            *self._noncooperative.target(now, begins, view),
+        ]
         sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
-        ends = [filed.controls[-1, 2] for filed in ledger.left.values()]
+        ends = [filed.controls[-1, 2] for filed in peers.left.values()]
         down = [*ends, *(place for system, (_, place, _) in aside.items() if system not in taken)]
-        alone = [*self._standing(own), *self._down(own, down), *strangers, *self._seen(sensed)]
+        alone = [*self._standing(own), *self._down(own, down), *noncooperative, *self._seen(sensed)]
         count, n = len(plans), self._steps
         controls = np.empty((count + len(alone), n, 3, 3))
         if plans:
@@ -65,7 +68,7 @@ class Surroundings:
         for index, (centres, radii) in enumerate(alone, count):
             controls[index], distance[index] = centres, radii
         others = Others(controls, distance, np.arange(len(controls)) < count)
-        return others, self._strangers.field(seen, own, sensed)
+        return others, self._noncooperative.field(seen, own, sensed)
 
     def _standing(self, own: Array) -> list[tuple[Array, Array]]:
         """Spheres about their centres; posts beside the vehicle, whatever its height: they count as if they
@@ -94,12 +97,12 @@ class Surroundings:
             for place, radius in zip(places, sensed.radius, strict=True)
         ]
 
-    def _aside(self, now: int, ledger: Ledger, world: World) -> dict[int, tuple[float, Array, bool]]:
+    def _aside(self, now: int, peers: PeerPlans, world: World) -> dict[int, tuple[float, Array, bool]]:
         """Of those who said farewell and were heard since beside their last plan: how far (m) beside it,
         where (3,), and whether they are heard still. Heights do not count, and two estimates of one place
         differ, too."""
         found: dict[int, tuple[float, Array, bool]] = {}
-        left = ledger.left
+        left = peers.left
         if not left:
             return found
         for system, time, position, _ in world.neighbours.last_heard():

@@ -25,7 +25,7 @@ _THERE = 0.1
 """m: by which a best distance is beaten, and within which nothing is in the way."""
 
 
-class StallTurn:
+class DeadlockTurn:
     """The turn of one vehicle's goal. ``pull``: the cost's, per metre; ``sense`` +1 turns right."""
 
     def __init__(self, config: StallConfig, pull: float, sense: float = 1.0) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from companion.avoidance.certified.clocks import ClockWatch
-from companion.avoidance.certified.commitment import Keeper, Why
-from companion.avoidance.certified.constraint_sources import Surroundings
-from companion.avoidance.certified.deadlock import StallTurn
-from companion.avoidance.certified.peer_plans import Ledger
-from companion.avoidance.certified.qp import Program, Wish
+from companion.avoidance.certified.commitment import Commitment, HoldReason
+from companion.avoidance.certified.constraint_sources import ConstraintSources
+from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.peer_plans import PeerPlans
+from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
@@ -32,12 +32,12 @@ class CertifiedFlight:
     def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
         certified, steps = config.certified, config.horizon.steps + 1
         self._config, self._own = config, own
-        program = Program(
+        program = SeparationQp(
             steps, config.limits.within(config.field.margin(1)), certified, planar=config.planar
         )
-        self._stall = StallTurn(certified.stall, program.pull, _SENSES.get(config.turning_sense, 1.0))
-        self.keeper = Keeper(certified, program, self._stall, fleet.fingerprint, planar=config.planar)
-        self.ledger = Ledger(
+        self._stall = DeadlockTurn(certified.stall, program.pull, _SENSES.get(config.turning_sense, 1.0))
+        self.commitment = Commitment(certified, program, self._stall, fleet.fingerprint, planar=config.planar)
+        self.peers = PeerPlans(
             own.system,
             frozenset(certified.fleet),
             steps,
@@ -47,7 +47,7 @@ class CertifiedFlight:
         )
         self.clocks = ClockWatch(own, certified.clock_us)
         self._replies: list[Timesync] = []
-        self._surroundings = Surroundings(config, steps)
+        self._sources = ConstraintSources(config, steps)
         seconds = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
         self._before_end: Array = seconds - seconds[-1]
         self._steps = steps
@@ -61,53 +61,53 @@ class CertifiedFlight:
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
         """From now to the end of the plan that is made next, s, at most."""
 
-    def hear(self, now: int, message: Tunnel | Timesync) -> None:
+    def receive(self, now: int, message: Tunnel | Timesync) -> None:
         """A TUNNEL or TIMESYNC on the swarm link."""
         system = message.source.system
         if isinstance(message, Timesync):
-            self._replies += self.clocks.hear(now, message)
+            self._replies += self.clocks.receive(now, message)
             return
         if message.payload_type == PAYLOAD_TYPE:
-            self.ledger.hear_plan(now, system, message.payload)
+            self.peers.receive_plan(now, system, message.payload)
         elif message.payload_type == ROSTER:
             try:
-                self.ledger.hear_roster(now, system, unpack_roster(message.payload))
+                self.peers.receive_roster(now, system, unpack_roster(message.payload))
             except PlanWireError:
-                self.ledger.refused += 1
+                self.peers.refused += 1
 
     def stand(self, now: int, position: Array) -> None:
         """Not steering, not yet or just again: the plan is to stand at ``position`` (3,), and nobody is told
         before it steers. But a plan in whose tube the vehicle still is goes on, and so does one that was told
         for this epoch: others count on it. To leave one that was told before is to plan anew."""
         self._asked = now
-        keeper, horizon = self.keeper, self.keeper.horizon()
+        commitment, horizon = self.commitment, self.commitment.horizon()
         if horizon is not None:
             off = horizon.at(now).position - position
             inside = float(off @ off) <= self._config.certified.tube**2
-            if inside or keeper.told_until >= keeper.epoch(now):
-                keeper.turn(now)
+            if inside or commitment.told_until >= commitment.epoch(now):
+                commitment.turn(now)
                 return
-        keeper.begin(now, position)
-        keeper.anchored_anew += self._told
+        commitment.begin(now, position)
+        commitment.anchored_anew += self._told
         self._steers = self._told = False
 
     def due(self, now: int) -> bool:
         """Whether the next epoch's plan is to be made now, one way or the other. Carries on by itself what
         cannot wait any longer."""
         self._asked, self._steers = now, True
-        if not self.keeper.turn(now):
+        if not self.commitment.turn(now):
             return False
-        wrong = not self.clocks.wrong.isdisjoint(self.ledger.members)
-        if not wrong and not self.ledger.missing(self.keeper.epoch(now)):
+        wrong = not self.clocks.wrong.isdisjoint(self.peers.members)
+        if not wrong and not self.peers.missing(self.commitment.epoch(now)):
             return True
-        if self.keeper.last_call(now):
-            self.keeper.carry_on(Why.CLOCK if wrong else Why.MISSING)
+        if self.commitment.last_call(now):
+            self.commitment.carry_on(HoldReason.CLOCK if wrong else HoldReason.MISSING)
         return False
 
     def watch(self, now: int, measured: Motion) -> None:
         """Note how far the vehicle is from its plan. Outside the tube the promise rests; the plan stays, for
         the autopilot finds back to it."""
-        horizon = self.keeper.horizon()
+        horizon = self.commitment.horizon()
         if horizon is None:
             return
         off = horizon.at(now).position - measured.position
@@ -124,24 +124,24 @@ class CertifiedFlight:
 
     def plan(self, now: int, aim: Aim, world: World, view: View) -> bool:
         """Make the next epoch's plan towards ``aim``, whose end is where this plan ends."""
-        keeper = self.keeper
-        start = keeper.start()
-        own = keeper.own()
-        others, field = self._surroundings.around(now, keeper.epoch(now), own, self.ledger, world, view)
+        commitment = self.commitment
+        start = commitment.start()
+        own = commitment.own()
+        others, field = self._sources.around(now, commitment.epoch(now), own, self.peers, world, view)
         goal = self._stall.turned(start.position_m, aim.destination)
         places = goal + self._before_end[:, None] * aim.velocity
-        wish = Wish(places, np.broadcast_to(aim.velocity, places.shape), field)
-        return keeper.replan(wish, aim.destination, others)
+        wish = Objective(places, np.broadcast_to(aim.velocity, places.shape), field)
+        return commitment.replan(wish, aim.destination, others)
 
     def idle(self, now: int) -> bool:
         """Whether there is nothing to make or to tell until something else is due."""
-        following = self.keeper.following
+        following = self.commitment.following
         waiting = following is not None and now < following.epoch and now < self._next_told
         return waiting and not self._replies
 
     def horizon(self) -> Horizon | None:
         """What is flown."""
-        return self.keeper.horizon()
+        return self.commitment.horizon()
 
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
         """What is to be told on the swarm link now: the newest plan, at once and then from time to time, and
@@ -151,20 +151,20 @@ class CertifiedFlight:
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()
         if farewell:
-            self.keeper.turn(now)
-            farewell = self.keeper.following is None
+            self.commitment.turn(now)
+            farewell = self.commitment.following is None
         elif self._asked != now:
             self._steers = False
-        told = self.keeper.told()
+        told = self.commitment.told()
         if told is None or not (self._steers or farewell):
             return sync
-        if told.epoch == self.keeper.told_until and now < self._next_told:
+        if told.epoch == self.commitment.told_until and now < self._next_told:
             return sync
-        self.keeper.told_until, self._next_told = told.epoch, now + self._config.certified.repeat_us
+        self.commitment.told_until, self._next_told = told.epoch, now + self._config.certified.repeat_us
         self._told = True
         if farewell:
-            self.ledger.leave(told.epoch)
-        roster = Roster(told.epoch, self.ledger.members, farewell)
+            self.peers.leave(told.epoch)
+        roster = Roster(told.epoch, self.peers.members, farewell)
         return [
             *sync,
             Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(told)),

@@ -37,7 +37,7 @@ class Stranger(NamedTuple):
     upright: bool
 
 
-class Strangers:
+class NonCooperative:
     """Of one vehicle, on its plans' ``steps`` knots."""
 
     def __init__(self, config: CompanionConfig, steps: int) -> None:

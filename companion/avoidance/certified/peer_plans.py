@@ -40,7 +40,7 @@ def _read(payload: bytes) -> tuple[Filed, bool]:
     return Filed(plan, points), rests(plan)
 
 
-class Ledger:
+class PeerPlans:
     """Plans and rosters of the others. ``expected``: system ids that are to take part, heard or not.
     ``steps`` and ``dt`` (µs) are everybody's; ``epoch`` (µs) is a whole number of dt."""
 
@@ -69,7 +69,7 @@ class Ledger:
             self._members = known - {self._own} - set(self._left)
         return self._members
 
-    def hear_plan(self, now: int, system: int, payload: bytes) -> None:
+    def receive_plan(self, now: int, system: int, payload: bytes) -> None:
         """A TUNNEL payload of kind plan; one that cannot be a committed plan is refused and counted."""
         # Most are told again what they hold.
         if system == self._own or self._last.get(system) == payload:
@@ -101,7 +101,7 @@ class Ledger:
             for epoch in sorted(filed)[:-_KEPT]:
                 del filed[epoch]
 
-    def hear_roster(self, now: int, system: int, roster: Roster) -> None:
+    def receive_roster(self, now: int, system: int, roster: Roster) -> None:
         """Whom a member counts with. A farewell says that its plan of that epoch is its last; whoever has
         not got that plan yet, or is not in that epoch yet, hears it again. One that comes late says nothing:
         who joined again since makes plans."""

@@ -45,7 +45,7 @@ class State(NamedTuple):
     committed: Array
 
 
-class Wish(NamedTuple):
+class Objective(NamedTuple):
     """What is preferred after each step: places (n, 3) m, velocities (n, 3) m/s, and the field f (n, 3) m/s²
     that is yielded to."""
 
@@ -63,7 +63,7 @@ class Answer(NamedTuple):
     rounds: int
 
 
-class Program:
+class SeparationQp:
     """Matrices for one horizon of ``steps`` inputs; ``solve`` for each plan. ``planar``: at one height."""
 
     def __init__(
@@ -107,7 +107,7 @@ class Program:
         )
         self._limits_low: Array = np.concatenate([-v_max, -v_max, low, -high, low, -high])
 
-    def solve(self, state: State, wish: Wish, planes: Planes) -> Answer:
+    def solve(self, state: State, wish: Objective, planes: Planes) -> Answer:
         """The best plan from ``state`` that keeps all rows. SolverError if PIQP finds none, or if rows are
         still broken after some rounds."""
         free = self._free(state.position, state.velocity)
@@ -133,7 +133,7 @@ class Program:
     def _free(self, position: Array, velocity: Array) -> Array:
         return position + self._times[:, :, None] * velocity
 
-    def _cost(self, ends: Array, velocity: Array, before: Array, wish: Wish) -> Array:
+    def _cost(self, ends: Array, velocity: Array, before: Array, wish: Objective) -> Array:
         """c (3n,) where the motion without input ends its steps at ``ends`` (n, 3); ``before`` (3,): the
         acceleration until the plan begins."""
         config = self._config
@@ -152,7 +152,7 @@ class _Rows:
     """All rows of one problem: those of the limits, then those of the planes, which are written out only
     where they take part."""
 
-    def __init__(self, program: Program, free: Array, state: State, planes: Planes) -> None:
+    def __init__(self, program: SeparationQp, free: Array, state: State, planes: Planes) -> None:
         self._program, self._normals = program, planes.normals
         n = program.n
         speeds = np.repeat(state.velocity, n)

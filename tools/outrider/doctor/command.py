@@ -65,7 +65,7 @@ def of_log(place: Replay, system: int | None) -> Verdict:
         for number, (time, _, data) in enumerate(on_one_line(reader)):
             frame = frame_at(data, 0)
             if isinstance(frame, Frame):
-                hearing.hear(time, frame)
+                hearing.receive(time, frame)
             if number % _OFTEN == 0:
                 watch(path.name, reader.bytes_read / size)
     hearing.bad, hearing.skipped_bytes = reader.report.bad, reader.report.skipped_bytes

@@ -41,7 +41,7 @@ class Consultation:
                     continue
                 refusal = self._signing.check(frame)
                 if refusal is None:
-                    hearing.hear(now, frame)
+                    hearing.receive(now, frame)
                 else:
                     hearing.refused += 1
                     hearing.refusal = refusal.value

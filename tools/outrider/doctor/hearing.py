@@ -28,7 +28,7 @@ class Hearing:
         self.frames = self.octets = self.bad = self.skipped_bytes = self.unheard = self.refused = 0
         self.refusal = ""
 
-    def hear(self, now: int, frame: Frame) -> None:
+    def receive(self, now: int, frame: Frame) -> None:
         """``frame`` arrived at ``now`` (µs); a time that goes back counts as the one before."""
         now = self.wait(now)
         self.frames += 1

@@ -159,7 +159,7 @@ class Speaker:
         if isinstance(message, _CLOCKED) and message.time_boot:
             self.clock.tell(now, message, message.time_boot)
         guided = self.vehicle.armed and self.vehicle.in_guided_mode
-        self.vehicle.hear(message)
+        self.vehicle.receive(message)
         self.vehicle.tick(now)
         match message:
             case Heartbeat():

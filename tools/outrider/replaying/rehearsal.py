@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from companion.config import CompanionConfig
-from companion.shadow import Understudy
+from companion.shadow import ShadowCompanion
 from mavlink_bridge.clock import SimulatedClock
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.followed_clock import FollowedClock
@@ -70,7 +70,7 @@ def rehearse(
     fleet = seen.fleet if fleet is None else fleet
     system = next(n for n in (TARGET_SYSTEM, 1, 2, 3) if n not in seen.systems and n != cast.own)
     target = system if cast.target is None else cast.target
-    companion = Understudy(config, cast.own, target, fleet, lambda: 0)
+    companion = ShadowCompanion(config, cast.own, target, fleet, lambda: 0)
     standing = None if cast.target is not None else Beacon(system, "target", _RATE_HZ, fleet)
     here = fleet.to_enu(*seen.place) * (1.0, 1.0, 0.0)
     found, reader, stand_in = Rehearsed(), Codec(), _StandIn(cast.own, seen, fleet)

@@ -105,7 +105,7 @@ def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> di
         if process is None:
             return {"unable": "its sweep is over"}
         while not process.ready and not process.dead and process.cannot is None:
-            process.hear()
+            process.receive()
         if process.ready and not process.dead:
             break
         what = process.cannot or process.bury(wall_limit_s)
@@ -122,7 +122,7 @@ def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> di
             CREW.forget(sweep, process)
             return {"entry": process.lost(task, process.bury(wall_limit_s))._asdict()}
         if output.poll(1e3 * min(_TICK_S, wall_limit_s)):
-            process.hear()
+            process.receive()
     process.task = None
     CREW.give_back(sweep, process)
     return {"entry": entry._asdict()}

@@ -76,7 +76,7 @@ class Pool:
         return max(0.0, min([_TICK_S, *ends]))
 
     def _hear(self, worker: Process) -> None:
-        worker.hear()
+        worker.receive()
         if worker.cannot is not None:
             raise OutriderError(f"no worker can start: {worker.cannot}")
         if worker.ready:

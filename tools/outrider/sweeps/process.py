@@ -61,7 +61,7 @@ class Process:
             self._input.write(json.dumps(task._asdict()).encode() + b"\n")
             self._input.flush()
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         """Read what has come; called when there is something, and that may be the end."""
         data = os.read(self.output.fileno(), 1 << 20)
         self.dead = not data

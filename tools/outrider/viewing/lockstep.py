@@ -43,7 +43,7 @@ class LockStepView:
             wishes = decoded(data)
             if wishes is None:
                 continue
-            self._pace.hear(wishes, now)
+            self._pace.receive(wishes, now)
             start = flight.conductor.clock_start
             change = self.orders.new(wishes, None if start is None else 1e-6 * (now - start))
             if change is not None:

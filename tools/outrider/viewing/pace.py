@@ -27,7 +27,7 @@ class Pace:
         self._until = 0
         self._anchor: tuple[float, int, float | None] | None = None
 
-    def hear(self, wishes: Wishes, now: int) -> None:
+    def receive(self, wishes: Wishes, now: int) -> None:
         """A wish, while the simulation is at ``now`` (µs)."""
         if self._steps is None:
             self._steps = wishes.steps
