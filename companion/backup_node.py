@@ -32,7 +32,6 @@ from companion.goals.heading import Yaw
 from companion.telemetry.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from companion.values.components import AUTOPILOT, COMPONENT
 from companion.values.horizon import Horizon
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import (
@@ -45,12 +44,13 @@ from mavlink_bridge.messages import (
     Tunnel,
 )
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE as PLAN
-from mavlink_bridge.plan_wire import WirePlan
-from mavlink_bridge.plan_wire import unpack as unpack_plan
-from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
-from mavlink_bridge.roster_wire import unpack as unpack_roster
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
+from mavlink_bridge.wire.plan import WirePlan
+from mavlink_bridge.wire.plan import unpack as unpack_plan
+from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.wire.roster import unpack as unpack_roster
+from mavlink_bridge.wire.signing import Signing
 
 HELM = 191
 """MAV_COMP_ID_ONBOARD_COMPUTER."""

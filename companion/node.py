@@ -30,11 +30,11 @@ from companion.values.components import COMPONENT
 from companion.values.horizon import Horizon
 from companion.values.phase import Phase
 from companion.world import View, World
-from mavlink_bridge.codec import Codec, Counters
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec, Counters
+from mavlink_bridge.wire.signing import Signing
 
 _LOOK = 100_000
 """µs between two looks at what may be wrong."""

@@ -19,7 +19,7 @@ from companion.world import View
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, SetpointLocal
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.signing import Signing
 
 _ALWAYS_ANEW = 1e-6
 """m: a plan that the vehicle is further from than that begins anew at the vehicle."""

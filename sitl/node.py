@@ -11,14 +11,14 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.converters import BY_TYPE
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, SetupSigning, Source, Vector
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.parcels import parcels
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.converters import BY_TYPE
+from mavlink_bridge.wire.packing import parcels
+from mavlink_bridge.wire.signing import Signing
 from sitl.airframe import hover_speeds
 from sitl.autopilot_config import AutopilotConfig
 from sitl.battery import Battery

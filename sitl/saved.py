@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from mavlink_bridge.signing import LATEST
+from mavlink_bridge.wire.signing import LATEST
 from sitl.missions.items import Item
 
 

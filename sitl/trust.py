@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final, Literal
 
 from mavlink_bridge.messages import SetupSigning, Source
-from mavlink_bridge.signing import LATEST, Signing
+from mavlink_bridge.wire.signing import LATEST, Signing
 from sitl.voice import Voice
 
 # µs between two words about messages that do not count.

@@ -19,8 +19,8 @@ from pathlib import Path
 from pymavlink.dialects.v20 import ardupilotmega
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.framing import Frame, frame_at
-from mavlink_bridge.tlog import Record, TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
+from mavlink_bridge.wire.framing import Frame, frame_at
 
 
 def wish(text: str) -> tuple[int, int]:

@@ -15,10 +15,10 @@ from companion.flight.autopilots.px4 import PX4
 from companion.flight.command_protocol import ACCEPTED, DO_SET_MODE
 from companion.flight.vehicle import Vehicle
 from companion.values.components import AUTOPILOT, COMPONENT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, Source
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.signing import Signing
 
 _AGAIN, _GRANTED = 100_000, 1_500_000
 """µs between two askings, and after one that was accepted: until then the heartbeat has told of it."""

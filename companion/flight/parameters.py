@@ -9,7 +9,7 @@ from types import MappingProxyType
 from companion.flight.autopilots import Profile
 from companion.flight.autopilots.limits import stock_parameters
 from mavlink_bridge.messages import Message, ParamRequestRead, ParamValue, Source
-from mavlink_bridge.param_value import number_of
+from mavlink_bridge.wire.param_value import number_of
 
 PATIENCE = 5_000_000
 """µs from the first request after which what is not answered counts as stock."""

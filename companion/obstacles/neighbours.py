@@ -27,11 +27,11 @@ from companion.values.components import AUTOPILOT
 from companion.values.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.values.obstacles import Obstacles
 from companion.values.vectors import limit
-from mavlink_bridge.doubt_wire import PAYLOAD_TYPE as DOUBT
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition, Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
+from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 
 _MOST = 255
 """System ids that there are."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from companion.values.horizon import Array
-from mavlink_bridge.doubt_wire import unpack
+from mavlink_bridge.wire.uncertainty import unpack
 
 _LASTS = 3_000_000
 """µs for which what was told counts; it is told with every position while there is something to tell."""

@@ -11,12 +11,12 @@ from typing import NamedTuple
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon
 from companion.world import View
-from mavlink_bridge.doubt_wire import PAYLOAD_TYPE as DOUBT
-from mavlink_bridge.doubt_wire import pack as pack_doubt
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, enu_to_ned, yaw_to_ned
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, Source, Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
+from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
+from mavlink_bridge.wire.uncertainty import pack as pack_doubt
 
 ONBOARD_CONTROLLER, AUTOPILOT_INVALID, ACTIVE = 18, 8, 4
 _SECOND = 1_000_000

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import Final
 
-from mavlink_bridge.framing import Framer
+from mavlink_bridge.wire.framing import Framer
 
 _CHUNK: Final = 8192
 

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from benchmarks.extract_swarm import extracted, main, measured_at
 from benchmarks.recorded_swarms import SwarmVehicle, at_times, read_swarm, write_swarm
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, LocalPosition, SetpointLocal, Source
-from mavlink_bridge.tlog import TlogWriter
+from mavlink_bridge.tlog.log import TlogWriter
+from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
 
 ORIGIN = FleetFrame(47.397742, 8.545594, 488.0)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from companion.avoidance.certified.committed import carried_on, committed, controls
 from companion.values.horizon import Array
-from mavlink_bridge.plan_wire import Integers, WirePlan, quantise
+from mavlink_bridge.wire.plan import Integers, WirePlan, quantise
 
 DT = 200_000
 """µs."""

@@ -14,7 +14,7 @@ from companion.avoidance.certified.separating_planes import Others, Planes, plan
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Array, roll_out
-from mavlink_bridge.plan_wire import WirePlan
+from mavlink_bridge.wire.plan import WirePlan
 
 CONFIG = CertifiedConfig(dt_us=DT)
 WIDE = LimitsConfig()

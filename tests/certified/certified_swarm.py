@@ -23,8 +23,8 @@ from companion.values.horizon import Array
 from companion.world import View, World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel
-from mavlink_bridge.plan_wire import WirePlan, pack
-from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.wire.plan import WirePlan, pack
+from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 TICK = 20_000

@@ -17,7 +17,7 @@ from companion.avoidance.certified.committed import (
     rests,
 )
 from companion.errors import CertificateError
-from mavlink_bridge.plan_wire import WirePlan, pack, quantise, unpack
+from mavlink_bridge.wire.plan import WirePlan, pack, quantise, unpack
 
 knots = st.integers(0, 40)
 seeds = st.integers(0, 2**32 - 1)

@@ -19,8 +19,8 @@ from companion.telemetry.sharing import position_message
 from companion.values.horizon import Array
 from companion.world import View, World
 from mavlink_bridge.messages import Source
-from mavlink_bridge.plan_wire import pack
-from mavlink_bridge.roster_wire import Roster
+from mavlink_bridge.wire.plan import pack
+from mavlink_bridge.wire.roster import Roster
 
 LEFT, OWN, STRANGER = 1, 2, 77
 CONFIG = CompanionConfig(

@@ -24,7 +24,7 @@ from companion.config.certified import CertifiedConfig
 from companion.config.planning import HorizonConfig, LimitsConfig
 from companion.values.horizon import Array, Motion, roll_out
 from mavlink_bridge.messages import Message, Source, Tunnel
-from mavlink_bridge.roster_wire import unpack
+from mavlink_bridge.wire.roster import unpack
 
 LENGTH = 400_000
 SHIFT = LENGTH // DT

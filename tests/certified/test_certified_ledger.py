@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from companion.avoidance.certified.committed import carried_on, committed, controls, resting
 from companion.avoidance.certified.peer_plans import PeerPlans
 from companion.values.horizon import Array
-from mavlink_bridge.plan_wire import WirePlan, pack
-from mavlink_bridge.roster_wire import Roster
+from mavlink_bridge.wire.plan import WirePlan, pack
+from mavlink_bridge.wire.roster import Roster
 
 OWN, OTHER, THIRD = 1, 2, 3
 ORIGIN = 7

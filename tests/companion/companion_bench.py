@@ -17,9 +17,7 @@ from companion.flight.autopilots.px4 import PX4
 from companion.node import Companion
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     Attitude,
     CommandAck,
@@ -36,7 +34,9 @@ from mavlink_bridge.messages import (
     SysStatus,
 )
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.signing import Signing
 
 PROFILES = {"ardupilot": ARDUPILOT, "px4": PX4}
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)

@@ -20,9 +20,9 @@ from companion.telemetry.reception import accepts
 from companion.telemetry.sharing import plan_message, position_message
 from companion.values.horizon import Motion, roll_out
 from companion.world import World
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source
+from mavlink_bridge.wire.codec import Codec
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 NOW = 1_767_225_600_000_000

@@ -20,11 +20,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from companion.values.phase import Phase
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.converters import TABLE
-from mavlink_bridge.framing import frame_v1, frame_v2
 from mavlink_bridge.messages import CommandLong, SetpointLocal, Source
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.converters import TABLE
+from mavlink_bridge.wire.framing import frame_v1, frame_v2
 
 SHARED = settings(QUICK, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 """One bench for all examples of a law that says that nothing changes."""

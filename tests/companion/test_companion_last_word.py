@@ -11,9 +11,9 @@ from companion.flight.autopilots import Profile
 from companion.flight.autopilots.ardupilot import ARDUPILOT
 from companion.flight.autopilots.px4 import PX4
 from companion.flight.hold_on_exit import LastWord
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, Source
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
 
 VEHICLE = Source(4, 1)
 HELD = {"ArduPilot": 17, "PX4": 4 << 16 | 3 << 24}

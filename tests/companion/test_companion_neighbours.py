@@ -13,7 +13,7 @@ from companion.obstacles.neighbours import Neighbours
 from companion.values.horizon import roll_out
 from mavlink_bridge.frames import FleetFrame, enu_to_ned
 from mavlink_bridge.messages import GlobalPosition, Source, Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 ELSEWHERE = FleetFrame(47.5, 8.545594, 488.0)

@@ -46,7 +46,7 @@ from mavlink_bridge.messages import (
     Source,
     Tunnel,
 )
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 
 FLAVOURS = tuple(PROFILES)
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3

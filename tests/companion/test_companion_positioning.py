@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from companion.flight.positioning import Positioning
 from companion.obstacles.uncertainty import ReportedUncertainty
-from mavlink_bridge.doubt_wire import pack
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.messages import EkfStatus, EstimatorStatus, GpsRaw
+from mavlink_bridge.wire.uncertainty import pack
 
 SECOND = 1_000_000
 READY, LOST = 0x33F, 0xA5

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from companion.flight.setpoint import setpoint
 from companion.goals.heading import Yaw
 from companion.values.horizon import roll_out
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source
+from mavlink_bridge.wire.codec import Codec
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 HOME = FLEET.local(47.397742, 8.545594, 488.0)

@@ -17,8 +17,8 @@ from companion.config.estimation import TrackConfig
 from companion.estimation.target import Target
 from companion.estimation.tracks import Track
 from companion.telemetry.reception import accepts
-from mavlink_bridge.converters import BY_TYPE
 from mavlink_bridge.messages import CameraTrackingGeo, FollowTarget, GlobalPosition, Source
+from mavlink_bridge.wire.converters import BY_TYPE
 
 CAMERA = Source(SYSTEM, 100)
 PHONE = Source(TARGET, 1)

@@ -15,10 +15,10 @@ import outrider
 from companion.config.estimation import TrackConfig
 from companion.estimation.sender_clock import SenderClock
 from companion.estimation.tracks import Track
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 
 DELAY, LATEST = 20_000, 2_000_000
 NOW = 1_767_225_600_000_000

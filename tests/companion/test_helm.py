@@ -11,9 +11,7 @@ from companion.avoidance.certified.committed import committed, horizon_of
 from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
 from companion.values.components import COMPONENT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     CommandLong,
     GpsGlobalOrigin,
@@ -24,11 +22,13 @@ from mavlink_bridge.messages import (
     Tunnel,
 )
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, WirePlan, pack, quantise
-from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
-from mavlink_bridge.roster_wire import Roster
-from mavlink_bridge.roster_wire import pack as pack_roster
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
+from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.wire.roster import Roster
+from mavlink_bridge.wire.roster import pack as pack_roster
+from mavlink_bridge.wire.signing import Signing
 
 SYSTEM = 11
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)

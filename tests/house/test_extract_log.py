@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mavlink_bridge.tlog import Record, read_tlog
+from mavlink_bridge.tlog.log import Record, read_tlog
 
 ROOT = Path(__file__).parents[2]
 FLIGHTS = ROOT / "tests" / "data" / "flights"

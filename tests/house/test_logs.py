@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 
-from mavlink_bridge.tlog import Record, read_tlog
+from mavlink_bridge.tlog.log import Record, read_tlog
 
 LOG = Path(__file__).parents[2] / "config" / "logs" / "escort-target.tlog"
 

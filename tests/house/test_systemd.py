@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mavlink_bridge.priority import LEVEL
+from mavlink_bridge.loops.priority import LEVEL
 from outrider.__main__ import main
 from outrider.aboard import command
 from outrider.aboard.request import Request

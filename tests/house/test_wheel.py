@@ -184,9 +184,9 @@ def test_a_core_install_has_neither_compiler_nor_simulator_nor_viewer(core: Inst
     "module",
     [
         "companion.node",
-        "mavlink_bridge.realtime",
+        "mavlink_bridge.loops.realtime",
         "mavlink_bridge.links.opening",
-        "mavlink_bridge.tlog",
+        "mavlink_bridge.tlog.log",
         "outrider.report.command",
         "outrider.resources",
         "outrider.yaml_file",
@@ -207,7 +207,7 @@ def test_a_core_install_plans_and_speaks(core: Installed) -> None:
     """A companion is made with the shipped scenario's settings, connects, and answers its first heartbeat."""
     done = core.python(
         "from companion.node import Companion\n"
-        "from mavlink_bridge.codec import Codec\n"
+        "from mavlink_bridge.wire.codec import Codec\n"
         "from mavlink_bridge.frames import FleetFrame\n"
         "from mavlink_bridge.messages import Heartbeat, Source\n"
         "from mavlink_bridge.node import Datagram\n"

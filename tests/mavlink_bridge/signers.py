@@ -6,11 +6,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as dialect
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.framing import Frame, frame_at
-from mavlink_bridge.key import Key
 from mavlink_bridge.messages import Ping, Source
-from mavlink_bridge.signing import EPOCH, UNIT, Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import Frame, frame_at
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.signing import EPOCH, UNIT, Signing
 
 KEY = Key.of_passphrase("correct horse")
 NOW = 1_780_000_000_000_000

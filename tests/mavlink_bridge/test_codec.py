@@ -30,9 +30,9 @@ from wire_values import (
 )
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.converters import BY_ID, BY_TYPE, TABLE
 from mavlink_bridge.errors import EncodeError
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.converters import BY_ID, BY_TYPE, TABLE
 
 KINDS: dict[type[m.Message], st.SearchStrategy[Any]] = {
     m.Heartbeat: st.builds(m.Heartbeat, source, u8, u8, u8, u32, u8),

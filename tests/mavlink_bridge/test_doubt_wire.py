@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink_bridge.doubt_wire import pack, unpack
 from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.wire.uncertainty import pack, unpack
 
 
 @given(radius=st.floats(0.0, 655.0))

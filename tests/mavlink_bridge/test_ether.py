@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mavlink_bridge.errors import BridgeError
-from mavlink_bridge.ether import Channel, Ether, Faults
+from mavlink_bridge.network.simulated import Channel, Ether, Faults
 from mavlink_bridge.node import Datagram
 
 TICK = 2500

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mavlink_bridge.channel import Direction
 from mavlink_bridge.errors import BridgeError
-from mavlink_bridge.ether import Channel, Ether, EtherCounters, Faults
+from mavlink_bridge.network.channel import Direction
+from mavlink_bridge.network.simulated import Channel, Ether, EtherCounters, Faults
 from mavlink_bridge.node import Datagram
 
 TICK = 2500

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mavlink_bridge.errors import ScheduleError
-from mavlink_bridge.ether import Channel, Ether, Faults
-from mavlink_bridge.node_clock import NodeClock
-from mavlink_bridge.runtime import LockStep, Scheduled
+from mavlink_bridge.loops.lockstep import LockStep, Scheduled
+from mavlink_bridge.loops.node_clock import NodeClock
+from mavlink_bridge.network.simulated import Channel, Ether, Faults
 
 PERIOD = 2 * TICK
 NAMES = "abc"

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from link_pairs import HOST, frame, frames
 
-from mavlink_bridge.clock import SimulatedClock
-from mavlink_bridge.framing import LONGEST_FRAME
-from mavlink_bridge.inbox import CAPACITY, FINGERS, HANDFUL, ROOM, Inbox
 from mavlink_bridge.links.endpoints import TcpIn
 from mavlink_bridge.links.link import memory_pair
 from mavlink_bridge.links.tcp import TcpListener
+from mavlink_bridge.loops.clock import SimulatedClock
+from mavlink_bridge.loops.inbox import CAPACITY, FINGERS, HANDFUL, ROOM, Inbox
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.framing import LONGEST_FRAME
 
 sizes = st.integers(1, 3000) | st.sampled_from([HANDFUL - 1, HANDFUL, HANDFUL + 1, 65507])
 many = st.integers(0, 3 * FINGERS).map(lambda count: [20] * count)

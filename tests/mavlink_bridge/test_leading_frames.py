@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.framing import Frame, Framer, frame_at, leading_frames
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import Frame, Framer, frame_at, leading_frames
 
 SOURCE = m.Source(11, 191)
 BEATS = [Codec().encode(m.Heartbeat(SOURCE, 2, 3, 81, number, 4)) for number in range(4)]

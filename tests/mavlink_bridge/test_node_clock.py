@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from watching import Event, Watcher
 
 from mavlink_bridge.errors import ScheduleError
-from mavlink_bridge.ether import Channel, Ether, Faults
-from mavlink_bridge.node_clock import NodeClock
-from mavlink_bridge.runtime import LockStep, Scheduled
+from mavlink_bridge.loops.lockstep import LockStep, Scheduled
+from mavlink_bridge.loops.node_clock import NodeClock
+from mavlink_bridge.network.simulated import Channel, Ether, Faults
 
 EPOCH = 1_767_225_600_000_000
 SECOND = 1_000_000

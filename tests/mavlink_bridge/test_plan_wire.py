@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mavlink_bridge.errors import PlanWireError
-from mavlink_bridge.plan_wire import KNOTS, PAYLOAD_TYPE, WirePlan, pack, quantise, unpack
+from mavlink_bridge.wire.plan import KNOTS, PAYLOAD_TYPE, WirePlan, pack, quantise, unpack
 
 
 def signed(bits: int) -> st.SearchStrategy[int]:

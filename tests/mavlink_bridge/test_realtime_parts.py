@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink_bridge import priority
-from mavlink_bridge.garbage import IdleCollector, seldom_collected
-from mavlink_bridge.histogram import Histogram, Spread
-from mavlink_bridge.priority import LEVEL, Priority, ask_for_priority
+from mavlink_bridge.loops import priority
+from mavlink_bridge.loops.garbage import IdleCollector, seldom_collected
+from mavlink_bridge.loops.histogram import Histogram, Spread
+from mavlink_bridge.loops.priority import LEVEL, Priority, ask_for_priority
 
 VALUES = st.lists(st.one_of(st.integers(0, 200), st.integers(0, 2**45 - 1)), max_size=60)
 
@@ -170,7 +170,7 @@ def test_what_is_said_is_what_was_granted() -> None:
     """In a process of its own, as it cannot be undone; threads must have what the first one got."""
     program = """
 import os, threading
-from mavlink_bridge.priority import ask_for_priority
+from mavlink_bridge.loops.priority import ask_for_priority
 granted = ask_for_priority()
 seen = []
 thread = threading.Thread(target=lambda: seen.append((os.sched_getscheduler(0), os.sched_getparam(0))))

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mavlink_bridge.errors import PlanWireError
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE as PLAN
-from mavlink_bridge.roster_wire import PAYLOAD_TYPE, Roster, pack, unpack
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
+from mavlink_bridge.wire.roster import PAYLOAD_TYPE, Roster, pack, unpack
 
 rosters = st.builds(Roster, st.integers(0, 2**56 - 1), st.frozensets(st.integers(1, 255)), st.booleans())
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from watching import Event, Watcher
 
 from mavlink_bridge.errors import ScheduleError
-from mavlink_bridge.ether import Channel, Ether, Faults
-from mavlink_bridge.runtime import LockStep, Scheduled
+from mavlink_bridge.loops.lockstep import LockStep, Scheduled
+from mavlink_bridge.network.simulated import Channel, Ether, Faults
 
 CLEAN = Faults()
 

@@ -15,10 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.messages import Heartbeat, Source, StatusText
-from mavlink_bridge.tlog import Record, TlogReport, TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import Record, TlogReport, TlogWriter, read_tlog
+from mavlink_bridge.wire.codec import Codec
 
 NOW = 1_700_000_000_000_000
 ME = Source(11, 1)

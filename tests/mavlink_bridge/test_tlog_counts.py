@@ -23,10 +23,10 @@ from hypothesis import strategies as st
 from pymavlink import mavutil
 from recorded_logs import LOGS, PIECES
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.framing import Frame, frame_at
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Source
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import Frame, frame_at
 
 NOW = 1_700_000_000_000_000
 
@@ -144,7 +144,7 @@ def signed(data: bytes, random: Random) -> bytes:
     it."""
     from fastcrc.crc16 import mcrf4xx
 
-    from mavlink_bridge.framing import CRC_EXTRA
+    from mavlink_bridge.wire.framing import CRC_EXTRA
 
     frame = frame_at(data, 0)
     assert isinstance(frame, Frame)

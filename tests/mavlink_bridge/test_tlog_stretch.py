@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recorded_logs import PIECES
 
-from mavlink_bridge import tlog
-from mavlink_bridge.framing import Flaw, frame_at
-from mavlink_bridge.tlog import Record, read_tlog
-from mavlink_bridge.tlog_stretch import leading_records
+from mavlink_bridge.tlog import log as tlog
+from mavlink_bridge.tlog.log import Record, read_tlog
+from mavlink_bridge.tlog.stretch import leading_records
+from mavlink_bridge.wire.framing import Flaw, frame_at
 
 LOGS = [path.read_bytes() for path in PIECES]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.runtime import Direction
 
 Event = tuple[int, str, str, Datagram]
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from companion.avoidance.certified.committed import carried_on, controls, resting
 from companion.values.horizon import Array
-from mavlink_bridge.plan_wire import Integers, WirePlan
+from mavlink_bridge.wire.plan import Integers, WirePlan
 from outrider.certify.evidence import Evidence, Log, Sighting, Terms, Word
 
 DT = EPOCH = 200_000

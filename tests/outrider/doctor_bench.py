@@ -7,11 +7,11 @@ from typing import Any
 
 from autopilot_rig import FIREFLY, SITE
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.framing import Frame, leading_frames
 from mavlink_bridge.messages import CommandLong, Message, Source
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import Frame, leading_frames
+from mavlink_bridge.wire.signing import Signing
 from outrider.doctor.consultation import Consultation
 from outrider.doctor.finding import Finding, Severity, Verdict
 from sitl.autopilot_config import AutopilotConfig

@@ -13,8 +13,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 from shipped import FIREFLY, scenario
 
-from mavlink_bridge.framing import frame_v2
-from mavlink_bridge.tlog import TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import TlogWriter, read_tlog
+from mavlink_bridge.wire.framing import frame_v2
 from outrider import swarm
 from outrider.__main__ import main
 

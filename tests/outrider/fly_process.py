@@ -19,12 +19,12 @@ import numpy as np
 import yaml
 from test_sitl_command import free_base, sitl
 
-from mavlink_bridge.clock import WallClock
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.loops.clock import WallClock
 from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.wire.codec import Codec
 from outrider.beacon import Beacon
 from outrider.paths import Motion
 from outrider.resources import find

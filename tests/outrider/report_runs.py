@@ -13,7 +13,6 @@ import numpy as np
 import yaml
 from shipped import scenario as shipped
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import (
     CommandAck,
     GlobalPosition,
@@ -23,7 +22,8 @@ from mavlink_bridge.messages import (
     Source,
     StatusText,
 )
-from mavlink_bridge.tlog import TlogWriter
+from mavlink_bridge.tlog.log import TlogWriter
+from mavlink_bridge.wire.codec import Codec
 from outrider import names
 from outrider.scenario import Scenario
 

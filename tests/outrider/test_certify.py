@@ -26,7 +26,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from mavlink_bridge.errors import PlanWireError
-from mavlink_bridge.plan_wire import Integers, WirePlan, pack, unpack
+from mavlink_bridge.wire.plan import Integers, WirePlan, pack, unpack
 from outrider.certify.evidence import Evidence, Garbled, Log, Word
 from outrider.certify.histories import Kind
 from outrider.certify.verdict import Verdict, judge

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from shipped import FIREFLY, scenario
 
 from companion.avoidance.certified.peer_plans import PeerPlans
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Message, Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE
-from mavlink_bridge.tlog import Record, TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE
 from outrider import swarm
 from outrider.__main__ import main
 from outrider.certify.command import show

@@ -12,9 +12,9 @@ from doctor_bench import Bench, autopilot
 from said import Run
 from sitl_process import Sitl
 
-from mavlink_bridge.clock import SimulatedClock
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.link import BURST, LinkCounters
+from mavlink_bridge.loops.clock import SimulatedClock
+from mavlink_bridge.wire.codec import Codec
 from outrider.doctor.command import consult
 from outrider.doctor.consultation import Consultation
 

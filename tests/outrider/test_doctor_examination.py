@@ -17,9 +17,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.flight.vehicle import PREARM_OK
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.converters import BY_ID
-from mavlink_bridge.framing import CRC_EXTRA, frame_v1, frame_v2, leading_frames
 from mavlink_bridge.messages import (
     Attitude,
     GlobalPosition,
@@ -33,8 +30,11 @@ from mavlink_bridge.messages import (
     StatusText,
     SysStatus,
 )
-from mavlink_bridge.param_value import number_of
-from mavlink_bridge.tlog import TlogReader
+from mavlink_bridge.tlog.log import TlogReader
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.converters import BY_ID
+from mavlink_bridge.wire.framing import CRC_EXTRA, frame_v1, frame_v2, leading_frames
+from mavlink_bridge.wire.param_value import number_of
 from outrider.doctor.boot_clock import BootClock
 from outrider.doctor.consultation import Consultation
 from outrider.doctor.examination import Examination

@@ -10,8 +10,6 @@ import pytest
 from autopilot_rig import ARM, FLAVOURS, GUIDED, SET_MODE, TAKEOFF
 from doctor_bench import BATTERY, GCS, GPS, INJECT, OFF, Bench, autopilot, blocking, found, warnings
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     CommandLong,
     Heartbeat,
@@ -20,7 +18,9 @@ from mavlink_bridge.messages import (
     SetpointLocal,
     Source,
 )
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.signing import Signing
 from outrider.doctor.finding import Severity
 from outrider.doctor.questions import COMPONENT, STRANGER
 from outrider.doctor.settings import rules

@@ -10,9 +10,9 @@ from doctor_bench import BATTERY, GPS, INJECT, OFF, TICK, Bench, autopilot, foun
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.framing import Frame, Framer, frame_at, frame_v2, leading_frames
 from mavlink_bridge.messages import CommandLong, Heartbeat, Message, Source, StatusText, SysStatus
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import Frame, Framer, frame_at, frame_v2, leading_frames
 from outrider.doctor.consultation import Consultation
 from outrider.doctor.finding import Severity, Verdict
 from outrider.doctor.objections import RUN_CHECKS, Objections

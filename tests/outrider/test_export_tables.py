@@ -16,7 +16,7 @@ import pytest
 from export_runs import SYSTEMS, Heard, all_same, everything, heard, run  # noqa: F401
 from pymavlink.dialects.v20 import all as dialect
 
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
 from outrider.exports import mavlink_tables
 from outrider.exports.command import export
 from outrider.exports.dialect import identifiers, kind

@@ -14,8 +14,8 @@ from pymavlink.dialects.v20 import all as dialect
 from pyulog import ULog
 from pyulog.px4 import PX4ULog
 
-from mavlink_bridge.framing import frame_v2
-from mavlink_bridge.tlog import TlogWriter
+from mavlink_bridge.tlog.log import TlogWriter
+from mavlink_bridge.wire.framing import frame_v2
 from outrider.exports.command import export
 from outrider.exports.dialect import identifiers, kind
 from outrider.exports.ulog_export import mavlink_topic

@@ -14,13 +14,13 @@ from shipped import FIREFLY
 
 from companion.flight.readiness import GPS_RAW, HEALTH, STREAMS
 from companion.values.phase import Phase
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Serial, UdpIn
 from mavlink_bridge.messages import CommandLong, Source
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.signing import Signing
 from outrider.aboard.airtime import (
     FLEET,
     SHARE,

@@ -17,9 +17,9 @@ from said import Ended, Run
 
 from companion import node
 from companion.flight.setpoint import setpoint
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import LocalPosition, SetpointLocal
-from mavlink_bridge.tlog import TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import TlogWriter, read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.aboard.fly_config import FlyConfig
 from outrider.resources import find
 from outrider.yaml_file import load

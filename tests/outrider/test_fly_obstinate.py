@@ -15,10 +15,10 @@ from typing import IO, cast
 import pytest
 from rich.console import Console
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.aboard.crew import FAREWELL, KILLED, Crew
 from outrider.aboard.diary import Diary
 from outrider.aboard.log import BATCH, MOST, Log

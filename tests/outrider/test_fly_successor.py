@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from mavlink_bridge.clock import SimulatedClock
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.links.endpoints import parse_endpoint
+from mavlink_bridge.loops.clock import SimulatedClock
+from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, LocalPosition, Source
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
 from outrider.aboard import flight
 from outrider.aboard.cockpit import Cockpit
 from outrider.aboard.departures import Departures

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from companion.config import CompanionConfig
 from companion.telemetry.reception import LINKS, accepts
 from companion.values.components import COMPONENT
-from mavlink_bridge.header import Header
+from mavlink_bridge.wire.header import Header
 from outrider.aboard.wiring import wants
 
 OWN, TARGET = 1, 100

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from shipped import FIREFLY, scenario
 
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
 from outrider.conductor import Stage
 from outrider.errors import OutriderError
 from outrider.interruption import Came, insisted, interruptible, noted

@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as dialect
 from recorded_logs import LOGS, PIECES, SHIPPED
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.framing import Frame, frame_at
 from mavlink_bridge.messages import Heartbeat, Source, StatusText
-from mavlink_bridge.tlog import TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import TlogWriter, read_tlog
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import Frame, frame_at
 from outrider.__main__ import main
 from outrider.logs.census import Census
 from outrider.logs.listing import document

@@ -14,11 +14,11 @@ from ways import bent_ring
 
 from companion.obstacles.moving import MovingObstacles
 from companion.telemetry.sharing import plan_message
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition, Message, Source, Tunnel
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.plan_wire import KNOTS, unpack
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import KNOTS, unpack
 from outrider import names
 from outrider.fleet import Fleet
 from outrider.moving import STEP, MovingObstacle, places

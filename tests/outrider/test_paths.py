@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ways import bent_ring
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition
+from mavlink_bridge.wire.codec import Codec
 from outrider.options import Options
 from outrider.paths import ClosedPath
 from outrider.scenario import PathTarget

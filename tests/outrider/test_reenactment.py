@@ -14,7 +14,7 @@ import pytest
 from said import Run
 from shipped import FIREFLY, scenario
 
-from mavlink_bridge.tlog import TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from outrider import swarm
 from outrider.options import METHODS
 from outrider.replaying.runs import again

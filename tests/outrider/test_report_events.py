@@ -10,7 +10,7 @@ from report_runs import BEFORE, leave
 from shipped import scenario
 
 from mavlink_bridge.messages import CommandAck, Heartbeat, Source, StatusText
-from mavlink_bridge.tlog import TlogReport
+from mavlink_bridge.tlog.log import TlogReport
 from outrider.report.command import make
 from outrider.report.distances import encounters
 from outrider.report.events import Event, together

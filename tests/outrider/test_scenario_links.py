@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from shipped import FIREFLY, LOGS, scenario
 
-from mavlink_bridge.ether import Ether, Faults
+from mavlink_bridge.network.simulated import Ether, Faults
 from outrider.fleet import Fleet
 from outrider.scenario_links import Links
 

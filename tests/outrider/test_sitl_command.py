@@ -19,8 +19,8 @@ from typing import Any, Final
 import pytest
 from said import Run
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Heartbeat, Message, ParamSet, ParamValue, Source
+from mavlink_bridge.wire.codec import Codec
 
 HOST: Final = "127.0.0.1"
 GCS: Final = Source(255, 190)

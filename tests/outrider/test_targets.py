@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shipped import LOGS, scenario
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Source
-from mavlink_bridge.tlog import TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import TlogWriter, read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
 from outrider.scenario import TARGET_SYSTEM, FixedTarget, RecordedTarget
 from outrider.targets import LINK, SHORT, Recorded, Standing, load

@@ -15,12 +15,12 @@ from shipped import FIREFLY, LOGS
 from view_flights import small
 
 from companion.values.components import COMPONENT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.link import LinkCounters
+from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Source, Tunnel
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
-from mavlink_bridge.runtime import Direction
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
 from outrider import names, swarm
 from outrider.flight import Flight
 from outrider.realtime.window import Window
@@ -206,7 +206,7 @@ def overheard(of: Any) -> Overhears:
     listener = Listener([ear], [True], 10, "")
     flight = Flight(of, FIREFLY, 1, LOGS, stopwatch=lambda: 0)
     found = Overhears(flight, ear, listener)
-    from mavlink_bridge.runtime import LockStep
+    from mavlink_bridge.loops.lockstep import LockStep
 
     loop = LockStep(flight._schedule(), flight.ether, of.timing.base_tick_us, [found])
     from outrider.flight import EPOCH, _Computers

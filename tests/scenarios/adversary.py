@@ -12,9 +12,9 @@ from single_vehicle import BOOT, SITE, SYSTEM, TICK, SingleVehicle
 
 from companion.values.horizon import Array
 from companion.values.phase import Phase
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import GlobalPosition, SetpointLocal, Source
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
 from outrider.resources import find
 
 Place = Callable[[float, Array, np.random.Generator], Array]

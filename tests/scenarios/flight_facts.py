@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from lockstep_flights import Flown
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Message
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.conductor import SLOW, Stage
 from outrider.names import LINK_NUMBERS
 from outrider.truth import Samples

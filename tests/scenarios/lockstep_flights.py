@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from companion.values.phase import Phase
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import SetpointLocal
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.conductor import Stage
 from outrider.flight import Flight
 from outrider.resources import config_root, find

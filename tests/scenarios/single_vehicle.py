@@ -14,7 +14,6 @@ from companion.config import CompanionConfig
 from companion.node import Companion
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import (
     CommandLong,
@@ -26,6 +25,7 @@ from mavlink_bridge.messages import (
     Timesync,
 )
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
 from sitl.autopilot_config import AutopilotConfig
 from sitl.node import Autopilot
 

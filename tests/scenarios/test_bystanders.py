@@ -9,9 +9,9 @@ import pytest
 from flight_facts import check_told, clock
 from lockstep_flights import fly, scenario
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import GlobalPosition, Tunnel
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.bystander import Bystander
 from outrider.summary import exit_status
 

@@ -9,8 +9,8 @@ from single_vehicle import SITE, SYSTEM, SingleVehicle
 
 from companion.config import CompanionConfig
 from companion.obstacles.neighbours import Neighbours
-from mavlink_bridge.doubt_wire import PAYLOAD_TYPE, unpack
 from mavlink_bridge.messages import GlobalPosition, Source, StatusText, Tunnel
+from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE, unpack
 
 
 def told(vehicle):

@@ -8,9 +8,9 @@ from lockstep_flights import Flown, check, fly, scenario, setpoints
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import SetpointLocal
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.flight import EPOCH
 from outrider.names import LINK_NUMBERS
 from outrider.scenario import TARGET_SYSTEM

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from lockstep_flights import FIREFLY, scenario, setpoints
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import GlobalPosition, Tunnel
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.conductor import Stage
 from outrider.realtime.flight import RealTimeFlight
 from outrider.resources import config_root

@@ -11,7 +11,7 @@ import pytest
 from flight_facts import check_told, clock
 from lockstep_flights import Flown, fly, scenario
 
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
 from outrider.summary import WALL_FIELDS
 
 CHANGES: dict[str, Any] = {

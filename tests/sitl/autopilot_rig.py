@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 import numpy as np
 import yaml
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import (
     CommandAck,
@@ -22,7 +21,8 @@ from mavlink_bridge.messages import (
     Vector,
 )
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.signing import Signing
 from sitl.autopilot_config import AutopilotConfig
 from sitl.config import VehicleConfig
 from sitl.node import LINK, Autopilot

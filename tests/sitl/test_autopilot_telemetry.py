@@ -23,7 +23,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, ned_to_enu, yaw_to_enu
 from mavlink_bridge.messages import (
     Attitude,
@@ -45,6 +44,7 @@ from mavlink_bridge.messages import (
     Timesync,
 )
 from mavlink_bridge.node import Node
+from mavlink_bridge.wire.codec import Codec
 from sitl.autopilot_config import AutopilotConfig
 from sitl.node import Autopilot
 from sitl.origin import Origin

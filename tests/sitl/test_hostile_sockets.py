@@ -20,16 +20,16 @@ import pytest
 from autopilot_rig import LINK, Rig
 from hostile import command
 
-from mavlink_bridge.clock import WallClock
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import TcpIn, UdpIn
 from mavlink_bridge.links.tcp import BACKLOG, TcpListener
 from mavlink_bridge.links.udp import MOST_PEERS, UdpListener
+from mavlink_bridge.loops.clock import WallClock
+from mavlink_bridge.loops.lockstep import Scheduled
+from mavlink_bridge.loops.realtime import RealTime
 from mavlink_bridge.messages import CommandAck, LocalPosition, Source
-from mavlink_bridge.realtime import RealTime
-from mavlink_bridge.runtime import Scheduled
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.signing import Signing
 
 HOST = "127.0.0.1"
 HERE = Path(__file__).parent

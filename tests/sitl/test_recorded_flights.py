@@ -17,7 +17,7 @@ from benchmarks.recorded_swarms import SwarmVehicle, read_swarm
 from benchmarks.response import SWARMS
 from benchmarks.swarm_responses import Deviations, Followed, closest, follow
 from mavlink_bridge.messages import CommandLong, SetpointLocal
-from mavlink_bridge.tlog import TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from outrider.errors import InputError
 
 FLIGHTS = Path(__file__).parents[1] / "data" / "flights"

@@ -11,9 +11,9 @@ from outside_client import Client
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as dialect
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.key import Key
-from mavlink_bridge.signing import EPOCH, UNIT, Refusal, Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.signing import EPOCH, UNIT, Refusal, Signing
 from sitl.saved import Saved
 
 KEY, OTHER = Key.of_passphrase("correct horse"), Key.of_passphrase("battery staple")

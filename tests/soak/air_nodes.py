@@ -12,11 +12,11 @@ import numpy as np
 from companion.flight.state_machine import NAV_TAKEOFF
 from companion.node import Companion
 from companion.values.components import COMPONENT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandLong, Message, SetpointLocal, Source, StatusText
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.signing import Signing
 from outrider import names
 from outrider.beacon import Beacon
 from outrider.paths import Motion

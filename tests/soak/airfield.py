@@ -30,12 +30,12 @@ from air_nodes import (
 
 from companion.config import CompanionConfig
 from companion.node import Companion
-from mavlink_bridge.ether import Channel, Ether, Faults
-from mavlink_bridge.key import Key
+from mavlink_bridge.loops.lockstep import LockStep, Scheduled
+from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.messages import SetpointLocal
-from mavlink_bridge.node_clock import NodeClock
-from mavlink_bridge.runtime import LockStep, Scheduled
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.network.simulated import Channel, Ether, Faults
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.signing import Signing
 from sitl.autopilot_config import AutopilotConfig
 from sitl.node import Autopilot
 from sitl.profiles import PROFILES

@@ -18,10 +18,10 @@ from fly_process import FLEET, HOST
 from switch import Switch
 from test_sitl_command import free_base
 
-from mavlink_bridge.clock import WallClock
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.loops.clock import WallClock
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, SysStatus
+from mavlink_bridge.wire.codec import Codec
 
 PACE: Final = 0.9
 """By its rate a clock is known for a simulation's, which stands now and then on a busy machine. At 1 it is

@@ -12,9 +12,6 @@ from typing import NamedTuple
 from recorded_logs import PIECES
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.converters import BY_TYPE, TABLE
-from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     Attitude,
     CommandAck,
@@ -37,7 +34,10 @@ from mavlink_bridge.messages import (
     Timesync,
     Tunnel,
 )
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, WirePlan, pack, quantise
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.converters import BY_TYPE, TABLE
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
 from outrider.resources import config_root
 
 AUTOPILOT, COMPANION, NEIGHBOUR = Source(11, 1), Source(11, 195), Source(12, 195)

@@ -13,9 +13,6 @@ from air_nodes import FENCE, GROUND, Edit
 from airfield import Airfield, Craft
 
 from companion.errors import SolverError
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.converters import BY_TYPE
-from mavlink_bridge.framing import frame_v2, leading_frames
 from mavlink_bridge.messages import (
     Attitude,
     GpsGlobalOrigin,
@@ -28,6 +25,9 @@ from mavlink_bridge.messages import (
     SysStatus,
     SystemTime,
 )
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.converters import BY_TYPE
+from mavlink_bridge.wire.framing import frame_v2, leading_frames
 
 _MODES = {"ardupilot": {"hold": 17, "land": 9, "return": 6}, "px4": {"hold": 4 << 16 | 3 << 24}}
 _MODES["px4"] |= {"land": 4 << 16 | 6 << 24, "return": 4 << 16 | 5 << 24}

@@ -11,8 +11,8 @@ from campaigns import Mutants
 from corpora import GROUND, frames, messages
 from damage import WIRE_EDITS, absurd, damaged
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Ping, SetpointLocal, Timesync
+from mavlink_bridge.wire.codec import Codec
 
 OTHERS = frames(messages())
 OBEYED = CommandInt | CommandLong | SetpointLocal | Ping | Timesync

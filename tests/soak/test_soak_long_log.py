@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from recorded_logs import PIECES
 
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
 
 GIGABYTE = 1_000_000_000
 MOST = 300 << 20

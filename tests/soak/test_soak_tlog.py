@@ -13,12 +13,12 @@ from corpora import frames as frames_of
 from corpora import log, logs, messages
 from damage import EDITS, WIRE_EDITS, absurd, damaged
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.framing import LONGEST_FRAME, Flaw, frame_at
 from mavlink_bridge.messages import Heartbeat, Source
-from mavlink_bridge.tlog import LINKS, Record, TlogReader, read_tlog
+from mavlink_bridge.tlog.log import LINKS, Record, TlogReader, read_tlog
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import LONGEST_FRAME, Flaw, frame_at
 from outrider.errors import InputError
 from outrider.logs.listing import document
 from outrider.logs.tally import count

@@ -9,10 +9,10 @@ from campaigns import Mutants
 from corpora import frames, logs, messages
 from damage import WIRE_EDITS, absurd, damaged
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.converters import BY_TYPE
-from mavlink_bridge.framing import LONGEST_FRAME, Frame, Framer
 from mavlink_bridge.messages import Heartbeat, Message, Source, StatusText
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.converters import BY_TYPE
+from mavlink_bridge.wire.framing import LONGEST_FRAME, Frame, Framer
 
 FRAMES = frames(messages())
 OTHERS = (*FRAMES, *logs())

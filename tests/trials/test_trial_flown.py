@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import (
     GlobalPosition,
@@ -14,7 +13,8 @@ from mavlink_bridge.messages import (
     SetpointLocal,
     Source,
 )
-from mavlink_bridge.tlog import TlogWriter
+from mavlink_bridge.tlog.log import TlogWriter
+from mavlink_bridge.wire.codec import Codec
 from trials.flown import flown
 from trials.plan import TARGET
 

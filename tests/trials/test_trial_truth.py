@@ -7,11 +7,11 @@ import socket
 import numpy as np
 import pytest
 
-from mavlink_bridge.clock import SimulatedClock
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.endpoints import UdpIn
+from mavlink_bridge.loops.clock import SimulatedClock
 from mavlink_bridge.messages import CommandLong, Heartbeat, HilState, SimulationState, Source
+from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
 from trials.ears import PortEar
 from trials.truth import TruthObserver

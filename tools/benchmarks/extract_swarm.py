@@ -22,11 +22,11 @@ import numpy as np
 import yaml
 
 from benchmarks.recorded_swarms import Array, FlavourName, SwarmVehicle, write_swarm
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.frames import FleetFrame, LocalFrame, enu_to_ned
 from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, LocalPosition, SetpointLocal, Source
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError, OutriderError
 
 _AUTOPILOT: Final = 1

@@ -17,7 +17,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import (
     Attitude,
@@ -29,7 +28,8 @@ from mavlink_bridge.messages import (
     Source,
 )
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
 from sitl.autopilot_config import AutopilotConfig
 from sitl.config import VehicleConfig

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from companion.telemetry.sharing import position_message
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
 from outrider.paths import Motion
 
 

@@ -20,10 +20,10 @@ from companion.telemetry.sharing import position_message
 from companion.values.bearings import bearing
 from companion.values.obstacles import Obstacles
 from companion.world import World
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import GlobalPosition, Source, Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack, quantise
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
 from outrider import bench_certified, bench_tlog
 from outrider.flight import Flight
 from outrider.resources import config_root, find

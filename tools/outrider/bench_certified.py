@@ -19,7 +19,7 @@ from companion.values.horizon import Array
 from companion.world import World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, WirePlan, pack, quantise
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
 from outrider.resources import find
 from outrider.scenario import Scenario
 from outrider.yaml_file import load

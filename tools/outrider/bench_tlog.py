@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, LocalPosition, Message, Source
-from mavlink_bridge.tlog import TlogWriter, read_tlog
+from mavlink_bridge.tlog.log import TlogWriter, read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.logs.tally import count
 
 _FRAMES = 20_000

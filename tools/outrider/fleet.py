@@ -13,9 +13,9 @@ from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
 from companion.node import Companion
 from companion.values.bearings import bearing
-from mavlink_bridge.ether import Channel, Faults
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.node_clock import NodeClock
+from mavlink_bridge.loops.node_clock import NodeClock
+from mavlink_bridge.network.simulated import Channel, Faults
 from outrider import names
 from outrider.bystander import Bystander
 from outrider.companion_settings import settings_of

@@ -13,9 +13,9 @@ from companion.obstacles.moving import MovingObstacles
 from companion.obstacles.static import FixedObstacles
 from companion.planning import Tally
 from companion.values.phase import Phase
-from mavlink_bridge.ether import Ether
-from mavlink_bridge.garbage import seldom_collected
-from mavlink_bridge.runtime import LockStep, Scheduled
+from mavlink_bridge.loops.garbage import seldom_collected
+from mavlink_bridge.loops.lockstep import LockStep, Scheduled
+from mavlink_bridge.network.simulated import Ether
 from outrider import names
 from outrider.conductor import Conductor, Sight, Stage
 from outrider.disturbances import Event, events, strike_autopilot, strike_computer

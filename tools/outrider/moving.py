@@ -11,7 +11,7 @@ from companion.telemetry.sharing import plan_message
 from companion.values.horizon import Horizon, roll_out
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.plan_wire import KNOTS
+from mavlink_bridge.wire.plan import KNOTS
 from outrider import names
 from outrider.beacon import Beacon
 from outrider.paths import Array, ClosedPath, Motion, Walk

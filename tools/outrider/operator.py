@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from companion.flight.orders import DO_REPOSITION, NAV_RETURN
 from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
 from companion.values.components import COMPONENT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Source
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
 
 LINK = "ground"
 GLOBAL_FRAME = 0

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from contextlib import ExitStack, closing
 from pathlib import Path
 
+from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.runtime import Direction
-from mavlink_bridge.tlog import TlogWriter
+from mavlink_bridge.tlog.log import TlogWriter
 from outrider import names
 from outrider.steps_file import StepsFile
 

@@ -8,7 +8,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from mavlink_bridge.ether import Faults
+from mavlink_bridge.network.simulated import Faults
 from outrider.scenario_part import Duration, Milliseconds, Part, Seconds, Share, System
 
 _WORDS = ("delay_ms", "jitter_ms", "loss", "duplication", "reordering", "burst")

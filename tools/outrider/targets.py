@@ -11,12 +11,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import GlobalPosition
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.beacon import Beacon
 from outrider.errors import InputError
 from outrider.paths import ClosedPath, Motion, Walk

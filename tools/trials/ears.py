@@ -6,11 +6,11 @@ from __future__ import annotations
 import socket
 from typing import Final, Protocol
 
-from mavlink_bridge.clock import WallClock
 from mavlink_bridge.errors import LinkError
-from mavlink_bridge.framing import Flaw, frame_at
 from mavlink_bridge.links.endpoints import UdpIn, parse_endpoint
 from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.loops.clock import WallClock
+from mavlink_bridge.wire.framing import Flaw, frame_at
 from outrider.errors import InputError
 
 _LONGEST: Final = 65536

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, LocalPosition, SetpointLocal
-from mavlink_bridge.tlog import TlogReader
+from mavlink_bridge.tlog.log import TlogReader
+from mavlink_bridge.wire.codec import Codec
 from trials.measures import Setpoints
 from trials.plan import TARGET
 from trials.separation import Track

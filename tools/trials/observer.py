@@ -9,11 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink_bridge.clock import Clock, WallClock
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.links.link import Link
+from mavlink_bridge.loops.clock import Clock, WallClock
+from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.messages import (
     CommandLong,
     GpsGlobalOrigin,
@@ -22,6 +21,7 @@ from mavlink_bridge.messages import (
     Source,
     SystemTime,
 )
+from mavlink_bridge.wire.codec import Codec
 from trials.separation import Track
 
 Array = NDArray[np.float64]

@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink_bridge.clock import Clock, WallClock
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.loops.clock import Clock, WallClock
 from mavlink_bridge.messages import CommandLong, Heartbeat, HilState, SimulationState
+from mavlink_bridge.wire.codec import Codec
 from trials.ears import Ear
 from trials.observer import AGAIN, ARMED, OWN
 from trials.separation import Track

@@ -26,7 +26,7 @@ from companion.avoidance.certified.separating_planes import Others, planes
 from companion.config.certified import CertifiedConfig
 from companion.errors import CertificateError, CompanionError, SolverError
 from companion.values.horizon import Array, Horizon, Motion
-from mavlink_bridge.plan_wire import WirePlan, quantise
+from mavlink_bridge.wire.plan import WirePlan, quantise
 
 
 class HoldReason(Enum):

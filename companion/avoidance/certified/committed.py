@@ -1,6 +1,6 @@
 """Committed plans: integer trajectories on absolute knots that end at rest, so that each is valid for ever.
 
-With positions in units of ½ A dt² and velocities in A dt (A = 1 mm/s²; see ``mavlink_bridge.plan_wire``) the
+With positions in units of ½ A dt² and velocities in A dt (A = 1 mm/s²; see ``mavlink_bridge.wire.plan``) the
 motion over a knot is p' = p + 2v + a, v' = v + a, and the segment between is the quadratic Bézier curve with
 the control points p, p + v, p'. All of it is exact in integers: moving on by a knot, coming to rest, and what
 a receiver makes of the bytes.
@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from companion.errors import CertificateError
 from companion.values.horizon import Array, Horizon
-from mavlink_bridge.plan_wire import Integers, WirePlan, quantise
+from mavlink_bridge.wire.plan import Integers, WirePlan, quantise
 
 _MM = 1e-3
 

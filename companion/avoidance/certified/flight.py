@@ -17,11 +17,11 @@ from companion.world import View, World
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, pack
-from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
-from mavlink_bridge.roster_wire import Roster
-from mavlink_bridge.roster_wire import pack as pack_roster
-from mavlink_bridge.roster_wire import unpack as unpack_roster
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack
+from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.wire.roster import Roster
+from mavlink_bridge.wire.roster import pack as pack_roster
+from mavlink_bridge.wire.roster import unpack as unpack_roster
 
 _SENSES = {"left": -1.0}
 

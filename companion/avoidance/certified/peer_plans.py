@@ -16,8 +16,8 @@ from typing import NamedTuple
 from companion.avoidance.certified.committed import carried_on, controls, rests
 from companion.values.horizon import Array
 from mavlink_bridge.errors import PlanWireError
-from mavlink_bridge.plan_wire import WirePlan, unpack
-from mavlink_bridge.roster_wire import Roster
+from mavlink_bridge.wire.plan import WirePlan, unpack
+from mavlink_bridge.wire.roster import Roster
 
 _KEPT = 4
 """Epochs of a sender that are kept; nothing that is older or further ahead is believed."""

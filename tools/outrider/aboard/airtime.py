@@ -8,7 +8,6 @@ from typing import Final
 from companion.config import CompanionConfig
 from companion.flight.readiness import HEALTH, STREAMS
 from companion.telemetry.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.endpoints import BAUD_RATES, Endpoint, Serial
 from mavlink_bridge.messages import (
     Attitude,
@@ -25,7 +24,8 @@ from mavlink_bridge.messages import (
     Tunnel,
     Vector,
 )
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE
 from outrider.errors import InputError
 
 SHARE: Final = 0.7

@@ -15,10 +15,10 @@ from companion.flight.hold_on_exit import LastWord
 from companion.node import Companion
 from companion.telemetry.status_text import Severity
 from companion.values.phase import STEERED, Phase
-from mavlink_bridge.clock import Clock
-from mavlink_bridge.followed_clock import FollowedClock
+from mavlink_bridge.loops.clock import Clock
+from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.signing import Signing
 from outrider.aboard.gate import Gate
 from outrider.aboard.twin import Twin
 

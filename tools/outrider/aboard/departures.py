@@ -7,11 +7,11 @@ from struct import Struct
 from typing import Final
 
 from companion.config.planning import LimitsConfig
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.framing import leading_frames
+from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.runtime import Direction
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import leading_frames
 from outrider.aboard.gauge import gauge_for
 
 _COMMAND_LONG, _SETPOINT = 76, 84

@@ -9,11 +9,11 @@ from typing import Final
 from companion.flight.state_machine import NAV_TAKEOFF
 from companion.telemetry.reception import LINKS
 from companion.values.components import COMPONENT
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.framing import Frame, leading_frames
 from mavlink_bridge.messages import CommandAck, Source
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import Frame, leading_frames
+from mavlink_bridge.wire.signing import Signing
 
 _COMMAND_LONG: Final = 76
 _ORDER: Final = Struct("<28xHBB")

@@ -6,8 +6,8 @@ from struct import Struct
 from typing import Final
 
 from companion.dry_run import REQUESTS
-from mavlink_bridge.framing import Frame, leading_frames
 from mavlink_bridge.links.link import Link, LinkCounters
+from mavlink_bridge.wire.framing import Frame, leading_frames
 
 _COMMAND_LONG: Final = 76
 _COMMAND: Final = Struct("<28xH")

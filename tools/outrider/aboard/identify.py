@@ -6,10 +6,10 @@ from companion.flight.autopilots import Profile
 from companion.flight.autopilots.known import KNOWN, profile_of
 from companion.telemetry.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from companion.values.components import AUTOPILOT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import Heartbeat, Source
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.signing import Signing
 from outrider.errors import InputError
 
 _BEAT = 1_000_000

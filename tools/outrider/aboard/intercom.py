@@ -9,9 +9,9 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.links.link import LinkCounters
 from mavlink_bridge.messages import CommandAck
+from mavlink_bridge.wire.codec import Codec
 from outrider.aboard.orders import OPERATOR
 
 _MOST: Final = 65536

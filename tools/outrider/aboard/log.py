@@ -12,8 +12,8 @@ from types import TracebackType
 from typing import Final, NamedTuple, Self
 
 from mavlink_bridge.errors import LogError
+from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.runtime import Direction
 from outrider.recorder import Recorder
 
 BATCH: Final = 16

@@ -11,10 +11,10 @@ from companion.flight.autopilots import Profile
 from companion.flight.autopilots.known import KNOWN, profile_of
 from companion.telemetry.sharing import AUTOPILOT_INVALID
 from companion.values.components import AUTOPILOT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.messages import Heartbeat
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider.aboard.gauge import gauge_for
 from outrider.aboard.likeness import likeness
 from outrider.aboard.request import Request

@@ -9,9 +9,9 @@ from companion.flight.orders import NAV_LOITER_UNLIM, NAV_RETURN
 from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
 from companion.telemetry.reception import LINKS
 from companion.values.components import COMPONENT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import CommandLong, Source
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.signing import Signing
 
 OPERATOR = 190
 """MAV_COMP_ID_MISSIONPLANNER, under the vehicle's own system id: no ground station's."""

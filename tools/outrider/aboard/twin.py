@@ -7,9 +7,9 @@ from collections import OrderedDict
 from typing import Final
 
 from companion.values.components import COMPONENT
-from mavlink_bridge.clock import Clock
-from mavlink_bridge.framing import leading_frames
-from mavlink_bridge.header import Header
+from mavlink_bridge.loops.clock import Clock
+from mavlink_bridge.wire.framing import leading_frames
+from mavlink_bridge.wire.header import Header
 
 REMEMBERED: Final = 4096
 """Frames; more than a link says until its echo is back."""

@@ -13,14 +13,14 @@ from typing import Final
 
 from companion.dry_run import DryRun
 from companion.node import Companion
-from mavlink_bridge.clock import Clock, WallClock
-from mavlink_bridge.followed_clock import FollowedClock
-from mavlink_bridge.garbage import IdleCollector
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.priority import ask_for_priority, sharpen_timers
-from mavlink_bridge.realtime import RealTime
-from mavlink_bridge.runtime import Scheduled
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.loops.clock import Clock, WallClock
+from mavlink_bridge.loops.followed_clock import FollowedClock
+from mavlink_bridge.loops.garbage import IdleCollector
+from mavlink_bridge.loops.lockstep import Scheduled
+from mavlink_bridge.loops.priority import ask_for_priority, sharpen_timers
+from mavlink_bridge.loops.realtime import RealTime
+from mavlink_bridge.wire.signing import Signing
 from outrider.aboard.cockpit import Cockpit
 from outrider.aboard.departures import Departures
 from outrider.aboard.harmless import HarmlessLink

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from mavlink_bridge.plan_wire import Integers, WirePlan
+from mavlink_bridge.wire.plan import Integers, WirePlan
 
 
 class Terms(NamedTuple):

@@ -12,7 +12,7 @@ from itertools import zip_longest
 from typing import NamedTuple
 
 from companion.avoidance.certified.committed import carried_on, rests
-from mavlink_bridge.plan_wire import WirePlan, pack
+from mavlink_bridge.wire.plan import WirePlan, pack
 from outrider.certify.evidence import Finding, Log, Sighting, Terms
 
 _FAR = 4

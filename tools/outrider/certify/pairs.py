@@ -16,7 +16,7 @@ import numpy as np
 from companion.avoidance.certified.committed import carried_on, controls
 from companion.avoidance.certified.separating_planes import hull_distance
 from companion.values.horizon import Array
-from mavlink_bridge.plan_wire import WirePlan
+from mavlink_bridge.wire.plan import WirePlan
 from outrider.certify.evidence import Finding, Terms
 from outrider.certify.histories import History, Kind
 

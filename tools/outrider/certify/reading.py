@@ -6,15 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.avoidance.certified.margins import between
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE as PLAN
-from mavlink_bridge.plan_wire import unpack as unpack_plan
-from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
-from mavlink_bridge.roster_wire import unpack as unpack_roster
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
+from mavlink_bridge.wire.plan import unpack as unpack_plan
+from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.wire.roster import unpack as unpack_roster
 from outrider import names
 from outrider.certify.evidence import Evidence, Garbled, Log, Sighting, Terms, Word
 from outrider.companion_settings import settings_of

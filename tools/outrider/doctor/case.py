@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from companion.flight.autopilots import Profile
 from mavlink_bridge.messages import ParamValue, Source
-from mavlink_bridge.param_value import number_of
+from mavlink_bridge.wire.param_value import number_of
 from outrider.doctor.hearing import Hearing
 from outrider.doctor.speaker import Speaker
 

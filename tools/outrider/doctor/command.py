@@ -8,14 +8,14 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
-from mavlink_bridge.clock import Clock, WallClock
 from mavlink_bridge.errors import EndpointError, LinkError, LogError
-from mavlink_bridge.framing import Frame, frame_at
 from mavlink_bridge.links.endpoints import Endpoint, Replay, Serial, parse_endpoint
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.signing import Signing
-from mavlink_bridge.tlog import TlogReader
+from mavlink_bridge.loops.clock import Clock, WallClock
+from mavlink_bridge.tlog.log import TlogReader
+from mavlink_bridge.wire.framing import Frame, frame_at
+from mavlink_bridge.wire.signing import Signing
 from outrider.console import share_progress
 from outrider.doctor.consultation import Consultation
 from outrider.doctor.examination import Examination

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.framing import Framer
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import Framer
+from mavlink_bridge.wire.signing import Signing
 from outrider.doctor.examination import Examination
 from outrider.doctor.px4_events import genuine
 from outrider.doctor.questions import Questions

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from mavlink_bridge.converters import BY_ID
-from mavlink_bridge.framing import Frame
 from mavlink_bridge.messages import Source
+from mavlink_bridge.wire.converters import BY_ID
+from mavlink_bridge.wire.framing import Frame
 from outrider.doctor.speaker import Speaker
 
 MOST: Final = 128

@@ -12,7 +12,7 @@ from typing import Final
 
 from fastcrc.crc16 import mcrf4xx
 
-from mavlink_bridge.framing import SIGNATURE_LENGTH, Frame
+from mavlink_bridge.wire.framing import SIGNATURE_LENGTH, Frame
 
 EVENT: Final = 410
 CRC_EXTRA: Final = b"\xa0"

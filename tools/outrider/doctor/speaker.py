@@ -6,7 +6,6 @@ from collections import deque
 from typing import Final, TypeVar, cast
 
 from companion.flight.vehicle import INVALID, PREARM_OK, Vehicle
-from mavlink_bridge.framing import Frame
 from mavlink_bridge.messages import (
     Attitude,
     AttitudeQuaternion,
@@ -26,6 +25,7 @@ from mavlink_bridge.messages import (
     SysStatus,
     SystemTime,
 )
+from mavlink_bridge.wire.framing import Frame
 from outrider.doctor.boot_clock import BootClock
 from outrider.doctor.condition import Condition
 from outrider.doctor.px4_events import reason

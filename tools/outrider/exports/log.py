@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.framing import Flaw, frame_at
-from mavlink_bridge.signing import SETUP_SIGNING
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.framing import Flaw, frame_at
+from mavlink_bridge.wire.signing import SETUP_SIGNING
 from outrider.exports.dialect import Kind, kind
 
 LATEST: Final = (1 << 63) // 1000 - 1

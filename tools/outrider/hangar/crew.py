@@ -9,8 +9,8 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Final
 
-from mavlink_bridge.clock import PacedClock, WallClock
 from mavlink_bridge.links.link import Link
+from mavlink_bridge.loops.clock import PacedClock, WallClock
 from outrider.errors import OutriderError
 from outrider.hangar.board import Board
 from outrider.hangar.request import Request

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Final, Literal, cast, get_args
 
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.key import Key
 from mavlink_bridge.messages import Vector
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.key import Key
+from mavlink_bridge.wire.signing import Signing
 from outrider.errors import InputError
 from outrider.key_files import key_of
 from outrider.options import wind_of

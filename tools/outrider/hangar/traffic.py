@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from mavlink_bridge.framing import STARTS, claimed_length
+from mavlink_bridge.wire.framing import STARTS, claimed_length
 
 _STATUSTEXT: Final = 253
 _HEADER: Final = 10

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from mavlink_bridge.clock import PacedClock, WallClock
-from mavlink_bridge.garbage import IdleCollector
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.priority import sharpen_timers
-from mavlink_bridge.realtime import RealTime
-from mavlink_bridge.runtime import Scheduled
+from mavlink_bridge.loops.clock import PacedClock, WallClock
+from mavlink_bridge.loops.garbage import IdleCollector
+from mavlink_bridge.loops.lockstep import Scheduled
+from mavlink_bridge.loops.priority import sharpen_timers
+from mavlink_bridge.loops.realtime import RealTime
 from outrider.hangar.board import Board, Pace
 from outrider.hangar.cabinet import Cabinet
 from outrider.hangar.clients import Clients

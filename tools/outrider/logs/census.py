@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from mavlink_bridge.tlog import TlogReport
+from mavlink_bridge.tlog.log import TlogReport
 
 NO_AUTOPILOT = 8
 """MAV_AUTOPILOT_INVALID: a component that is no autopilot."""

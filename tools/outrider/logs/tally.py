@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable
 from itertools import islice
 from pathlib import Path
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.framing import SIGNED_FLAG, START_V2
 from mavlink_bridge.messages import Heartbeat
-from mavlink_bridge.tlog import Record, TlogReader
+from mavlink_bridge.tlog.log import Record, TlogReader
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import SIGNED_FLAG, START_V2
 from outrider.logs.census import NO_AUTOPILOT, Census, Gaps, Vehicle
 
 SHORTEST_GAP = 1 << 21

@@ -14,10 +14,10 @@ from types import FrameType
 import numpy as np
 
 from companion.planning import Tally
-from mavlink_bridge.clock import WallClock
-from mavlink_bridge.histogram import Histogram
-from mavlink_bridge.realtime import RealTime
-from mavlink_bridge.runtime import Scheduled
+from mavlink_bridge.loops.clock import WallClock
+from mavlink_bridge.loops.histogram import Histogram
+from mavlink_bridge.loops.lockstep import Scheduled
+from mavlink_bridge.loops.realtime import RealTime
 from outrider import names
 from outrider.conductor import PREPARE_CAP, Conductor, Sight, Stage
 from outrider.disturbances import Event, events, strike_computer

@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from mavlink_bridge.channel import Channel
-from mavlink_bridge.clock import Clock
+from mavlink_bridge.loops.clock import Clock
+from mavlink_bridge.loops.lockstep import Scheduled
+from mavlink_bridge.loops.node_clock import QUANTUM, NodeClock
+from mavlink_bridge.network.channel import Channel
 from mavlink_bridge.node import Node
-from mavlink_bridge.node_clock import QUANTUM, NodeClock
-from mavlink_bridge.runtime import Scheduled
 from outrider import names
 from outrider.disturbances import events
 from outrider.fleet import Fleet

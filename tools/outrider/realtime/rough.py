@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from mavlink_bridge.ether import Channel, Ether
-from mavlink_bridge.header import sending_system
+from mavlink_bridge.loops.lockstep import Direction, Tap
+from mavlink_bridge.network.simulated import Channel, Ether
 from mavlink_bridge.node import Datagram, Node
-from mavlink_bridge.runtime import Direction, Tap
+from mavlink_bridge.wire.header import sending_system
 from outrider import names
 
 

@@ -18,13 +18,13 @@ from companion.avoidance.field.plan_log import PlanLog
 from companion.node import Companion
 from companion.planning import Tally
 from companion.values.phase import Phase
-from mavlink_bridge.clock import Clock
-from mavlink_bridge.garbage import IdleCollector
-from mavlink_bridge.histogram import Histogram
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.priority import LEVEL, ask_for_priority, sharpen_timers
-from mavlink_bridge.realtime import RealTime
-from mavlink_bridge.runtime import Scheduled, Tap
+from mavlink_bridge.loops.clock import Clock
+from mavlink_bridge.loops.garbage import IdleCollector
+from mavlink_bridge.loops.histogram import Histogram
+from mavlink_bridge.loops.lockstep import Scheduled, Tap
+from mavlink_bridge.loops.priority import LEVEL, ask_for_priority, sharpen_timers
+from mavlink_bridge.loops.realtime import RealTime
 from outrider import names
 from outrider.bystander import Bystander
 from outrider.disturbances import Event, strike_autopilot, strike_computer

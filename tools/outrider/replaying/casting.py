@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.values.components import AUTOPILOT, COMPONENT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.header import header
 from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, LocalPosition, Source
-from mavlink_bridge.tlog import Record
+from mavlink_bridge.tlog.log import Record
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.header import header
 from outrider.errors import Fault, InputError
 from outrider.replaying.timeline import on_one_line
 

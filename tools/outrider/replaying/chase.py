@@ -8,10 +8,10 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from companion.config import CompanionConfig
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.header import header
 from mavlink_bridge.messages import SetpointLocal
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.header import header
 from outrider import swarm
 from outrider.errors import InputError
 from outrider.replaying.casting import SETPOINT, Survey

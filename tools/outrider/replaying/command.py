@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Message
+from mavlink_bridge.wire.codec import Codec
 from outrider.console import share_progress
 from outrider.replaying.reenactment import Difference, Reenacted, Sent
 from outrider.replaying.runs import again

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.tlog import Record, read_tlog
+from mavlink_bridge.tlog.log import Record, read_tlog
 from outrider import names
 from outrider.console import progress, share_progress
 from outrider.errors import InputError

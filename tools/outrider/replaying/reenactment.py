@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import zip_longest
 from typing import NamedTuple
 
-from mavlink_bridge.framing import leading_frames
-from mavlink_bridge.header import header
 from mavlink_bridge.node import Datagram, Node
-from mavlink_bridge.tlog import Record
+from mavlink_bridge.tlog.log import Record
+from mavlink_bridge.wire.framing import leading_frames
+from mavlink_bridge.wire.header import header
 from outrider import names
 
 _LINKS = {number: link for link, number in names.LINK_NUMBERS.items()}

@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 
 from companion.config import CompanionConfig
 from companion.shadow import ShadowCompanion
-from mavlink_bridge.clock import SimulatedClock
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame, enu_to_ned
-from mavlink_bridge.header import header
+from mavlink_bridge.loops.clock import SimulatedClock
+from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.messages import (
     GlobalPosition,
     GpsGlobalOrigin,
@@ -22,7 +20,9 @@ from mavlink_bridge.messages import (
     Source,
 )
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.tlog import Record
+from mavlink_bridge.tlog.log import Record
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.header import header
 from outrider.aboard.cockpit import Cockpit
 from outrider.beacon import Beacon
 from outrider.paths import Motion

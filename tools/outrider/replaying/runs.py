@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.values.components import COMPONENT
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
 from outrider import names
 from outrider.errors import Fault, InputError
 from outrider.fleet import Fleet

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from mavlink_bridge.tlog import Record
+from mavlink_bridge.tlog.log import Record
 
 IDLE = 5_000_000
 """µs of silence that are gone through; what is longer is skipped where nobody has to notice it."""

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.messages import CommandAck, Heartbeat, LocalPosition, Message, StatusText
-from mavlink_bridge.tlog import Record, TlogReport, read_tlog
+from mavlink_bridge.tlog.log import Record, TlogReport, read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider import names
 from outrider.report.run import Log, Sender, Stream, Times, Utterance
 

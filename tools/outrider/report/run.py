@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavlink_bridge.messages import CommandAck, Heartbeat, StatusText
-from mavlink_bridge.tlog import TlogReport
+from mavlink_bridge.tlog.log import TlogReport
 from outrider.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.messages import Heartbeat
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
 from outrider import names
 from outrider.replaying.chase import setpoints
 from outrider.replaying.rehearsal import Rehearsed

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
 from outrider import swarm
 from outrider.errors import InputError
 from outrider.replaying.casting import Cast, check, survey

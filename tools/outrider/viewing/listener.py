@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.avoidance.certified.committed import horizon_of
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu, yaw_to_enu
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, NamedValue, Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
-from mavlink_bridge.roster_wire import PAYLOAD_TYPE as ROSTER
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
+from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 from outrider.hangar.modes import is_armed, told_mode
 from outrider.viewing.moment import NO_PLAN, Array, Moment, Single, State, euler_attitude, padded
 from outrider.viewing.scene import LEAST_REACH, Scene

@@ -13,11 +13,11 @@ import numpy as np
 from companion.avoidance.certified.committed import horizon_of
 from companion.flight.vehicle import HEARTBEAT_LOST
 from companion.values.components import AUTOPILOT
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, Source, Tunnel
-from mavlink_bridge.plan_wire import PAYLOAD_TYPE, unpack
-from mavlink_bridge.tlog import read_tlog
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 from outrider import names
 from outrider.hangar.modes import is_armed, told_mode
 from outrider.viewing.moment import NO_PLAN, Array, Single, euler_attitude, padded

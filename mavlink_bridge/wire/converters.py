@@ -18,12 +18,12 @@ from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.fields import flight as f
-from mavlink_bridge.fields import missions as w
-from mavlink_bridge.fields import services as p
-from mavlink_bridge.fields import status as q
-from mavlink_bridge.fields import surroundings as r
-from mavlink_bridge.fields.units import Fields, unchanged
+from mavlink_bridge.wire.fields import flight as f
+from mavlink_bridge.wire.fields import missions as w
+from mavlink_bridge.wire.fields import services as p
+from mavlink_bridge.wire.fields import status as q
+from mavlink_bridge.wire.fields import surroundings as r
+from mavlink_bridge.wire.fields.units import Fields, unchanged
 
 
 class Converter(NamedTuple):

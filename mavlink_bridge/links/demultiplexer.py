@@ -8,9 +8,9 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Final, Protocol
 
-from mavlink_bridge.framing import Framer
-from mavlink_bridge.header import Header
 from mavlink_bridge.links.link import BURST, WAITING, Link, LinkCounters
+from mavlink_bridge.wire.framing import Framer
+from mavlink_bridge.wire.header import Header
 
 Wants = Callable[[Header], bool]
 ROOM: Final = 1 << 20

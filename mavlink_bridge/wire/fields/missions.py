@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.fields.units import Fields
+from mavlink_bridge.wire.fields.units import Fields
 
 
 def item(s: m.Source, f: Fields) -> m.MissionItem:

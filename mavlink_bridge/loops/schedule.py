@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mavlink_bridge.errors import ScheduleError
+from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.node import Node
-from mavlink_bridge.node_clock import NodeClock
 
 
 class Slot:

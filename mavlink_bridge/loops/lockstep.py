@@ -9,10 +9,10 @@ from itertools import pairwise
 from typing import Literal, NamedTuple, Protocol
 
 from mavlink_bridge.errors import ScheduleError
-from mavlink_bridge.ether import Ether
+from mavlink_bridge.loops.node_clock import QUANTUM, NodeClock
+from mavlink_bridge.loops.schedule import Slot
+from mavlink_bridge.network.simulated import Ether
 from mavlink_bridge.node import Datagram, Node
-from mavlink_bridge.node_clock import QUANTUM, NodeClock
-from mavlink_bridge.slot import Slot
 
 __all__ = ["BUFFER", "QUANTUM", "Direction", "LockStep", "Scheduled", "Tap"]
 

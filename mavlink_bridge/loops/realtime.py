@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Final, NamedTuple
 
-from mavlink_bridge.clock import Clock, SkewedClock
-from mavlink_bridge.deadlines import Deadlines
 from mavlink_bridge.errors import ScheduleError
-from mavlink_bridge.histogram import Histogram, Spread
-from mavlink_bridge.inbox import CAPACITY, Inbox
 from mavlink_bridge.links.link import Link
+from mavlink_bridge.loops.clock import Clock, SkewedClock
+from mavlink_bridge.loops.deadlines import Deadlines
+from mavlink_bridge.loops.histogram import Histogram, Spread
+from mavlink_bridge.loops.inbox import CAPACITY, Inbox
+from mavlink_bridge.loops.lockstep import Direction, Scheduled, Tap
+from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.node_clock import NodeClock
-from mavlink_bridge.runtime import Direction, Scheduled, Tap
 
 _NAP: Final = 100_000
 # µs; someone who wants the loop to stop waits no longer than this and one step.

@@ -13,8 +13,8 @@ from random import Random
 from typing import NamedTuple
 from zlib import crc32
 
-from mavlink_bridge.channel import Channel, Faults
 from mavlink_bridge.errors import BridgeError
+from mavlink_bridge.network.channel import Channel, Faults
 from mavlink_bridge.node import Datagram
 
 __all__ = ["Channel", "Ether", "EtherCounters", "Faults"]

@@ -18,7 +18,8 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.framing import (
+from mavlink_bridge.tlog.stretch import Record, Stretch, leading_records
+from mavlink_bridge.wire.framing import (
     LONGEST_FRAME,
     STARTS,
     Flaw,
@@ -28,8 +29,7 @@ from mavlink_bridge.framing import (
     leading_frames,
     without_signature,
 )
-from mavlink_bridge.signing import SETUP_SIGNING
-from mavlink_bridge.tlog_stretch import Record, Stretch, leading_records
+from mavlink_bridge.wire.signing import SETUP_SIGNING
 
 __all__ = ["LINKS", "PLAUSIBLE_JUMP", "Record", "TlogReader", "TlogReport", "TlogWriter", "read_tlog"]
 

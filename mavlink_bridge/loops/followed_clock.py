@@ -20,7 +20,7 @@ from itertools import pairwise
 from threading import Lock
 from typing import Final, NamedTuple
 
-from mavlink_bridge.clock import Clock
+from mavlink_bridge.loops.clock import Clock
 
 _PIECE: Final = 250_000
 """µs of the wall; of each piece the stamp that took the shortest way counts."""

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
-from mavlink_bridge.converters import BY_ID, BY_TYPE, Converter
 from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.fields.flight import TEXT_LENGTH, text_chunks
-from mavlink_bridge.framing import SIGNED_FLAG, Frame, Framer, frame_v1, frame_v2
 from mavlink_bridge.messages import Message, Source, StatusText
-from mavlink_bridge.signing import Signing
+from mavlink_bridge.wire.converters import BY_ID, BY_TYPE, Converter
+from mavlink_bridge.wire.fields.flight import TEXT_LENGTH, text_chunks
+from mavlink_bridge.wire.framing import SIGNED_FLAG, Frame, Framer, frame_v1, frame_v2
+from mavlink_bridge.wire.signing import Signing
 
 Accept = Callable[[int, int, int], bool]
 

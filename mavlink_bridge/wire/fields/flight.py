@@ -6,7 +6,7 @@ from math import degrees, isfinite, radians, remainder, tau
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.fields.units import FULL_CIRCLE_CDEG, UNKNOWN_U16, Fields, degrees_e7, on_globe
+from mavlink_bridge.wire.fields.units import FULL_CIRCLE_CDEG, UNKNOWN_U16, Fields, degrees_e7, on_globe
 
 TEXT_LENGTH = 50
 TUNNEL_LENGTH = 128

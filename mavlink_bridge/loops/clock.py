@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-from mavlink_bridge.node_clock import NodeClock
+from mavlink_bridge.loops.node_clock import NodeClock
 
 
 class Clock(Protocol):

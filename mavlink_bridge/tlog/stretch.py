@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
 
-from mavlink_bridge.framing import CRC_EXTRA, SIGNATURE_LENGTH, SIGNED_FLAG, START_V1, START_V2
+from mavlink_bridge.wire.framing import CRC_EXTRA, SIGNATURE_LENGTH, SIGNED_FLAG, START_V1, START_V2
 
 SHORTEST_RECORD = 16
 """Bytes: a stamp and a version 1 frame without payload."""
