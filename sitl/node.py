@@ -19,46 +19,46 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_TYPE
 from mavlink_bridge.wire.packing import parcels
 from mavlink_bridge.wire.signing import Signing
-from sitl.airframe import hover_speeds
-from sitl.autopilot_config import AutopilotConfig
-from sitl.battery import Battery
-from sitl.commander import Commander
-from sitl.config import VehicleConfig
-from sitl.failsafes import Failsafes
-from sitl.failures import Failures
-from sitl.fences import Fences
-from sitl.flavours import Flavour, Mode
-from sitl.flavours.ardupilot import ArduPilot
-from sitl.flavours.px4 import Px4
-from sitl.following import Following
-from sitl.gauges import Gauges
-from sitl.guidance import Guidance
-from sitl.home import Home
-from sitl.homing import Homing
-from sitl.journeys import Journeys
-from sitl.maneuvers import Maneuvers
-from sitl.missions.itinerary import Itinerary
-from sitl.missions.plans import Plans
-from sitl.missions.service import MissionService
-from sitl.orders import Orders
-from sitl.origin import Origin
-from sitl.parameters import ardupilot as ardupilot_parameters
-from sitl.parameters import px4 as px4_parameters
-from sitl.parameters.values import Values
-from sitl.plant import Plant
-from sitl.reception import Reception
-from sitl.reports import HEARTBEAT, ORIGIN
-from sitl.returning import Returning
-from sitl.saved import Saved
-from sitl.sensors import Estimate
-from sitl.services import Services
-from sitl.steering import Steering
-from sitl.streams import usual_rates
-from sitl.telemetry import Telemetry
-from sitl.trust import Trust
-from sitl.vehicle import Reference, VehicleState
-from sitl.voice import Voice
-from sitl.weather import WeatherConfig
+from sitl.autopilot.autonomous_modes import Journeys
+from sitl.autopilot.command_protocol import Orders
+from sitl.autopilot.commander import Commander
+from sitl.autopilot.failsafes import Failsafes
+from sitl.autopilot.failures import Failures
+from sitl.autopilot.fences import Fences
+from sitl.autopilot.firmware import Flavour, Mode
+from sitl.autopilot.firmware.ardupilot import ArduPilot
+from sitl.autopilot.firmware.px4 import Px4
+from sitl.autopilot.following import Following
+from sitl.autopilot.guidance import Guidance
+from sitl.autopilot.home_commands import Homing
+from sitl.autopilot.maneuvers import Maneuvers
+from sitl.autopilot.missions.itinerary import Itinerary
+from sitl.autopilot.missions.plans import Plans
+from sitl.autopilot.missions.service import MissionService
+from sitl.autopilot.parameters import ardupilot as ardupilot_parameters
+from sitl.autopilot.parameters import px4 as px4_parameters
+from sitl.autopilot.parameters.values import Values
+from sitl.autopilot.plant import Plant
+from sitl.autopilot.reception import Reception
+from sitl.autopilot.returning import Returning
+from sitl.autopilot.saved import Saved
+from sitl.autopilot.services import Services
+from sitl.autopilot.setpoint_reception import Steering
+from sitl.autopilot.trust import Trust
+from sitl.config.autopilot import AutopilotConfig
+from sitl.environment.weather import WeatherConfig
+from sitl.estimation.sensors import Estimate
+from sitl.snapshot import Gauges
+from sitl.telemetry.reports import HEARTBEAT, ORIGIN
+from sitl.telemetry.schedule import Telemetry
+from sitl.telemetry.status_text import Voice
+from sitl.telemetry.streams import usual_rates
+from sitl.values.home import Home
+from sitl.values.origin import Origin
+from sitl.vehicle.airframe import hover_speeds
+from sitl.vehicle.battery import Battery
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.multirotor import Reference, VehicleState
 
 LINK: Final = "autopilot"
 """The one link of the node."""

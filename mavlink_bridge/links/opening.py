@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.endpoints import (
     Endpoint,
     Multicast,
@@ -18,7 +19,6 @@ from mavlink_bridge.links.replay import ReplayLink
 from mavlink_bridge.links.serial_port import SerialPort
 from mavlink_bridge.links.tcp import TcpCaller, TcpListener
 from mavlink_bridge.links.udp import MulticastLink, UdpCaller, UdpListener
-from mavlink_bridge.loops.clock import Clock
 
 
 def open_link(endpoint: Endpoint | str, clock: Clock) -> Link:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.links.endpoints import Replay
 from mavlink_bridge.links.link import BURST, LinkCounters
-from mavlink_bridge.loops.clock import Clock
 from mavlink_bridge.tlog.log import Record, read_tlog
 
 

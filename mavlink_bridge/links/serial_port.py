@@ -7,11 +7,11 @@ import sys
 from array import array
 from typing import Final
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.links.endpoints import Serial
 from mavlink_bridge.links.hosts import because
 from mavlink_bridge.links.streams import StreamLink
-from mavlink_bridge.loops.clock import Clock
 
 if sys.platform != "win32":
     import fcntl

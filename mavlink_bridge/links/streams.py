@@ -6,9 +6,9 @@ import selectors
 from threading import Lock
 from typing import Any, Final
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import LinkCounters
 from mavlink_bridge.links.stream import Stream
-from mavlink_bridge.loops.clock import Clock
 
 RETRY: Final = 1_000_000
 """µs between two attempts to get a lost connection back."""

@@ -7,11 +7,11 @@ import socket
 from contextlib import suppress
 from typing import Any, Final
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.links.endpoints import TcpIn, TcpOut
 from mavlink_bridge.links.hosts import because, resolved
 from mavlink_bridge.links.streams import StreamLink
-from mavlink_bridge.loops.clock import Clock
 
 MOST_CALLERS: Final = 32
 BACKLOG: Final = 65536

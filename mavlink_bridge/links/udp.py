@@ -6,11 +6,11 @@ import socket
 from ipaddress import IPv4Address
 from typing import Any, Final
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.links.endpoints import Multicast, UdpIn, UdpOut
 from mavlink_bridge.links.hosts import because, resolved
 from mavlink_bridge.links.link import BURST, LinkCounters
-from mavlink_bridge.loops.clock import Clock
 
 Address = tuple[Any, ...]
 """As the socket module writes it: (host, port, …)."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from mavlink_bridge.clocks.node_clock import QUANTUM
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.loops.histogram import Histogram
-from mavlink_bridge.loops.node_clock import QUANTUM
 
 
 class Deadlines:

@@ -8,8 +8,8 @@ from heapq import heapify, heapreplace
 from itertools import pairwise
 from typing import Literal, NamedTuple, Protocol
 
+from mavlink_bridge.clocks.node_clock import QUANTUM, NodeClock
 from mavlink_bridge.errors import ScheduleError
-from mavlink_bridge.loops.node_clock import QUANTUM, NodeClock
 from mavlink_bridge.loops.schedule import Slot
 from mavlink_bridge.network.simulated import Ether
 from mavlink_bridge.node import Datagram, Node

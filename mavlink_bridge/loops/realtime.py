@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Final, NamedTuple
 
+from mavlink_bridge.clocks.clock import Clock, SkewedClock
+from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.loops.clock import Clock, SkewedClock
 from mavlink_bridge.loops.deadlines import Deadlines
 from mavlink_bridge.loops.histogram import Histogram, Spread
 from mavlink_bridge.loops.inbox import CAPACITY, Inbox
 from mavlink_bridge.loops.lockstep import Direction, Scheduled, Tap
-from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.node import Datagram
 
 _NAP: Final = 100_000

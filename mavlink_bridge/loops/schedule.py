@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.errors import ScheduleError
-from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.node import Node
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages.source import Source, Vector
-from mavlink_bridge.wire.key import Key
 
 
 class SetMode(NamedTuple):

@@ -11,8 +11,8 @@ from collections.abc import Collection
 from enum import Enum
 from typing import Final
 
+from mavlink_bridge.key import Key
 from mavlink_bridge.wire.framing import Frame
-from mavlink_bridge.wire.key import Key
 
 EPOCH: Final = 1_420_070_400_000_000
 """Unix time of the stamp 0, 2015-01-01 (µs)."""

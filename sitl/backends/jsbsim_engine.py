@@ -18,12 +18,12 @@ from mavlink_bridge.messages import Vector
 from sitl.backends.jsbsim_model import FOOT, aircraft, command_property, left_property, motor_property
 from sitl.backends.jsbsim_place import euler_angles, rotation_of
 from sitl.backends.physics import BackendError
-from sitl.config import VehicleConfig
-from sitl.pipeline import STATE_SIZE
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.pipeline import STATE_SIZE
 
 if TYPE_CHECKING:
-    from sitl.airframe import FloatArray
     from sitl.backends.jsbsim_place import Place
+    from sitl.vehicle.airframe import FloatArray
 
 MEASURED: Final = (
     *(f"position/ecef-{axis}-ft" for axis in "xyz"),
@@ -72,8 +72,8 @@ class Engine:
     def __init__(
         self, config: VehicleConfig, place: Place, state: FloatArray, ground: float, air: Air
     ) -> None:
-        """At the motion and the motor speeds of a ``state`` row (as in ``sitl.pipeline``; site NED). The
-        ground is at z = ``ground`` (m) there and level all around. Raises BackendError."""
+        """At the motion and the motor speeds of a ``state`` row (as in ``sitl.vehicle.pipeline``; site NED).
+        The ground is level at z = ``ground`` (m) there. Raises BackendError."""
         n = len(config.rotors)
         self._name = config.name
         self._fdm = _loaded(config, isa=air.isa)

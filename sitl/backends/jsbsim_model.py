@@ -15,8 +15,8 @@ import math
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from sitl.config import Rotor, VehicleConfig
-from sitl.environment import GRAVITY
+from sitl.vehicle.config import Rotor, VehicleConfig
+from sitl.vehicle.ground import GRAVITY
 
 FOOT: Final = 0.3048
 """m."""
@@ -155,7 +155,7 @@ def _motors(root: Element, config: VehicleConfig) -> None:
 
 
 def _aerodynamics(root: Element, config: VehicleConfig, *, isa: bool) -> None:
-    """The rotors' wrench, the RotorS model as in ``sitl.rotors``: thrust k_f ω² along −b3, torque k_m times
+    """The rotors' wrench, the RotorS model as in ``sitl.vehicle.rotors``: thrust k_f ω² along −b3, torque k_m times
     it, and −c ω v⊥ for drag and for the rolling moment, v⊥ being the velocity of the hub through the air."""
     aerodynamics = SubElement(root, "aerodynamics")
     density: tuple[str, ...] = ("atmosphere/sigma",) if isa else ()

@@ -1,6 +1,6 @@
 """The compiled part of the JSBSim backend: what JSBSim measures → state row → speeds asked of the motors.
 
-Rows are those of ``sitl.pipeline``; controller, allocation and observer are its kernels. A *place* row has 12
+Rows are those of ``sitl.vehicle.pipeline``; controller, allocation and observer are its kernels. A *place* row has 12
 columns: the origin of the site 0:3 (m, earth-centred, earth-fixed) and, row by row, the rotation 3:12 from
 there to the site's NED. A *measured* row is that of ``jsbsim_engine``.
 """
@@ -13,15 +13,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.airframe import FloatArray
 from sitl.backends.jsbsim_model import FOOT, POUND
-from sitl.body import Quaternion
-from sitl.compiled import entry, kernel, sources_digest
-from sitl.lanes import put_three, three_at
-from sitl.observer import observed
-from sitl.pipeline import FLYING, LANDED, STATE_SIZE, command_motors
-from sitl.rotors import wrench
-from sitl.vectors import Axes, Vector, plus, times, to_body, to_ned
+from sitl.vehicle.airframe import FloatArray
+from sitl.vehicle.body import Quaternion
+from sitl.vehicle.compiled import entry, kernel, sources_digest
+from sitl.vehicle.observer import observed
+from sitl.vehicle.pipeline import FLYING, LANDED, STATE_SIZE, command_motors
+from sitl.vehicle.rotors import wrench
+from sitl.vehicle.simd import put_three, three_at
+from sitl.vehicle.vectors import Axes, Vector, plus, times, to_body, to_ned
 
 
 @kernel

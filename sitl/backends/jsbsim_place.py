@@ -11,7 +11,7 @@ from pymap3d import Ellipsoid
 from pymap3d.ecef import enu2uvw, geodetic2ecef
 
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
-from sitl.airframe import FloatArray
+from sitl.vehicle.airframe import FloatArray
 
 _WGS84 = Ellipsoid.from_name("wgs84")
 

@@ -6,15 +6,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mavlink_bridge.messages import Vector
-from sitl.airframe import FloatArray, airframe, airframe_record
 from sitl.backends.jsbsim_engine import STILL, Air, Engine
 from sitl.backends.jsbsim_pilot import sense, steer
 from sitl.backends.jsbsim_place import Place
 from sitl.backends.physics import BackendError
-from sitl.config import VehicleConfig
-from sitl.environment import GRAVITY
-from sitl.pipeline import COMMAND_SIZE, LANDED
-from sitl.vehicle import NotFiniteError, Reference, VehicleState, checked_rotor, state_of, write_command
+from sitl.vehicle.airframe import FloatArray, airframe, airframe_record
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.ground import GRAVITY
+from sitl.vehicle.multirotor import (
+    NotFiniteError,
+    Reference,
+    VehicleState,
+    checked_rotor,
+    state_of,
+    write_command,
+)
+from sitl.vehicle.pipeline import COMMAND_SIZE, LANDED
 
 
 class JsbsimVehicle:

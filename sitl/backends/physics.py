@@ -7,9 +7,9 @@ from typing import Literal, Protocol
 from numpy.typing import ArrayLike
 
 from mavlink_bridge.messages import Vector
-from sitl.airframe import FloatArray
-from sitl.config import VehicleConfig
-from sitl.vehicle import Reference, VehicleState
+from sitl.vehicle.airframe import FloatArray
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.multirotor import Reference, VehicleState
 
 PhysicsName = Literal["own", "jsbsim"]
 

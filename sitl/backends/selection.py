@@ -7,12 +7,12 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from mavlink_bridge.frames import FleetFrame
-from sitl.airframe import FloatArray
 from sitl.backends.physics import Physics, PhysicsName
-from sitl.config import VehicleConfig
-from sitl.turbulence import W20, Severity
-from sitl.vehicle import Vehicle, initial_states
-from sitl.weather import WeatherConfig
+from sitl.environment.turbulence import W20, Severity
+from sitl.environment.weather import WeatherConfig
+from sitl.vehicle.airframe import FloatArray
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.multirotor import Vehicle, initial_states
 
 _STREAM: Final = 0x4A
 _CURVES: Final[dict[Severity, int]] = {"light": 3, "moderate": 4, "severe": 6}

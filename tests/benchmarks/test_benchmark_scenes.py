@@ -14,7 +14,7 @@ from outrider.resources import config_root, find
 from outrider.scenario import Scenario
 from outrider.starts import Starts, starts
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 SEEDS = st.integers(0, 2**31)
 

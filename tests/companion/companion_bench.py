@@ -18,6 +18,7 @@ from companion.node import Companion
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     Attitude,
     CommandAck,
@@ -35,7 +36,6 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import Signing
 
 PROFILES = {"ardupilot": ARDUPILOT, "px4": PX4}

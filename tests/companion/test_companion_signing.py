@@ -6,9 +6,9 @@ import pytest
 from companion_bench import LINKS, TARGET, Bench, seen_at
 
 from companion.values.phase import Phase
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import Signing
 
 KEY, OTHER = Key.of_passphrase("correct horse"), Key.of_passphrase("battery staple")

@@ -12,6 +12,7 @@ from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
 from companion.values.components import COMPONENT
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     CommandLong,
     GpsGlobalOrigin,
@@ -23,7 +24,6 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
 from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 from mavlink_bridge.wire.roster import Roster

@@ -193,7 +193,7 @@ def test_a_core_install_has_neither_compiler_nor_simulator_nor_viewer(core: Inst
         "outrider.scenario",
         "outrider.sweeps.grid",
         "outrider.exports.ulog_export",
-        "sitl.weather",
+        "sitl.environment.weather",
     ],
 )
 def test_what_flies_on_a_vehicle_needs_the_core_alone(core: Installed, module: str) -> None:

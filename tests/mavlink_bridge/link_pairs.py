@@ -8,13 +8,13 @@ import tty
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from mavlink_bridge.clocks.clock import Clock, SimulatedClock
 from mavlink_bridge.links.endpoints import Multicast, Serial, TcpIn, TcpOut, UdpIn, UdpOut
 from mavlink_bridge.links.link import Link, memory_pair
 from mavlink_bridge.links.serial_port import SerialPort
 from mavlink_bridge.links.streams import StreamLink
 from mavlink_bridge.links.tcp import TcpCaller, TcpListener
 from mavlink_bridge.links.udp import MulticastLink, UdpCaller, UdpListener
-from mavlink_bridge.loops.clock import Clock, SimulatedClock
 from mavlink_bridge.messages import Source, Tunnel
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Framer

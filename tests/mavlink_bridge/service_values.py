@@ -25,7 +25,7 @@ from wire_values import (
 )
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.wire.key import Key
+from mavlink_bridge.key import Key
 
 four = st.tuples(f32, f32, f32, f32)
 name = st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=16)

@@ -6,10 +6,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as dialect
 
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import Ping, Source
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Frame, frame_at
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import EPOCH, UNIT, Signing
 
 KEY = Key.of_passphrase("correct horse")

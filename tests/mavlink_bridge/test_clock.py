@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink_bridge.loops.clock import Clock, PacedClock, SimulatedClock, SkewedClock, WallClock
-from mavlink_bridge.loops.node_clock import NodeClock
+from mavlink_bridge.clocks.clock import Clock, PacedClock, SimulatedClock, SkewedClock, WallClock
+from mavlink_bridge.clocks.node_clock import NodeClock
 
 
 def test_simulated_time_jumps_forward_only() -> None:

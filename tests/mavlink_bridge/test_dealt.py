@@ -7,11 +7,11 @@ import socket
 import pytest
 from link_pairs import HOST, frame, frames, gather
 
+from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.links.demultiplexer import Dealer
 from mavlink_bridge.links.endpoints import TcpIn
 from mavlink_bridge.links.link import BURST, memory_pair
 from mavlink_bridge.links.tcp import TcpListener
-from mavlink_bridge.loops.clock import SimulatedClock
 from mavlink_bridge.wire.header import Header
 
 

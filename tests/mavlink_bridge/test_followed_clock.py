@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mavlink_bridge.loops.clock import SimulatedClock
-from mavlink_bridge.loops.followed_clock import FollowedClock
+from mavlink_bridge.clocks.clock import SimulatedClock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 
 SECOND = 1_000_000
 

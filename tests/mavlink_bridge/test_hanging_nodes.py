@@ -8,9 +8,9 @@ from chatter import TICK, Chatter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
-from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.network.simulated import Channel, Ether, Faults
 
 PERIOD = 2 * TICK

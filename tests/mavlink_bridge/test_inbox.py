@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from link_pairs import HOST, frame, frames
 
+from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.links.endpoints import TcpIn
 from mavlink_bridge.links.link import memory_pair
 from mavlink_bridge.links.tcp import TcpListener
-from mavlink_bridge.loops.clock import SimulatedClock
 from mavlink_bridge.loops.inbox import CAPACITY, FINGERS, HANDFUL, ROOM, Inbox
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.framing import LONGEST_FRAME

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mavlink_bridge.errors import KeyFileError
+from mavlink_bridge.key import Key, create_key, read_key
 from mavlink_bridge.messages import SetupSigning, Source
-from mavlink_bridge.wire.key import Key, create_key, read_key
 
 secrets = st.binary(min_size=32, max_size=32)
 

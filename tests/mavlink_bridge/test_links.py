@@ -26,6 +26,7 @@ from link_pairs import (
     wait,
 )
 
+from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.links.endpoints import BAUD_RATES, Multicast, Serial, TcpIn, TcpOut, UdpIn, UdpOut
 from mavlink_bridge.links.opening import open_link
@@ -41,7 +42,6 @@ from mavlink_bridge.links.udp import (
     UdpCaller,
     UdpListener,
 )
-from mavlink_bridge.loops.clock import SimulatedClock
 from mavlink_bridge.messages import Message
 from mavlink_bridge.tlog.log import TlogWriter
 from mavlink_bridge.wire.codec import Codec

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from watching import Event, Watcher
 
+from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
-from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.network.simulated import Channel, Ether, Faults
 
 EPOCH = 1_767_225_600_000_000

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from link_pairs import HOST, frame, udp
 from watching import Watcher
 
+from mavlink_bridge.clocks.clock import SimulatedClock, WallClock
+from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.errors import BridgeError, ScheduleError
 from mavlink_bridge.links.endpoints import UdpIn, UdpOut
 from mavlink_bridge.links.link import Link, LinkCounters, MemoryLink, memory_pair
 from mavlink_bridge.links.udp import UdpCaller, UdpListener
-from mavlink_bridge.loops.clock import SimulatedClock, WallClock
 from mavlink_bridge.loops.inbox import Inbox
 from mavlink_bridge.loops.lockstep import Scheduled
-from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.loops.realtime import RealTime, Statistics
 from mavlink_bridge.node import Datagram
 

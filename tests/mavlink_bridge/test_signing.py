@@ -10,9 +10,9 @@ from signers import KEY, ME, NOW, SECOND, beat, frame_of, peer, signed, signing,
 from test_codec import UNKNOWN_TO_PEER, any_message
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.key import Key
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import SIGNATURE_LENGTH, without_signature
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import LATEST, MINUTE, RADIOS, STREAMS, Refusal, Signing
 
 OTHER = Key.of_passphrase("battery staple")

@@ -14,9 +14,9 @@ from mavlink_bridge.wire.framing import Frame, leading_frames
 from mavlink_bridge.wire.signing import Signing
 from outrider.doctor.consultation import Consultation
 from outrider.doctor.finding import Finding, Severity, Verdict
-from sitl.autopilot_config import AutopilotConfig
-from sitl.battery import BatteryConfig
+from sitl.config.autopilot import AutopilotConfig
 from sitl.node import LINK, Autopilot
+from sitl.vehicle.battery import BatteryConfig
 
 TICK = 20_000
 GCS = Source(255, 190)

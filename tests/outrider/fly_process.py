@@ -19,10 +19,10 @@ import numpy as np
 import yaml
 from test_sitl_command import free_base, sitl
 
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.loops.clock import WallClock
 from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.wire.codec import Codec
 from outrider.beacon import Beacon

@@ -8,7 +8,7 @@ from typing import Any
 from outrider.resources import config_root, find
 from outrider.scenario import Scenario
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 LOGS = config_root() / "logs"
 SCENARIOS = {path.stem: path for path in sorted((config_root() / "scenarios").glob("*.yaml"))}

@@ -12,8 +12,8 @@ from doctor_bench import Bench, autopilot
 from said import Run
 from sitl_process import Sitl
 
+from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.links.link import BURST, LinkCounters
-from mavlink_bridge.loops.clock import SimulatedClock
 from mavlink_bridge.wire.codec import Codec
 from outrider.doctor.command import consult
 from outrider.doctor.consultation import Consultation

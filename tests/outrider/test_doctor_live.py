@@ -10,6 +10,7 @@ import pytest
 from autopilot_rig import ARM, FLAVOURS, GUIDED, SET_MODE, TAKEOFF
 from doctor_bench import BATTERY, GCS, GPS, INJECT, OFF, Bench, autopilot, blocking, found, warnings
 
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     CommandLong,
     Heartbeat,
@@ -19,12 +20,11 @@ from mavlink_bridge.messages import (
     Source,
 )
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import Signing
 from outrider.doctor.finding import Severity
 from outrider.doctor.questions import COMPONENT, STRANGER
 from outrider.doctor.settings import rules
-from sitl.autopilot_config import TelemetryRates
+from sitl.config.autopilot import TelemetryRates
 
 FOLLOWS = "it follows up to "
 """What the shipped companion asks of it is judged beside the vehicle: ``test_doctor_agility``."""

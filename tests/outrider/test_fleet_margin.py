@@ -6,7 +6,7 @@ import pytest
 from shipped import FIREFLY, LOGS, scenario
 
 from outrider.fleet import Fleet
-from sitl.profiles import PROFILES, ProfileName
+from sitl.estimation.profiles import PROFILES, ProfileName
 
 
 @pytest.mark.parametrize("profile", PROFILES)

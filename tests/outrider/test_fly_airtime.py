@@ -15,11 +15,11 @@ from shipped import FIREFLY
 from companion.flight.readiness import GPS_RAW, HEALTH, STREAMS
 from companion.values.phase import Phase
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Serial, UdpIn
 from mavlink_bridge.messages import CommandLong, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import Signing
 from outrider.aboard.airtime import (
     FLEET,
@@ -35,7 +35,7 @@ from outrider.aboard.airtime import (
 )
 from outrider.aboard.fly_config import RADIOS, FleetOrigin, FlyConfig
 from outrider.errors import InputError
-from sitl.autopilot_config import AutopilotConfig
+from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
 
 HERE = FleetOrigin(latitude=47.4, longitude=8.5, altitude=500.0)

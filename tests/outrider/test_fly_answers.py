@@ -16,14 +16,14 @@ from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
 from companion.node import Companion
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
+from mavlink_bridge.clocks.clock import SimulatedClock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
 from mavlink_bridge.links.link import memory_pair
-from mavlink_bridge.loops.clock import SimulatedClock
-from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.messages import CommandAck, CommandLong, GpsGlobalOrigin, Heartbeat, LocalPosition, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import EPOCH, Signing
 from outrider.aboard.cockpit import Cockpit
 from outrider.aboard.fly_config import FleetOrigin, FlyConfig

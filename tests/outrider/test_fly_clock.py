@@ -7,8 +7,8 @@ import pytest
 
 from companion.config import CompanionConfig
 from companion.estimation.tracks import Track
-from mavlink_bridge.loops.clock import SimulatedClock
-from mavlink_bridge.loops.followed_clock import FollowedClock
+from mavlink_bridge.clocks.clock import SimulatedClock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 from outrider.aboard.news import judgement
 
 SECOND = 1_000_000

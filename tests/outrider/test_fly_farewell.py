@@ -10,9 +10,9 @@ from companion.flight.autopilots.ardupilot import ARDUPILOT
 from companion.flight.hold_on_exit import LastWord
 from companion.node import Companion
 from companion.values.phase import Phase
+from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.link import memory_pair
-from mavlink_bridge.loops.clock import SimulatedClock
 from mavlink_bridge.messages import CommandLong, Heartbeat, Source
 from mavlink_bridge.wire.codec import Codec
 from outrider.aboard.cockpit import OURS, Cockpit

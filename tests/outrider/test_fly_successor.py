@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from mavlink_bridge.clocks.clock import SimulatedClock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.links.endpoints import parse_endpoint
-from mavlink_bridge.loops.clock import SimulatedClock
-from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, LocalPosition, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec

@@ -17,11 +17,11 @@ from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
 from companion.node import Companion
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
+from mavlink_bridge.clocks.clock import SimulatedClock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.demultiplexer import Dealer
 from mavlink_bridge.links.link import memory_pair
-from mavlink_bridge.loops.clock import SimulatedClock
-from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Message, Source, StatusText
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from said import Run
 
-from mavlink_bridge.wire.key import read_key
+from mavlink_bridge.key import read_key
 from outrider.errors import InputError
 from outrider.key_files import key_of
 

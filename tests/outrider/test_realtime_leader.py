@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shipped import FIREFLY, LOGS, scenario
 
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.links.udp import MulticastLink
-from mavlink_bridge.loops.clock import WallClock
 from mavlink_bridge.node import Datagram
 from outrider import console, names
 from outrider.conductor import PREPARE_CAP, Conductor, Stage

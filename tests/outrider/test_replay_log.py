@@ -15,13 +15,13 @@ from said import Run
 from shipped import FIREFLY, LOGS, scenario
 
 from companion.config import CompanionConfig
+from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.errors import LogError
+from mavlink_bridge.key import Key
 from mavlink_bridge.links.link import memory_pair
-from mavlink_bridge.loops.clock import SimulatedClock
 from mavlink_bridge.messages import CommandLong, GlobalPosition, Heartbeat, SetpointLocal, Source
 from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import Signing
 from outrider import swarm
 from outrider.replaying.casting import Cast, Part, survey

@@ -20,7 +20,7 @@ from outrider.hangar.crew import squads
 from outrider.hangar.request import MOST_ID, Options, Request, checked
 from outrider.hangar.worker import PERIOD, period
 from outrider.scenario_places import Origin
-from sitl.saved import Saved
+from sitl.autopilot.saved import Saved
 
 Found = TypeVar("Found")
 

@@ -17,11 +17,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from mavlink_bridge.key import create_key
 from mavlink_bridge.messages import CommandLong, Heartbeat, Message, ParamSet, Source, StatusText, Timesync
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Framer
-from mavlink_bridge.wire.key import create_key
 from mavlink_bridge.wire.signing import EPOCH, Signing
 from outrider.errors import InputError, OutriderError
 from outrider.hangar.addresses import addresses

@@ -18,9 +18,9 @@ from outrider.scenario import FixedTarget
 from outrider.targets import Standing
 from outrider.truth import SAMPLE, Encounters, Limits, Truth
 from outrider.witness import Witness
-from sitl.autopilot_config import AutopilotConfig
+from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
-from sitl.vehicle import Reference, VehicleState
+from sitl.vehicle.multirotor import Reference, VehicleState
 
 NAN = float("nan")
 LEAST = 0.5

@@ -19,7 +19,7 @@ from outrider.scenario import Scenario
 from outrider.summary import Cost, Value, summarise
 from outrider.testing.scenes import merged
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 FIREFLY = load(find("vehicles", "firefly"), VehicleConfig)
 SLOWLY = {"companion": {"rates": {"replan_us": 50_000}}}

@@ -26,7 +26,7 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from sitl.autopilot_config import AutopilotConfig
+from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
 
 SITE = FleetFrame(47.397742, 8.545594, 488.0)

@@ -20,7 +20,7 @@ from mavlink_bridge.messages import CommandInt, CommandLong
 from outrider.flight import EPOCH
 from outrider.names import LINK_NUMBERS
 from outrider.summary import exit_status
-from sitl.flavours import Mode
+from sitl.autopilot.firmware import Mode
 
 PAIR: dict[str, Any] = {
     "vehicles": 2,

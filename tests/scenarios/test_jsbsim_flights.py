@@ -10,7 +10,7 @@ from lockstep_flights import scenario
 from outrider.resources import find
 from outrider.swarm import Prepared, measure
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 pytestmark = pytest.mark.slow
 

@@ -23,7 +23,7 @@ from mavlink_bridge.messages import SetpointLocal, StatusText, Tunnel
 from outrider.conductor import NEAR
 from outrider.names import LINK_NUMBERS
 from outrider.summary import exit_status
-from sitl.flavours import Mode
+from sitl.autopilot.firmware import Mode
 
 STRUCK = 12
 K = 1

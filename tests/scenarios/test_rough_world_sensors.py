@@ -14,7 +14,7 @@ from lockstep_flights import fly, scenario
 
 from outrider.conductor import NEAR
 from outrider.summary import exit_status
-from sitl.profiles import PROFILES
+from sitl.estimation.profiles import PROFILES
 
 LANES = {
     "vehicles": 2,

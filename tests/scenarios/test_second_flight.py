@@ -7,7 +7,7 @@ from single_vehicle import LAND, MODE, OPERATOR, SYSTEM, SingleVehicle
 
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandLong, SetpointLocal, SysStatus
-from sitl.flavours import Mode
+from sitl.autopilot.firmware import Mode
 
 PREARM = 0x10000000
 

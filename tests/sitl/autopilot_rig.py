@@ -23,10 +23,10 @@ from mavlink_bridge.messages import (
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
-from sitl.autopilot_config import AutopilotConfig
-from sitl.config import VehicleConfig
+from sitl.autopilot.saved import Saved
+from sitl.config.autopilot import AutopilotConfig
 from sitl.node import LINK, Autopilot
-from sitl.saved import Saved
+from sitl.vehicle.config import VehicleConfig
 
 CONFIG = Path(__file__).parents[2] / "config" / "vehicles" / "firefly.yaml"
 FIREFLY = VehicleConfig.model_validate(yaml.safe_load(CONFIG.read_text()))

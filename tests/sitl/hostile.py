@@ -12,11 +12,11 @@ from autopilot_rig import LINK, Rig
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import CommandLong, Message, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_TYPE
-from mavlink_bridge.wire.key import Key
 
 RATE = 10_000
 """Messages per second."""

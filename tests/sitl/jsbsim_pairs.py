@@ -10,12 +10,12 @@ import numpy as np
 import yaml
 
 from mavlink_bridge.frames import FleetFrame
-from sitl.airframe import airframe, airframe_record
 from sitl.backends.jsbsim_engine import STILL, Air
 from sitl.backends.jsbsim_place import Place
 from sitl.backends.jsbsim_vehicle import JsbsimVehicle
-from sitl.config import VehicleConfig
-from sitl.vehicle import Reference, advance_many, command_row, initial_states
+from sitl.vehicle.airframe import airframe, airframe_record
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.multirotor import Reference, advance_many, command_row, initial_states
 
 VEHICLES = ("firefly", "hummingbird")
 SITE = FleetFrame(47.397742, 8.545594, 488.0)

@@ -8,9 +8,9 @@ import pytest
 from autopilot_rig import ALL, FIREFLY, FLAVOURS, SITE, Rig, setpoint
 
 from mavlink_bridge.messages import Attitude, ExtendedSysState, GlobalPosition, Heartbeat, LocalPosition
-from sitl.flavours import Mode
+from sitl.autopilot.firmware import Mode
+from sitl.environment.weather import WeatherConfig
 from sitl.node import Autopilot
-from sitl.weather import WeatherConfig
 
 PLACE = (2.0, -1.0, -5.0)
 HERE = setpoint(ALL, PLACE)

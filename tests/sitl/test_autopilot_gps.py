@@ -15,9 +15,9 @@ from mavlink_bridge.messages import (
     LocalPosition,
     SysStatus,
 )
-from sitl.flavours import Mode
+from sitl.autopilot.firmware import Mode
+from sitl.environment.weather import WeatherConfig
 from sitl.node import Autopilot
-from sitl.weather import WeatherConfig
 
 HERE = setpoint(ALL, (0.0, 0.0, -20.0))
 PATIENCE = {"ardupilot": 7.0, "px4": 5.0}

@@ -22,7 +22,7 @@ from autopilot_rig import (
 )
 
 from mavlink_bridge.messages import CommandInt, ExtendedSysState, Heartbeat
-from sitl.flavours import Mode
+from sitl.autopilot.firmware import Mode
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 NAN = math.nan

@@ -23,7 +23,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mavlink_bridge.messages import Heartbeat, PositionTarget, SetpointLocal, StatusText, SysStatus
-from sitl.flavours import Mode
+from sitl.autopilot.firmware import Mode
 
 CHECK = 401
 """RUN_PREARM_CHECKS."""

@@ -45,9 +45,9 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.node import Node
 from mavlink_bridge.wire.codec import Codec
-from sitl.autopilot_config import AutopilotConfig
+from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
-from sitl.origin import Origin
+from sitl.values.origin import Origin
 
 RATES: list[tuple[type[Message], float]] = [
     (Heartbeat, 1.0),

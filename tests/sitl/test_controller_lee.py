@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from sitl.airframe import airframe, airframe_record
-from sitl.body import body_axes, free_flight
-from sitl.compiled import kernel
-from sitl.config import VehicleConfig
-from sitl.controller import commanded_attitude, control, desired_force
-from sitl.vectors import dot, plus
+from sitl.vehicle.airframe import airframe, airframe_record
+from sitl.vehicle.body import body_axes, free_flight
+from sitl.vehicle.compiled import kernel
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.controller import commanded_attitude, control, desired_force
+from sitl.vehicle.vectors import dot, plus
 
 M, D, C_TAU_F = 4.34, 0.315, 8.004e-4
 LEE = VehicleConfig.model_validate(

@@ -12,15 +12,15 @@ from autopilot_rig import SITE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.airframe import airframe, airframe_record
-from sitl.allocation import allocate, effectiveness
-from sitl.body import body_axes
-from sitl.compiled import kernel
-from sitl.config import VehicleConfig
-from sitl.course import Course
-from sitl.guidance import Activity
-from sitl.origin import Origin
-from sitl.vehicle import Reference, Vehicle
+from sitl.autopilot.course import Course
+from sitl.autopilot.guidance import Activity
+from sitl.values.origin import Origin
+from sitl.vehicle.airframe import airframe, airframe_record
+from sitl.vehicle.allocation import allocate, effectiveness
+from sitl.vehicle.body import body_axes
+from sitl.vehicle.compiled import kernel
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.multirotor import Reference, Vehicle
 
 CONFIG = Path(__file__).parents[2] / "config" / "vehicles" / "firefly.yaml"
 FIREFLY = VehicleConfig.model_validate(yaml.safe_load(CONFIG.read_text()))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from autopilot_rig import SITE
 
-from sitl.course import Course
-from sitl.guidance import Activity
-from sitl.origin import Origin
+from sitl.autopilot.course import Course
+from sitl.autopilot.guidance import Activity
+from sitl.values.origin import Origin
 
 ORIGIN = Origin(SITE, 47.42, 8.52, 500.0)
 JERK, TURNING = np.array([2.0, -1.0, 0.5]), 0.7

@@ -14,13 +14,13 @@ from outside_client import Client
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.messages import FenceStatus, SysStatus
-from sitl.autopilot_config import AutopilotConfig
-from sitl.fences import Breach, Fences, Rules
-from sitl.flavours import ACCEPTED, FAILED, Mode
-from sitl.home import Home
-from sitl.missions.items import Item
-from sitl.missions.plans import Plans
-from sitl.origin import Origin
+from sitl.autopilot.fences import Breach, Fences, Rules
+from sitl.autopilot.firmware import ACCEPTED, FAILED, Mode
+from sitl.autopilot.missions.items import Item
+from sitl.autopilot.missions.plans import Plans
+from sitl.config.autopilot import AutopilotConfig
+from sitl.values.home import Home
+from sitl.values.origin import Origin
 
 REQUEST, FENCE_STATUS = 512, 162
 STAY_IN, STAY_OUT, CIRCLE_IN, CIRCLE_OUT = 5001, 5002, 5003, 5004

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mavlink_bridge.messages import SetpointAttitude, SetpointGlobal
-from sitl.attitude_setpoints import GRAVITY, STEEPEST, climbing, thrusting
-from sitl.flavours import Mode
-from sitl.setpoints import Refusal, Setpoint
+from sitl.autopilot.attitude_setpoints import GRAVITY, STEEPEST, climbing, thrusting
+from sitl.autopilot.firmware import Mode
+from sitl.values.setpoints import Refusal, Setpoint
 
 ABOVE_SEA, ABOVE_HOME = (0, 5), (3, 6)
 NAN = math.nan

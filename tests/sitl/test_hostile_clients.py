@@ -21,9 +21,9 @@ from outside_client import Client
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import CommandAck, CommandLong, Source
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.packing import LONGEST
 from mavlink_bridge.wire.signing import Refusal, Signing
 

@@ -20,15 +20,15 @@ import pytest
 from autopilot_rig import LINK, Rig
 from hostile import command
 
+from mavlink_bridge.clocks.clock import WallClock
+from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import TcpIn, UdpIn
 from mavlink_bridge.links.tcp import BACKLOG, TcpListener
 from mavlink_bridge.links.udp import MOST_PEERS, UdpListener
-from mavlink_bridge.loops.clock import WallClock
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.realtime import RealTime
 from mavlink_bridge.messages import CommandAck, LocalPosition, Source
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import Signing
 
 HOST = "127.0.0.1"

@@ -8,9 +8,9 @@ from autopilot_rig import ARM, FIREFLY, FLAVOURS, LAND, PILOT, SITE, Rig, setpoi
 
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandLong
-from sitl.autopilot_config import AutopilotConfig
+from sitl.config.autopilot import AutopilotConfig
+from sitl.environment.weather import WeatherConfig
 from sitl.node import Autopilot
-from sitl.weather import WeatherConfig
 
 pytest.importorskip("jsbsim", reason="there is no wheel of JSBSim for this machine")
 

@@ -13,8 +13,8 @@ from jsbsim_pairs import HIGH, PERIOD, VEHICLES, Pair, gravity, lap, laps, step,
 from sitl.backends import jsbsim_engine
 from sitl.backends.jsbsim_engine import Air
 from sitl.backends.jsbsim_model import aircraft
-from sitl.vehicle import Reference, initial_states
-from sitl.weather import Weather, WeatherConfig
+from sitl.environment.weather import Weather, WeatherConfig
+from sitl.vehicle.multirotor import Reference, initial_states
 
 pytest.importorskip("jsbsim", reason="there is no wheel of JSBSim for this machine")
 

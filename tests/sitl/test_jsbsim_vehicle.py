@@ -16,9 +16,9 @@ from sitl.backends.jsbsim_place import Place, euler_angles, rotation_of
 from sitl.backends.jsbsim_vehicle import JsbsimVehicle
 from sitl.backends.physics import BackendError
 from sitl.backends.selection import Start, physics, severity
-from sitl.pipeline import STATE_SIZE
-from sitl.vehicle import NotFiniteError, Reference, Vehicle, initial_states
-from sitl.weather import WeatherConfig
+from sitl.environment.weather import WeatherConfig
+from sitl.vehicle.multirotor import NotFiniteError, Reference, Vehicle, initial_states
+from sitl.vehicle.pipeline import STATE_SIZE
 
 pytest.importorskip("jsbsim", reason="there is no wheel of JSBSim for this machine")
 

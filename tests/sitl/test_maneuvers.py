@@ -12,7 +12,7 @@ from outside_client import Client
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.messages import Attitude, CommandAck, CommandInt, FollowTarget, GlobalPosition, Source
-from sitl.flavours import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Mode
+from sitl.autopilot.firmware import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Mode
 
 LOITER, FOLLOW, YAW, SPEED, TERMINATE, REPOSITION, PAUSE, CHECK = 17, 32, 115, 178, 185, 192, 193, 401
 START, RETURN = 300, 20

@@ -32,8 +32,8 @@ from mission_client import (
 from outside_client import Client, only
 from pymavlink.dialects.v20 import all as dialect
 
+from sitl.autopilot.saved import Saved
 from sitl.node import Autopilot
-from sitl.saved import Saved
 
 ACCEPTED, ERROR, BAD_FRAME, UNSUPPORTED, NO_SPACE, BAD_SEQUENCE, DENIED, CANCELLED = 0, 1, 2, 3, 4, 13, 14, 15
 SQUARE = [

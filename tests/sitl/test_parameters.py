@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from outside_client import Client, only
 from pymavlink.dialects.v20 import all as dialect
 
-from sitl.autopilot_config import AutopilotConfig
+from sitl.autopilot.parameters import ardupilot, px4
+from sitl.autopilot.parameters.parameter import Kind, Parameter
+from sitl.autopilot.parameters.values import Values
+from sitl.autopilot.saved import Saved
+from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
-from sitl.parameters import ardupilot, px4
-from sitl.parameters.parameter import Kind, Parameter
-from sitl.parameters.values import Values
-from sitl.saved import Saved
 
 TABLES = {"ardupilot": ardupilot.table(6), "px4": px4.table(6)}
 BOUND = {"ardupilot": ardupilot.BOUND, "px4": px4.BOUND}

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import yaml
 
-from sitl.airframe import Airframe, airframe, airframe_record
-from sitl.config import VehicleConfig
-from sitl.environment import GRAVITY
-from sitl.pipeline import STATE_SIZE
-from sitl.vehicle import Reference, Vehicle, advance_many, command_row, initial_states
+from sitl.vehicle.airframe import Airframe, airframe, airframe_record
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.ground import GRAVITY
+from sitl.vehicle.multirotor import Reference, Vehicle, advance_many, command_row, initial_states
+from sitl.vehicle.pipeline import STATE_SIZE
 
 CONFIG = Path(__file__).parents[2] / "config" / "vehicles" / "firefly.yaml"
 FIREFLY = VehicleConfig.model_validate(yaml.safe_load(CONFIG.read_text()))

@@ -9,8 +9,8 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from sitl.airframe import airframe, airframe_record
-from sitl.config import VehicleConfig
+from sitl.vehicle.airframe import airframe, airframe_record
+from sitl.vehicle.config import VehicleConfig
 
 CONFIG = Path(__file__).parents[2] / "config" / "vehicles" / "firefly.yaml"
 FIREFLY = yaml.safe_load(CONFIG.read_text())

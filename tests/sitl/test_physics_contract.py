@@ -8,8 +8,8 @@ from jsbsim_pairs import SITE, VEHICLES, vehicle
 
 from sitl.backends.physics import Physics
 from sitl.backends.selection import Start, physics
-from sitl.vehicle import NotFiniteError, Reference
-from sitl.weather import WeatherConfig
+from sitl.environment.weather import WeatherConfig
+from sitl.vehicle.multirotor import NotFiniteError, Reference
 
 PLACE = np.array((2.0, -1.0, -4.0))
 GROUND = 0.5

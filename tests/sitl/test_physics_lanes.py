@@ -11,14 +11,14 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.airframe import airframe, airframe_record
-from sitl.angles import cosine_sine, small_cosine_sinc
-from sitl.compiled import kernel
-from sitl.config import VehicleConfig
-from sitl.lanes import LANES, at, nearest, put, put_three, some, three_at, where
-from sitl.pipeline import STATE_SIZE
-from sitl.vectors import cross, greatest, least
-from sitl.vehicle import Reference, advance_many, command_row, initial_states
+from sitl.vehicle.airframe import airframe, airframe_record
+from sitl.vehicle.angles import cosine_sine, small_cosine_sinc
+from sitl.vehicle.compiled import kernel
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.multirotor import Reference, advance_many, command_row, initial_states
+from sitl.vehicle.pipeline import STATE_SIZE
+from sitl.vehicle.simd import LANES, at, nearest, put, put_three, some, three_at, where
+from sitl.vehicle.vectors import cross, greatest, least
 
 CONFIG = Path(__file__).parents[2] / "config" / "vehicles" / "firefly.yaml"
 FIREFLY = VehicleConfig.model_validate(yaml.safe_load(CONFIG.read_text()))

@@ -10,10 +10,17 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.airframe import airframe, airframe_record
-from sitl.config import VehicleConfig
-from sitl.pipeline import LANDED
-from sitl.vehicle import NotFiniteError, Reference, Vehicle, advance_many, command_row, initial_states
+from sitl.vehicle.airframe import airframe, airframe_record
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.multirotor import (
+    NotFiniteError,
+    Reference,
+    Vehicle,
+    advance_many,
+    command_row,
+    initial_states,
+)
+from sitl.vehicle.pipeline import LANDED
 
 CONFIG = Path(__file__).parents[2] / "config" / "vehicles" / "firefly.yaml"
 FIREFLY = VehicleConfig.model_validate(yaml.safe_load(CONFIG.read_text()))

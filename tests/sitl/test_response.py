@@ -14,13 +14,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from sitl.autopilot_config import AutopilotConfig
-from sitl.flavours import Mode
-from sitl.guidance import Guidance
-from sitl.position_control.airframe import GRAVITY, Motion
-from sitl.position_control.px4 import _within
-from sitl.response import Response, response_of
-from sitl.setpoints import POSITION, Pose, Setpoint
+from sitl.autopilot.firmware import Mode
+from sitl.autopilot.guidance import Guidance
+from sitl.autopilot.position_control.airframe import GRAVITY, Motion
+from sitl.autopilot.position_control.px4 import _within
+from sitl.autopilot.response import Response, response_of
+from sitl.config.autopilot import AutopilotConfig
+from sitl.values.setpoints import POSITION, Pose, Setpoint
 
 DT = 0.01
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from outside_client import Client, only
 from pymavlink.dialects.v20 import all as dialect
 
-from sitl.parameters import ardupilot, px4
-from sitl.parameters.parameter import Parameter
+from sitl.autopilot.parameters import ardupilot, px4
+from sitl.autopilot.parameters.parameter import Parameter
 
 TABLES = {"ardupilot": ardupilot.table(6), "px4": px4.table(6)}
 ALL_BUT_YAW_RATE = 0x800

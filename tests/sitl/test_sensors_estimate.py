@@ -10,12 +10,12 @@ from autopilot_rig import FIREFLY, SITE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.course import believed
-from sitl.origin import Origin
-from sitl.positioning import Positioning
-from sitl.profiles import PROFILES, SensorProfile
-from sitl.sensors import Deviation, Sensors
-from sitl.vehicle import Reference, Vehicle
+from sitl.autopilot.course import believed
+from sitl.estimation.gps_faults import Positioning
+from sitl.estimation.profiles import PROFILES, SensorProfile
+from sitl.estimation.sensors import Deviation, Sensors
+from sitl.values.origin import Origin
+from sitl.vehicle.multirotor import Reference, Vehicle
 
 ORIGIN = Origin(SITE, 47.41, 8.53, 500.0)
 TICK = 5_000

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from sitl.noise import one_pole, two_poles
-from sitl.profiles import PROFILES, SensorProfile
-from sitl.wandering import PERIOD, Wandering
+from sitl.environment.noise import one_pole, two_poles
+from sitl.estimation.profiles import PROFILES, SensorProfile
+from sitl.estimation.random_errors import PERIOD, Wandering
 
 SHARES = st.floats(1e-4, 20.0)
 NOISY = [PROFILES["rtk"], PROFILES["gnss"]]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from outside_client import Client, only
 from pymavlink.dialects.v20 import all as dialect
 
-from sitl.battery import BatteryConfig
+from sitl.vehicle.battery import BatteryConfig
 
 GET_HOME, GET_INTERVAL, SET_INTERVAL, REQUEST, CAPABILITIES, SET_HOME, FAIL = (
     410,

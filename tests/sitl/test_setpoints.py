@@ -11,11 +11,11 @@ from autopilot_rig import FLAVOURS, SITE, ZERO, setpoint
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sitl.autopilot_config import AutopilotConfig
-from sitl.flavours import Flavour
-from sitl.flavours.ardupilot import ArduPilot
-from sitl.flavours.px4 import Px4
-from sitl.setpoints import ACCELERATION, POSITION, VELOCITY, Pose, Refusal, Setpoint, Stop, mask_of
+from sitl.autopilot.firmware import Flavour
+from sitl.autopilot.firmware.ardupilot import ArduPilot
+from sitl.autopilot.firmware.px4 import Px4
+from sitl.config.autopilot import AutopilotConfig
+from sitl.values.setpoints import ACCELERATION, POSITION, VELOCITY, Pose, Refusal, Setpoint, Stop, mask_of
 
 CONFIG = AutopilotConfig(system_id=1, latitude=SITE.latitude, longitude=SITE.longitude)
 READERS: dict[str, Flavour] = {"ardupilot": ArduPilot(CONFIG), "px4": Px4(CONFIG)}

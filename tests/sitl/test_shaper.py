@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.setpoints import ACCELERATION, POSITION, VELOCITY, ZERO, Setpoint
-from sitl.shaper import Heading, Limits, Shaper
+from sitl.autopilot.shaper import Heading, Limits, Shaper
+from sitl.values.setpoints import ACCELERATION, POSITION, VELOCITY, ZERO, Setpoint
 
 DT = 0.005
 LIMITS = Limits(speed=5.0, acceleration=4.0, jerk=40.0)

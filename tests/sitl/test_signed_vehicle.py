@@ -11,10 +11,10 @@ from outside_client import Client
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as dialect
 
+from mavlink_bridge.key import Key
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import EPOCH, UNIT, Refusal, Signing
-from sitl.saved import Saved
+from sitl.autopilot.saved import Saved
 
 KEY, OTHER = Key.of_passphrase("correct horse"), Key.of_passphrase("battery staple")
 BOOT = 1_780_000_000_000_000

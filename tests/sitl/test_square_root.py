@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.position_control.square_root import (
+from sitl.autopilot.position_control.square_root import (
     cut,
     directed,
     inverse_square_root_law,

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from sitl.turbulence import PERIOD, W20, Turbulence, scales
-from sitl.weather import Gust, Weather, WeatherConfig
+from sitl.environment.turbulence import PERIOD, W20, Turbulence, scales
+from sitl.environment.weather import Gust, Weather, WeatherConfig
 
 FOOT = 0.3048
 TIMES = st.integers(0, 200_000_000)

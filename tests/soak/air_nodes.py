@@ -22,8 +22,8 @@ from outrider.beacon import Beacon
 from outrider.paths import Motion
 from outrider.resources import find
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
 from sitl.node import Autopilot
+from sitl.vehicle.config import VehicleConfig
 
 EPOCH = 1_767_225_600_000_000
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)

@@ -30,16 +30,16 @@ from air_nodes import (
 
 from companion.config import CompanionConfig
 from companion.node import Companion
+from mavlink_bridge.clocks.node_clock import NodeClock
+from mavlink_bridge.key import Key
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
-from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.network.simulated import Channel, Ether, Faults
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import Signing
-from sitl.autopilot_config import AutopilotConfig
+from sitl.config.autopilot import AutopilotConfig
+from sitl.environment.weather import WeatherConfig
+from sitl.estimation.profiles import PROFILES
 from sitl.node import Autopilot
-from sitl.profiles import PROFILES
-from sitl.weather import WeatherConfig
 
 CONFIG = CompanionConfig.model_validate(
     {

@@ -18,8 +18,8 @@ from fly_process import FLEET, HOST
 from switch import Switch
 from test_sitl_command import free_base
 
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.loops.clock import WallClock
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, SysStatus
 from mavlink_bridge.wire.codec import Codec
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from recorded_logs import PIECES
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     Attitude,
     CommandAck,
@@ -36,7 +37,6 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_TYPE, TABLE
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
 from outrider.resources import config_root
 

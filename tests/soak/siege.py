@@ -25,6 +25,7 @@ from recorded_logs import PIECES, SHIPPED, WHOLE
 from companion.flight.readiness import OPERATORS_GO
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     CommandAck,
     ExtendedSysState,
@@ -42,7 +43,6 @@ from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_ID
 from mavlink_bridge.wire.framing import leading_frames
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import Signing
 
 KEY, OTHER = Key.of_passphrase("correct horse"), Key.of_passphrase("battery staple")

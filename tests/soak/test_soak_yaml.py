@@ -19,8 +19,8 @@ from outrider.sweeps.draw import draw
 from outrider.sweeps.grid import Sweep, points
 from outrider.sweeps.scenes import Scene
 from outrider.yaml_file import MOST_BYTES, load, read
-from sitl.airframe import airframe, hover_speeds
-from sitl.config import VehicleConfig
+from sitl.vehicle.airframe import airframe, hover_speeds
+from sitl.vehicle.config import VehicleConfig
 
 MODELS: dict[str, type[BaseModel]] = {
     "scenarios": Scenario,

@@ -7,9 +7,9 @@ import socket
 import numpy as np
 import pytest
 
+from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.endpoints import UdpIn
-from mavlink_bridge.loops.clock import SimulatedClock
 from mavlink_bridge.messages import CommandLong, Heartbeat, HilState, SimulationState, Source
 from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError

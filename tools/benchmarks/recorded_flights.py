@@ -31,9 +31,9 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
-from sitl.autopilot_config import AutopilotConfig
-from sitl.config import VehicleConfig
+from sitl.config.autopilot import AutopilotConfig
 from sitl.node import LINK, Autopilot
+from sitl.vehicle.config import VehicleConfig
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,7 @@ recorded vehicle was sent. Then the response alone flies the set-points that eac
 swarms was sent by its own companion, and is compared with the true motion.
 
 Only how late attitude and thrust follow was fitted, to the swarms (`angle_lag` and `thrust_lag` in
-`sitl/position_control/airframe.py`). Gains and limits are the firmware's defaults, mass and drag those of its
+`sitl/autopilot/position_control/airframe.py`). Gains and limits are the firmware's defaults, mass and drag those of its
 simulator.
 """
 
@@ -39,7 +39,7 @@ from mavlink_bridge.errors import LogError
 from outrider.errors import OutriderError
 from outrider.resources import find
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 LOGS: Final = Path(__file__).parents[2] / "tests" / "data" / "flights"
 PARTS: Final = (FULL, PVY, FIRST, SECOND)

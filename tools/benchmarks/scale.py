@@ -24,7 +24,7 @@ from outrider.scenario import Scenario
 from outrider.share_progress import share_progress
 from outrider.testing.scenes import merged
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 VEHICLES = (2, 8, 16, 32, 64, 128, 200)
 _REPLAN_US = 50_000

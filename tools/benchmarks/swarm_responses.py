@@ -17,9 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from benchmarks.recorded_swarms import Array, SwarmVehicle, at_times
-from sitl.autopilot_config import AutopilotConfig
-from sitl.response import response_of
-from sitl.setpoints import POSITION, Setpoint
+from sitl.autopilot.response import response_of
+from sitl.config.autopilot import AutopilotConfig
+from sitl.values.setpoints import POSITION, Setpoint
 
 STEP: Final = 0.01
 """s, of the response: as often as the autopilot renews what it tracks."""

@@ -30,9 +30,9 @@ from outrider.resources import config_root, find
 from outrider.scenario import Scenario
 from outrider.swarm import Options, prepare
 from outrider.yaml_file import load
-from sitl.airframe import airframe, airframe_record
-from sitl.config import VehicleConfig
-from sitl.vehicle import Reference, advance_many, command_row, initial_states
+from sitl.vehicle.airframe import airframe, airframe_record
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.multirotor import Reference, advance_many, command_row, initial_states
 
 Progress = Callable[[str, float], None]
 _FLEETS = (1, 8, 64, 512)

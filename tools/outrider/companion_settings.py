@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from companion.config import CompanionConfig
 from outrider.scenario import Scenario
-from sitl.profiles import PROFILES
+from sitl.estimation.profiles import PROFILES
 
 
 def settings_of(scenario: Scenario) -> CompanionConfig:

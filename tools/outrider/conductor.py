@@ -14,7 +14,7 @@ from outrider.scenario import FixedTarget, Scenario
 from outrider.standoff import standoff
 from outrider.starts import Starts
 from outrider.truth import Array
-from sitl.profiles import PROFILES
+from sitl.estimation.profiles import PROFILES
 
 NEAR, SLOW, HOLD = 0.3, 0.3, 1_000_000
 """Converged: nearer than this (m), slower than this against the target (m/s), for so long (µs)."""

@@ -13,8 +13,8 @@ from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
 from companion.node import Companion
 from companion.values.bearings import bearing
+from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.loops.node_clock import NodeClock
 from mavlink_bridge.network.simulated import Channel, Faults
 from outrider import names
 from outrider.bystander import Bystander
@@ -27,9 +27,9 @@ from outrider.scenario_links import Links
 from outrider.starts import starts
 from outrider.streams import Stream, stream
 from outrider.targets import Recorded, Standing, Target, Walking
-from sitl.autopilot_config import AutopilotConfig
-from sitl.config import VehicleConfig
+from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
+from sitl.vehicle.config import VehicleConfig
 
 
 class End(NamedTuple):

@@ -27,7 +27,7 @@ from outrider.scenario_faults import Vanish
 from outrider.scenario_links import PartitionPart
 from outrider.truth import Limits, Truth
 from outrider.witness import Witness
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 EPOCH = 1_767_225_600_000_000
 """Unix µs at which every simulated flight begins (2026-01-01 00:00 UTC): logs then open in any tool."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from mavlink_bridge.errors import KeyFileError
-from mavlink_bridge.wire.key import Key, create_key, read_key
+from mavlink_bridge.key import Key, create_key, read_key
 from outrider.errors import InputError
 
 

@@ -24,8 +24,8 @@ from outrider.scenario_places import (
     Starts,
     Target,
 )
-from sitl.position_control.gains import ResponseName
-from sitl.weather import WeatherConfig
+from sitl.config.gains import ResponseName
+from sitl.environment.weather import WeatherConfig
 
 FlavourName = Literal["ardupilot", "px4"]
 

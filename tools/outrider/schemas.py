@@ -17,7 +17,7 @@ from outrider.aboard.fly_config import FlyConfig
 from outrider.scenario import Scenario
 from outrider.sweeps.grid import Sweep
 from outrider.sweeps.scenes import Scene
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 SCHEMAS: list[tuple[str, type[BaseModel]]] = [
     ("scenario", Scenario),

@@ -27,7 +27,7 @@ from outrider.scenario_faults import MotorFailure
 from outrider.summary import WALL_FIELDS, Cost, Value, summarise, write
 from outrider.targets import load as load_log
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 if TYPE_CHECKING:
     from outrider.viewing.show import Show

@@ -6,10 +6,10 @@ from __future__ import annotations
 import socket
 from typing import Final, Protocol
 
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.links.endpoints import UdpIn, parse_endpoint
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.loops.clock import WallClock
 from mavlink_bridge.wire.framing import Flaw, frame_at
 from outrider.errors import InputError
 

@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mavlink_bridge.clocks.clock import Clock, WallClock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.loops.clock import Clock, WallClock
-from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.messages import (
     CommandLong,
     GpsGlobalOrigin,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.links.endpoints import UdpIn
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.udp import UdpListener
-from mavlink_bridge.loops.clock import WallClock
 from mavlink_bridge.messages import StatusText
 from mavlink_bridge.wire.codec import Codec
 from trials.plan import HOST

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mavlink_bridge.clocks.clock import Clock, WallClock
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.loops.clock import Clock, WallClock
 from mavlink_bridge.messages import CommandLong, Heartbeat, HilState, SimulationState
 from mavlink_bridge.wire.codec import Codec
 from trials.ears import Ear

@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.loops.clock import WallClock
 from outrider.beacon import Beacon
 from outrider.paths import ClosedPath, Motion, Walk
 from outrider.resources import find

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
+from mavlink_bridge.key import Key
 from mavlink_bridge.wire.fields.units import Fields, degrees_e7, on_globe
-from mavlink_bridge.wire.key import Key
 
 NAME_LENGTH = 16
 FILE_LENGTH = 251

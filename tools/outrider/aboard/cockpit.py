@@ -15,8 +15,8 @@ from companion.flight.hold_on_exit import LastWord
 from companion.node import Companion
 from companion.telemetry.status_text import Severity
 from companion.values.phase import STEERED, Phase
-from mavlink_bridge.loops.clock import Clock
-from mavlink_bridge.loops.followed_clock import FollowedClock
+from mavlink_bridge.clocks.clock import Clock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
 from outrider.aboard.gate import Gate

@@ -14,7 +14,7 @@ from typing import Final
 import yaml
 from rich.console import Console
 
-from mavlink_bridge.loops.clock import WallClock
+from mavlink_bridge.clocks.clock import WallClock
 from outrider.aboard.diary import Diary
 from outrider.aboard.figures import summary
 from outrider.aboard.flight import Flight

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Final
 
 from companion.flight.hold_on_exit import LastWord
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.loops.clock import Clock
 from mavlink_bridge.node import Datagram
 
 _STEP: Final = 10_000

@@ -19,7 +19,7 @@ from companion.flight.landing import Landing
 from companion.flight.readiness import OPERATORS_GO
 from companion.values.components import AUTOPILOT, COMPONENT
 from companion.values.phase import Phase
-from mavlink_bridge.loops.clock import WallClock
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.wire.signing import Signing
 from outrider.aboard.crew import Crew

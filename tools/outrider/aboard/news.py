@@ -12,8 +12,8 @@ from companion.flight.landing import Landing
 from companion.flight.readiness import OPERATORS_GO
 from companion.flight.vehicle import Vehicle
 from companion.values.phase import Phase
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.frames import ned_to_enu
-from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.wire.signing import Signing

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from companion.config.target_source import GlobalPositionSource
 from mavlink_bridge.errors import EndpointError
+from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Endpoint, Replay, parse_endpoint
-from mavlink_bridge.wire.key import Key
 from outrider.aboard.airtime import doubts, doubts_of_autopilot
 from outrider.aboard.fly_config import FlyConfig
 from outrider.errors import InputError

@@ -7,7 +7,7 @@ from collections import OrderedDict
 from typing import Final
 
 from companion.values.components import COMPONENT
-from mavlink_bridge.loops.clock import Clock
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.wire.framing import leading_frames
 from mavlink_bridge.wire.header import Header
 

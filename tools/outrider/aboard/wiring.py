@@ -8,13 +8,13 @@ from typing import NamedTuple
 from companion.config import CompanionConfig
 from companion.telemetry.reception import accepts
 from companion.values.components import AUTOPILOT, COMPONENT
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.errors import LinkError, LogError
 from mavlink_bridge.links.demultiplexer import Dealer, DealtLink, Wants
 from mavlink_bridge.links.endpoints import Endpoint
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.links.serial_port import SerialPort
-from mavlink_bridge.loops.clock import Clock
 from mavlink_bridge.wire.header import Header
 from outrider.aboard.twin import Twin
 from outrider.errors import InputError

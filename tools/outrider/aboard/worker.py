@@ -13,9 +13,9 @@ from typing import Final
 
 from companion.dry_run import DryRun
 from companion.node import Companion
+from mavlink_bridge.clocks.clock import Clock, WallClock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.loops.clock import Clock, WallClock
-from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.loops.garbage import IdleCollector
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.priority import ask_for_priority, sharpen_timers

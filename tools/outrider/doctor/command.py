@@ -8,11 +8,11 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
+from mavlink_bridge.clocks.clock import Clock, WallClock
 from mavlink_bridge.errors import EndpointError, LinkError, LogError
 from mavlink_bridge.links.endpoints import Endpoint, Replay, Serial, parse_endpoint
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.loops.clock import Clock, WallClock
 from mavlink_bridge.tlog.log import TlogReader
 from mavlink_bridge.wire.framing import Frame, frame_at
 from mavlink_bridge.wire.signing import Signing

@@ -24,7 +24,7 @@ from outrider.resources import find
 from outrider.scenario import Scenario
 from outrider.scenario_moving import MovingPostPart
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 FLEET: Final = "fleet"
 BYSTANDER, TARGET, SOLID, SHELL = Color(0.6, 0.6, 0.6), Color(1.0, 0.8, 0.1), Color(0.45, 0.4, 0.38), 0.12

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from outrider.errors import InputError
 from outrider.hangar.squad import Squad
-from sitl.saved import Saved
+from sitl.autopilot.saved import Saved
 
 _IDS: Final = ("SYSID_THISMAV", "MAV_SYS_ID")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.streams import StreamLink
 from mavlink_bridge.links.udp import REMEMBERED, UdpCaller, UdpListener
-from mavlink_bridge.loops.clock import Clock
 
 
 class Clients:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.errors import EndpointError
-from mavlink_bridge.loops.clock import WallClock
 from outrider.errors import InputError
 from outrider.exposure import exposed
 from outrider.hangar.addresses import Address, addresses, extra

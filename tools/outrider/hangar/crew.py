@@ -9,14 +9,14 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Final
 
+from mavlink_bridge.clocks.clock import PacedClock, WallClock
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.loops.clock import PacedClock, WallClock
 from outrider.errors import OutriderError
 from outrider.hangar.board import Board
 from outrider.hangar.request import Request
 from outrider.hangar.worker import PERIOD, STRIDE, Worker
 from outrider.sweeps.execution import cores
-from sitl.saved import Saved
+from sitl.autopilot.saved import Saved
 
 FULL: Final = 10
 """So many vehicles at real-time speed are one process's work before there is another."""

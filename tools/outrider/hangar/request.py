@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Final, Literal, cast, get_args
 
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
 from mavlink_bridge.messages import Vector
-from mavlink_bridge.wire.key import Key
 from mavlink_bridge.wire.signing import Signing
 from outrider.errors import InputError
 from outrider.key_files import key_of
@@ -18,15 +18,15 @@ from outrider.options import wind_of
 from outrider.resources import find
 from outrider.scenario_places import Origin
 from outrider.yaml_file import load
-from sitl.autopilot_config import AutopilotConfig
+from sitl.autopilot.saved import Saved
 from sitl.backends.physics import PhysicsName
-from sitl.battery import BatteryConfig
-from sitl.config import VehicleConfig
+from sitl.config.autopilot import AutopilotConfig
+from sitl.config.gains import ResponseName
+from sitl.environment.weather import WeatherConfig
+from sitl.estimation.profiles import ProfileName
 from sitl.node import Autopilot
-from sitl.position_control.gains import ResponseName
-from sitl.profiles import ProfileName
-from sitl.saved import Saved
-from sitl.weather import WeatherConfig
+from sitl.vehicle.battery import BatteryConfig
+from sitl.vehicle.config import VehicleConfig
 
 FlavourName = Literal["ardupilot", "px4"]
 StartupName = Literal["quick", "realistic"]

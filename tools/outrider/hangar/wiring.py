@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.loops.clock import Clock
 from outrider.errors import InputError
 from outrider.hangar.addresses import Address
 

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from mavlink_bridge.clocks.clock import PacedClock, WallClock
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.loops.clock import PacedClock, WallClock
 from mavlink_bridge.loops.garbage import IdleCollector
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.priority import sharpen_timers

@@ -14,7 +14,7 @@ from types import FrameType
 import numpy as np
 
 from companion.planning import Tally
-from mavlink_bridge.loops.clock import WallClock
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.realtime import RealTime
@@ -35,7 +35,7 @@ from outrider.realtime.workers import Remains
 from outrider.scenario import Scenario
 from outrider.truth import SAMPLE, Array
 from outrider.viewing.realtime import RealTimeView, Seen
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 _START, _START_WITH_PRIORITY = 1_000_000, 3_000_000
 """µs between forking and the first step: who becomes real-time while others still start makes them late."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from mavlink_bridge.loops.clock import Clock
+from mavlink_bridge.clocks.clock import Clock
+from mavlink_bridge.clocks.node_clock import QUANTUM, NodeClock
 from mavlink_bridge.loops.lockstep import Scheduled
-from mavlink_bridge.loops.node_clock import QUANTUM, NodeClock
 from mavlink_bridge.network.channel import Channel
 from mavlink_bridge.node import Node
 from outrider import names

@@ -7,10 +7,10 @@ import socket
 from contextlib import ExitStack
 from typing import NamedTuple
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.links.udp import UdpListener
-from mavlink_bridge.loops.clock import Clock
 
 _HOST = "127.0.0.1"
 

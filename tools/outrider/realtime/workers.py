@@ -18,8 +18,8 @@ from companion.avoidance.field.plan_log import PlanLog
 from companion.node import Companion
 from companion.planning import Tally
 from companion.values.phase import Phase
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.loops.clock import Clock
 from mavlink_bridge.loops.garbage import IdleCollector
 from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.loops.lockstep import Scheduled, Tap

@@ -18,7 +18,7 @@ from outrider.replaying.casting import SETPOINT, Survey
 from outrider.resources import find
 from outrider.scenario import Origin, RecordedTarget, Ring, Scenario
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 _ROOM = 20.0
 """m around all places of the target that are flown in."""

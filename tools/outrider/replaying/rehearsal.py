@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 from companion.config import CompanionConfig
 from companion.shadow import ShadowCompanion
+from mavlink_bridge.clocks.clock import SimulatedClock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame, enu_to_ned
-from mavlink_bridge.loops.clock import SimulatedClock
-from mavlink_bridge.loops.followed_clock import FollowedClock
 from mavlink_bridge.messages import (
     GlobalPosition,
     GpsGlobalOrigin,

@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.errors import EndpointError, LinkError, LogError
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.loops.clock import WallClock
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.console import share_progress
 from outrider.errors import InputError

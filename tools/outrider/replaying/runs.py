@@ -15,7 +15,7 @@ from outrider.resolved import resolved
 from outrider.resources import config_root, find
 from outrider.steps_file import read_steps
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 _ALLOWED = "allowed: what outrider swarm SCENARIO --out leaves"
 _OFTEN = 256

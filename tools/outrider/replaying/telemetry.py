@@ -12,8 +12,8 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as dialect
 
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.loops.clock import Clock
 from mavlink_bridge.tlog.log import Record
 from mavlink_bridge.wire.framing import without_signature
 from mavlink_bridge.wire.header import header

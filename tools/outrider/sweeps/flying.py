@@ -9,7 +9,7 @@ from outrider.summary import Value
 from outrider.swarm import Prepared, measure
 from outrider.sweeps.cells import scenario_of
 from outrider.sweeps.tasks import Task
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 RUN = f"{__name__}:fly"
 """How a worker finds `fly`."""

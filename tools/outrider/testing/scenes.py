@@ -19,7 +19,7 @@ from outrider.scenario import Scenario
 from outrider.testing.flown import Flown, Replayed
 from outrider.testing.golden import Golden
 from outrider.yaml_file import load
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 
 def flown(scenario: str | Path, seed: int, changes: dict[str, Any], folder: Path, golden: Golden) -> Flown:

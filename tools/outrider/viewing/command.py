@@ -12,10 +12,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.errors import EndpointError, LinkError, LogError
 from mavlink_bridge.links.endpoints import Endpoint, Multicast, UdpIn, UdpOut, parse_endpoint
 from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.loops.clock import WallClock
 from outrider.console import share_progress
 from outrider.errors import InputError
 from outrider.interruption import noted

@@ -19,7 +19,7 @@ from outrider.viewing.recorded import Record, record
 from outrider.viewing.scene import SPAN, Scene, staged
 from outrider.viewing.wishes import Wishes
 from outrider.yaml_file import load as load_yaml
-from sitl.config import VehicleConfig
+from sitl.vehicle.config import VehicleConfig
 
 PAST, PAST_EVERY = 20.0, 0.2
 """s before a time that was chosen, of which the trails are drawn anew, and how often."""

@@ -1,0 +1,120 @@
+"""Commands: COMMAND_LONG (76) or COMMAND_INT (75) in, a verb of the commander, COMMAND_ACK (77) out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple
+
+from mavlink_bridge.messages import CommandInt, CommandLong
+from sitl.autopilot.commander import Commander
+from sitl.autopilot.firmware import ACCEPTED, CUSTOM, DENIED, UNSUPPORTED, Denial, Flavour, Mode
+
+# MAV_CMD
+LAND: Final = 21
+TAKEOFF: Final = 22
+SET_MODE: Final = 176
+ARM: Final = 400
+
+_FORCED: Final = 21196.0
+# INT32_MAX in a field of COMMAND_INT
+NOWHERE: Final = 0x7FFFFFFF
+# MAV_FRAME
+_GLOBAL: Final = (0, 5)
+_RELATIVE: Final = (3, 6)
+
+
+class Order(NamedTuple):
+    """A command, whichever message brought it. ``relative``: its altitude counts from home (True), from mean
+    sea level (False), unsaid (None). ``integer``: it came as COMMAND_INT, with latitude and longitude in
+    degE7."""
+
+    params: tuple[float, ...]
+    relative: bool | None
+    now: int
+    integer: bool = False
+
+    @property
+    def place(self) -> tuple[float, float, float]:
+        """Parameters 5 to 7 as latitude and longitude (degrees) and altitude (m)."""
+        x, y, z = self.params[4:7]
+        return (x / 1e7, y / 1e7, z) if self.integer else (x, y, z)
+
+    @property
+    def nowhere(self) -> bool:
+        """Whether an integer latitude or longitude says *as it is*."""
+        return self.integer and NOWHERE in self.params[4:6]
+
+
+class Verdict(NamedTuple):
+    """What becomes of a command: a MAV_RESULT for COMMAND_ACK, and for STATUSTEXT why not."""
+
+    result: int
+    reason: str
+
+
+Handler = Callable[[Order], Denial | None]
+"""Obeys one command, or says why not."""
+
+
+class Orders:
+    """Obeys commands. A retried command finds that what it asks is already so, and changes nothing."""
+
+    def __init__(self, commander: Commander, flavour: Flavour, more: Mapping[int, Handler]) -> None:
+        """``more``: those who obey the commands that are not about flight, by MAV_CMD."""
+        self._commander = commander
+        self._flavour = flavour
+        self._handlers: dict[int, Handler] = {
+            LAND: self._land,
+            TAKEOFF: self._take_off,
+            SET_MODE: self._set_mode,
+            ARM: self._arm,
+            **more,
+        }
+
+    def obey(self, message: CommandLong | CommandInt, now: int) -> Verdict:
+        """Act on a command addressed to this vehicle that arrived at ``now`` (µs)."""
+        handler = self._handlers.get(message.command)
+        if handler is None:
+            return Verdict(UNSUPPORTED, f"Command {message.command} is not supported")
+        denial = handler(_order(message, now))
+        return Verdict(ACCEPTED, "") if denial is None else Verdict(*denial)
+
+    def set_mode(self, custom_mode: int, base_mode: int, now: int) -> Verdict:
+        """As SET_MODE (11), which has the mode in one number."""
+        main, sub = self._flavour.split(custom_mode)
+        denial = self._set_mode(Order((base_mode, main, sub), None, now))
+        return Verdict(ACCEPTED, "") if denial is None else Verdict(*denial)
+
+    def _arm(self, order: Order) -> Denial | None:
+        wanted, code = order.params[:2]
+        if wanted == 1.0:
+            return self._commander.arm(order.now, forced=code == _FORCED)
+        if wanted == 0.0:
+            return self._commander.disarm(forced=code == _FORCED)
+        return Denial(DENIED, "Arming: parameter 1 must be 0 or 1")
+
+    def _take_off(self, order: Order) -> Denial | None:
+        return self._commander.take_off(order.params[6], order.relative, order.now)
+
+    def _land(self, order: Order) -> Denial | None:
+        return self._commander.enter(Mode.LAND, order.now)
+
+    def _set_mode(self, order: Order) -> Denial | None:
+        base, main, sub = order.params[:3]
+        if not (math.isfinite(base) and int(base) & CUSTOM and math.isfinite(main)):
+            return Denial(DENIED, "Mode refused: only custom modes are known")
+        sub = sub if math.isfinite(sub) else 0.0
+        mode = self._flavour.requested(int(main), int(sub))
+        if mode is None:
+            return Denial(DENIED, f"Mode refused: {main:.0f}, {sub:.0f} is not known")
+        if mode is Mode.TAKEOFF:
+            return self._commander.take_off(math.nan, None, order.now)
+        return self._commander.enter(mode, order.now)
+
+
+def _order(message: CommandLong | CommandInt, now: int) -> Order:
+    if isinstance(message, CommandLong):
+        return Order(message.params, None, now)
+    relative = True if message.frame in _RELATIVE else False if message.frame in _GLOBAL else None
+    return Order((*message.params, message.x, message.y, message.z), relative, now, integer=True)

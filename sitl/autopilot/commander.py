@@ -1,0 +1,301 @@
+"""Armed state, flight mode, and what changes them: a command, the ground, or time. It decides; the guidance
+flies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from sitl.autopilot.autonomous_modes import MODES, Journeys
+from sitl.autopilot.firmware import FAILED, TEMPORARILY_REJECTED, Denial, Flavour, Mode, Status
+from sitl.autopilot.guidance import Activity, Guidance
+from sitl.autopilot.missions.itinerary import Event
+from sitl.autopilot.setpoint_reception import Steering
+from sitl.config.autopilot import AutopilotConfig
+from sitl.estimation.sensors import Estimate
+from sitl.telemetry.status_text import Voice
+from sitl.values.home import Home
+
+# PX4's position mode without sticks sinks with this speed (m/s).
+_SINKING: Final = 0.6
+# What failsafes enter, by how grave it is; other modes are none of theirs.
+_GRAVITY: Final = {Mode.HOLD: 1, Mode.RETURN: 2, Mode.LAND: 3}
+
+
+class Commander:
+    """The state of one vehicle. A verb returns None, also when what it asks is already so, or why it is
+    denied. ``doubts``: what speaks against arming, whatever the mode."""
+
+    def __init__(
+        self,
+        config: AutopilotConfig,
+        flavour: Flavour,
+        guidance: Guidance,
+        steering: Steering,
+        estimate: Callable[[], Estimate],
+        home: Home,
+        journeys: Journeys,
+        voice: Voice,
+    ) -> None:
+        """``estimate`` is the present state on demand."""
+        self._config = config
+        self._flavour = flavour
+        self._guidance = guidance
+        self._steering = steering
+        self._estimate = estimate
+        self._home = home
+        self._journeys = journeys
+        self._voice = voice
+        self._takeoff_height = config.takeoff_height
+        self._ready_at = 0 if config.start_height else round(config.ready_after * 1e6)
+        self._touched_at: int | None = None
+        self._blind_since: int | None = None
+        self._disarm_at = 0
+        self._chosen = flavour.boot_mode
+        self._lost = False
+        self.doubts: Callable[[], list[str]] = list
+        self.armed = False
+        self.landed = True
+        self.ready = False
+        self.mode = flavour.boot_mode
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        if config.takeoff_height != self._config.takeoff_height:
+            self._takeoff_height = config.takeoff_height
+        self._config = config
+
+    def status(self, now: int) -> Status:
+        """What decisions at ``now`` (µs) depend on."""
+        stream = self._steering.stream
+        return Status(
+            self.armed,
+            self.landed,
+            self.ready,
+            self.mode,
+            -self._estimate().position[2] - self._home.height,
+            self._guidance.activity is Activity.TAKEOFF,
+            stream.age(now),
+            stream.gap,
+        )
+
+    def begin_in_air(self) -> None:
+        """Boot in flight: armed, at rest, holding."""
+        self.armed, self.landed = True, False
+        self.mode = self._flavour.after_takeoff
+        self._guidance.hover(self._estimate().pose)
+
+    # What is asked
+
+    def arm(self, now: int, *, forced: bool) -> Denial | None:
+        """Allow the motors to turn. ``forced`` overrides every reason against it."""
+        if self.armed:
+            return None
+        if not forced:
+            if not self.ready:
+                return Denial(TEMPORARILY_REJECTED, "Arming refused: no position yet")
+            reason = self._flavour.arming_denial(self.status(now))
+            if doubts := [reason] if reason else self.doubts():
+                return Denial(FAILED, f"Arming refused: {doubts[0]}")
+        self.armed = True
+        self._postpone(now)
+        self._voice.inform("Armed")
+        if self.mode is Mode.MISSION:
+            self._journeys.begin(self.mode, self._estimate())
+        if self.mode is Mode.TAKEOFF:
+            self._guidance.takeoff(self._takeoff_height + self._home.height, self._estimate().pose)
+        return None
+
+    def disarm(self, *, forced: bool) -> Denial | None:
+        """Stop the motors; in flight only if ``forced``, and then it falls."""
+        if self.armed and not self.landed and not forced:
+            return Denial(FAILED, "Disarming refused: flying")
+        if self.armed:
+            self._stop("Disarmed")
+        return None
+
+    def cut(self, why: str) -> None:
+        """Stop the motors, wherever it is."""
+        if self.armed:
+            self._stop(why)
+
+    def fail_safe(self, mode: Mode, now: int) -> None:
+        """Change to ``mode`` because something is wrong; on the ground there is nothing to do, and what is
+        graver is not left for it."""
+        if not self.armed or self.landed or _GRAVITY.get(mode, 0) <= _GRAVITY.get(self.mode, 0):
+            return
+        self._switch(mode if self.ready else Mode.LAND, now)
+
+    @property
+    def level_speed(self) -> float:
+        """m/s, when nobody says another."""
+        return self._config.waypoint_speed
+
+    def take_off(self, altitude: float, relative: bool | None, now: int) -> Denial | None:
+        """As NAV_TAKEOFF (22); arguments as for ``Flavour.takeoff``."""
+        verdict = self._flavour.takeoff(altitude, relative, self._home.altitude, self.status(now))
+        if isinstance(verdict, Denial):
+            return verdict
+        self.mode, self._takeoff_height = verdict.mode, verdict.height
+        self._lost = False
+        if self.armed:
+            self._postpone(now)
+            self._guidance.takeoff(verdict.height + self._home.height, self._estimate().pose)
+        return None
+
+    def enter(self, mode: Mode, now: int) -> Denial | None:
+        """Change to ``mode``."""
+        self._lost = False
+        if mode is self.mode:
+            return None
+        status = self.status(now)
+        if mode is Mode.MISSION:
+            itinerary = self._journeys.itinerary
+            status = status._replace(items=itinerary.total, takes_off=itinerary.takes_off)
+        if denial := self._flavour.mode_denial(mode, status):
+            return denial
+        self._switch(mode, now)
+        if not self.armed or self._flavour.armable_mode(mode):
+            self._chosen = mode
+        return None
+
+    def mode_doubt(self, now: int) -> str | None:
+        """What speaks against arming in the present mode at ``now`` (µs), where the pre-arm check counts
+        that."""
+        if self.armed or not self._flavour.checks_mode:
+            return None
+        return self._flavour.arming_denial(self.status(now))
+
+    @property
+    def follows(self) -> bool:
+        """Whether a leader leads it."""
+        return self.armed and not self.landed and self.mode is Mode.FOLLOW
+
+    def steered(self, now: int) -> None:
+        """A usable set-point came: PX4 goes on with OFFBOARD if nothing but their silence had ended it."""
+        if self._lost and self.armed:
+            self._switch(Mode.GUIDED, now)
+
+    # What happens
+
+    def watch(self, now: int, on_ground: bool, located: bool) -> None:
+        """Notice what time and the ground brought about until ``now`` (µs); ``located``: the estimator says
+        that it has a position."""
+        self.ready = located and now >= self._ready_at
+        if not on_ground:
+            self.landed = False
+            self._touched_at = None
+        elif not self.landed:
+            self._touch(now)
+        if not self.armed:
+            return
+        guidance = self._guidance
+        if not located or self._blind_since is not None:
+            self._look(now, located)
+        if guidance.timed_out:
+            self._lose(now)
+        elif self.mode in MODES:
+            self._journey(now)
+        elif guidance.activity is Activity.TAKEOFF and guidance.reached:
+            self.mode = self._chosen = self._flavour.after_takeoff
+            guidance.settle()
+        if not self.landed:
+            self._postpone(now)
+        elif now >= self._disarm_at:
+            self._stop("Disarmed: on the ground for too long")
+
+    def start_mission(self, now: int) -> Denial | None:
+        """As MISSION_START (300): enter its mode, and arm if this firmware does."""
+        denial = self.enter(Mode.MISSION, now)
+        if denial is None and self._flavour.start_arms:
+            return self.arm(now, forced=False)
+        return denial
+
+    def _journey(self, now: int) -> None:
+        event = self._journeys.advance(self.mode, now, self._estimate())
+        if event is Event.RETURNS:
+            self._switch(Mode.RETURN, now)
+        elif event is Event.FINISHED:
+            self._voice.inform("Mission finished")
+            self.mode = self._chosen = self._flavour.after_mission
+            self._guidance.hold()
+
+    def _switch(self, mode: Mode, now: int) -> None:
+        self.mode = mode
+        self._lost = False
+        if self.armed and mode is Mode.MISSION:
+            self._journeys.begin(mode, self._estimate())
+            return
+        if self.landed or not self.armed:
+            self._guidance.idle()
+            if self.armed and mode is Mode.LAND:
+                self._stop("Landed, disarmed")
+            elif mode is Mode.LAND:
+                self.mode = self._flavour.after_landing
+            return
+        match mode:
+            case Mode.LAND:
+                self._guidance.land(self._config.land_speed)
+            case Mode.RETURN | Mode.FOLLOW:
+                self._journeys.begin(mode, self._estimate())
+            case Mode.GUIDED:
+                self._steering.resume(self._estimate().pose, now)
+            case _:
+                self._guidance.hold()
+
+    def _lose(self, now: int) -> None:
+        self._guidance.timed_out = False
+        self._voice.warn("Set-points timed out")
+        if self._flavour.after_loss is not self.mode:
+            self._switch(self._flavour.after_loss, now)
+            self._lost = self._flavour.keeps_choice
+        if self.mode is Mode.POSITION:
+            self._guidance.land(_SINKING)
+
+    def _look(self, now: int, located: bool) -> None:
+        """Flying without a position: land while there is height to lose, whoever steers."""
+        if located or self.landed:
+            self._blind_since = None
+            return
+        if self._blind_since is None:
+            self._blind_since = now
+        if self.mode is not Mode.LAND and now - self._blind_since >= self._flavour.blind_patience:
+            self._voice.warn(self._flavour.blind_text)
+            self._switch(Mode.LAND, now)
+
+    def _touch(self, now: int) -> None:
+        """On the ground, and not yet taken for landed."""
+        activity = self._guidance.activity
+        if activity is Activity.TAKEOFF:
+            return
+        if activity is Activity.LAND:
+            # Thrust is cut at once, so that it does not bounce while it is being sure.
+            self._guidance.idle()
+        if self._touched_at is None:
+            self._touched_at = now
+        if now - self._touched_at < self._config.touchdown_time * 1e6:
+            return
+        self.landed = True
+        self._postpone(now)
+        if self.armed and self._guidance.activity is Activity.IDLE:
+            self._stop("Landed, disarmed")
+        self._guidance.idle()
+
+    def _stop(self, why: str) -> None:
+        self.armed = False
+        self._guidance.idle()
+        self._journeys.end()
+        if self._flavour.keeps_choice:
+            self.mode = self._chosen
+        elif self.mode is Mode.LAND:
+            self.mode = self._flavour.after_landing
+        elif self.mode is Mode.RETURN:
+            self.mode = self._flavour.after_return
+        elif self.mode is Mode.MISSION:
+            self.mode = self._flavour.after_mission
+        elif self.mode is Mode.TAKEOFF:
+            self.mode = self._flavour.after_takeoff
+        self._voice.inform(why)
+
+    def _postpone(self, now: int) -> None:
+        self._disarm_at = now + round(self._config.disarm_delay * 1e6)

@@ -1,0 +1,138 @@
+"""What the vehicle watches by itself, and what follows: its battery and its fence. Also what speaks against
+arming."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from mavlink_bridge.messages import FenceStatus, Source
+from sitl.autopilot.commander import Commander
+from sitl.autopilot.fences import Breach, Fences
+from sitl.autopilot.firmware import Flavour, Mode, Worry
+from sitl.estimation.sensors import Estimate
+from sitl.telemetry.status_text import Voice
+from sitl.vehicle.battery import Battery, Charge
+
+_PERIOD: Final = 100_000
+# µs; ArduPilot says again and again why it cannot be armed.
+_AGAIN: Final = 30_000_000
+_ACTIONS: Final = {"hold": Mode.HOLD, "return": Mode.RETURN, "land": Mode.LAND}
+_WORDS: Final = {
+    Breach.TOO_LOW: "too low",
+    Breach.TOO_HIGH: "too high",
+    Breach.BOUNDARY: "outside",
+}
+
+
+class Failsafes:
+    """To be asked to ``watch`` when ``next_due`` (µs) has come."""
+
+    def __init__(
+        self,
+        flavour: Flavour,
+        commander: Commander,
+        fences: Fences,
+        battery: Battery | None,
+        estimate: Callable[[], Estimate],
+        voice: Voice,
+    ) -> None:
+        self._flavour = flavour
+        self._commander = commander
+        self._fences = fences
+        self._battery = battery
+        self._estimate = estimate
+        self._voice = voice
+        self._worry = Worry(0)
+        self._worse_since: int | None = None
+        self._breach = Breach.NONE
+        self._breached_at = 0
+        self._breaches = 0
+        self._said_at = 0
+        self.next_due = 0
+
+    @property
+    def breached(self) -> bool:
+        """Whether it is beyond its fence."""
+        return self._breach is not Breach.NONE
+
+    def fence_status(self, source: Source) -> FenceStatus:
+        """FENCE_STATUS (162)."""
+        return FenceStatus(
+            source, self._breached_at, self.breached, self._breaches & 0xFFFF, int(self._breach)
+        )
+
+    def doubts(self) -> list[str]:
+        """What speaks against arming, beside what the mode may have against it."""
+        found = [] if self._commander.ready else ["no position yet"]
+        if self._battery is not None and self._battery.charge.remaining <= 0.0:
+            found.append("battery empty")
+        elif self._worry.level:
+            found.append(f"battery {self._worry.word}")
+        if self._commander.ready and self._where() is not Breach.NONE:
+            found.append(f"{_WORDS[self._where()]} of the fence")
+        return found
+
+    def watch(self, now: int) -> None:
+        """At ``now`` (µs)."""
+        self.next_due = now + _PERIOD
+        if self._battery is not None:
+            self._watch_battery(self._battery.charge, now)
+        commander = self._commander
+        if commander.armed and commander.ready:
+            self._watch_fence(now)
+        elif not commander.armed:
+            self._breach = Breach.NONE
+        if not commander.armed and self._flavour.repeats_doubts and now - self._said_at >= _AGAIN:
+            self._said_at = now
+            self.say_doubts(now)
+
+    def say_doubts(self, now: int) -> None:
+        """One text for each, at ``now`` (µs)."""
+        of_mode = self._commander.mode_doubt(now)
+        for doubt in [*([of_mode] if of_mode else []), *self.doubts()]:
+            self._voice.warn(f"{self._flavour.doubt_prefix}{doubt}")
+
+    # Within
+
+    def _watch_battery(self, charge: Charge, now: int) -> None:
+        commander = self._commander
+        if charge.remaining <= 0.0 and commander.armed:
+            commander.cut("Battery empty: motors stopped")
+        worry = self._flavour.worry(charge)
+        if not commander.armed and worry.level < self._worry.level:
+            self._worry = worry
+        if worry.level <= self._worry.level:
+            self._worse_since = None
+            return
+        if self._worse_since is None:
+            self._worse_since = now
+        if now - self._worse_since >= self._flavour.battery_patience:
+            self._worry, self._worse_since = worry, None
+            self._voice.warn(f"Battery {worry.word}: {charge.voltage:.1f} V, {100 * charge.remaining:.0f} %")
+            if worry.mode is not None:
+                commander.fail_safe(worry.mode, now)
+
+    def _where(self) -> Breach:
+        rules = self._flavour.fence_rules
+        limited = self._fences.uploaded or min(rules.height, rules.radius, -rules.floor) < math.inf
+        if not (rules.enabled and limited):
+            return Breach.NONE
+        return self._fences.breach(self._estimate().position, rules)
+
+    def _watch_fence(self, now: int) -> None:
+        breach, before = self._where(), self._breach
+        self._breach = breach
+        if breach is before or breach is Breach.NONE:
+            return
+        self._breaches += 1
+        self._breached_at = now
+        action = self._flavour.fence_rules.action
+        if action == "nothing":
+            return
+        self._voice.warn(f"Fence breached: {_WORDS[breach]}")
+        if action == "terminate":
+            self._commander.cut("Flight terminated")
+        elif action in _ACTIONS:
+            self._commander.fail_safe(_ACTIONS[action], now)

@@ -1,0 +1,118 @@
+"""Fences: where the vehicle must not be, and which of them it has crossed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Final, NamedTuple
+
+from mavlink_bridge.messages import Vector
+from sitl.autopilot.missions.items import Item, Type
+from sitl.autopilot.missions.plans import Plans
+from sitl.values.home import Home
+from sitl.values.origin import Origin
+
+# MAV_CMD_NAV_FENCE: corners of a polygon to stay in and out of, circles likewise
+_STAY_IN, _STAY_OUT, _CIRCLE_IN, _CIRCLE_OUT = 5001, 5002, 5003, 5004
+Point = tuple[float, float]
+
+
+class Breach(IntEnum):
+    """FENCE_BREACH."""
+
+    NONE = 0
+    TOO_LOW = 1
+    TOO_HIGH = 2
+    BOUNDARY = 3
+
+
+class Rules(NamedTuple):
+    """What a firmware makes of it. ``any_area``: within one of the areas to stay in is enough (PX4), else
+    within all of them; ``areas``: whether they count; ``floor``, ``height`` and ``radius`` (m) are infinite
+    where there is no limit."""
+
+    enabled: bool
+    any_area: bool
+    height: float
+    radius: float
+    action: str
+    areas: bool = True
+    floor: float = -math.inf
+
+
+class _Area(NamedTuple):
+    """A polygon, or a circle around its only corner; local NED, m."""
+
+    corners: tuple[Point, ...]
+    radius: float
+    stay_in: bool
+
+    def holds(self, x: float, y: float) -> bool:
+        """Whether (x, y) is within."""
+        if self.radius:
+            return math.dist(self.corners[0], (x, y)) <= self.radius
+        inside = False
+        for (ax, ay), (bx, by) in zip(self.corners, self.corners[1:] + self.corners[:1], strict=True):
+            # A ray to the north crosses the edge.
+            if (ay > y) != (by > y) and x < ax + (bx - ax) * (y - ay) / (by - ay):
+                inside = not inside
+        return inside
+
+
+_NO_ITEMS: Final[tuple[Item, ...]] = ()
+
+
+class Fences:
+    """The fence of ``plans``, and a cylinder around home."""
+
+    def __init__(self, plans: Plans, origin: Origin, home: Home) -> None:
+        self._plans = plans
+        self._origin = origin
+        self._home = home
+        self._items = _NO_ITEMS
+        self._areas: tuple[_Area, ...] = ()
+
+    @property
+    def uploaded(self) -> bool:
+        """Whether there are areas."""
+        return bool(self._plans.items(Type.FENCE))
+
+    def breach(self, position: Vector, rules: Rules) -> Breach:
+        """Which limit ``position`` (m, local NED) is beyond."""
+        x, y, z = position
+        if -z - self._home.height > rules.height:
+            return Breach.TOO_HIGH
+        if -z - self._home.height < rules.floor:
+            return Breach.TOO_LOW
+        if math.dist(self._home.position[:2], (x, y)) > rules.radius:
+            return Breach.BOUNDARY
+        areas = self._known() if rules.areas else ()
+        within = [area.holds(x, y) for area in areas if area.stay_in]
+        kept_in = not within or (any(within) if rules.any_area else all(within))
+        kept_out = not any(area.holds(x, y) for area in areas if not area.stay_in)
+        return Breach.NONE if kept_in and kept_out else Breach.BOUNDARY
+
+    def _known(self) -> tuple[_Area, ...]:
+        items = self._plans.items(Type.FENCE)
+        if items is not self._items:
+            self._items, self._areas = items, tuple(self._read(items))
+        return self._areas
+
+    def _read(self, items: Sequence[Item]) -> list[_Area]:
+        areas: list[_Area] = []
+        at = 0
+        while at < len(items):
+            item, count = items[at], 1
+            if item.command in (_STAY_IN, _STAY_OUT):
+                count = int(item.params[0])
+                corners = tuple(self._point(corner) for corner in items[at : at + count])
+                areas.append(_Area(corners, 0.0, item.command == _STAY_IN))
+            elif item.command in (_CIRCLE_IN, _CIRCLE_OUT):
+                areas.append(_Area((self._point(item),), item.params[0], item.command == _CIRCLE_IN))
+            at += count
+        return areas
+
+    def _point(self, item: Item) -> Point:
+        x, y, _ = self._origin.local(item.x / 1e7, item.y / 1e7, self._origin.altitude)
+        return x, y

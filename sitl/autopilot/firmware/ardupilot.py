@@ -1,0 +1,247 @@
+"""ArduCopter 4.6: modes by one number, triples of ignore bits, offsets and body frames, takeoff by
+command."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from mavlink_bridge.messages import SetpointAttitude, SetpointLocal, Vector
+from sitl.autopilot.attitude_setpoints import climbing
+from sitl.autopilot.fences import Rules
+from sitl.autopilot.firmware import (
+    ACTIONS,
+    CUSTOM,
+    DENIED,
+    FAILED,
+    GUIDED_FLAG,
+    MANUAL,
+    STABILIZED,
+    TEMPORARILY_REJECTED,
+    Denial,
+    Mode,
+    Status,
+    Takeoff,
+    Worry,
+    limit,
+)
+from sitl.config.autopilot import AutopilotConfig
+from sitl.values.setpoints import (
+    ACCELERATION,
+    BODY_NED,
+    BODY_OFFSET_NED,
+    IGNORE_ACCELERATION,
+    IGNORE_POSITION,
+    IGNORE_VELOCITY,
+    IGNORE_YAW,
+    IGNORE_YAW_RATE,
+    LOCAL_NED,
+    LOCAL_OFFSET_NED,
+    POSITION,
+    VELOCITY,
+    ZERO,
+    Pose,
+    Reading,
+    Refusal,
+    Setpoint,
+    Stop,
+    rotated,
+    unusable,
+)
+from sitl.vehicle.battery import Charge
+
+_NUMBERS: Final = {
+    Mode.STANDBY: 0,
+    Mode.GUIDED: 4,
+    Mode.TAKEOFF: 4,
+    Mode.POSITION: 5,
+    Mode.MISSION: 3,
+    Mode.RETURN: 6,
+    Mode.LAND: 9,
+    Mode.HOLD: 17,
+    Mode.FOLLOW: 23,
+}
+_MODES: Final = {
+    0: Mode.STANDBY,
+    3: Mode.MISSION,
+    4: Mode.GUIDED,
+    5: Mode.POSITION,
+    6: Mode.RETURN,
+    9: Mode.LAND,
+    17: Mode.HOLD,
+    23: Mode.FOLLOW,
+}
+_NAMES: Final = {Mode.MISSION: "AUTO", Mode.RETURN: "RTL", Mode.HOLD: "BRAKE"}
+_NOT_ARMABLE: Final = (Mode.LAND, Mode.HOLD, Mode.MISSION, Mode.RETURN, Mode.FOLLOW)
+_FRAMES: Final = (LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED)
+_TRIPLES: Final = (IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION)
+
+
+class ArduPilot:
+    """STABILIZE 0, AUTO 3, GUIDED 4, LOITER 5, RTL 6, LAND 9, BRAKE 17, FOLLOW 23.
+
+    The force bit of a set-point means nothing to it: MAVProxy's velocity command has it set.
+    """
+
+    autopilot = 3
+    boot_mode = Mode.STANDBY
+    stream_first = False
+    stops = True
+    reports_ekf = True
+    echoes_yaw = False
+    # Streams are served from the 400 Hz loop, and not faster than 80 % of it.
+    shortest_interval = 3125
+    bytewise = False
+    groups_streams = True
+    after_takeoff = Mode.GUIDED
+    after_landing = Mode.LAND
+    keeps_choice = False
+    after_return = Mode.RETURN
+    after_mission = Mode.MISSION
+    # As if the number of the message were a command's.
+    set_mode_ack = 11
+    first_item = 1
+    start_arms = False
+    after_loss = Mode.GUIDED
+    # EKF3's posRetryTimeNoVel; then ten failures of the check that runs at 10 Hz.
+    coasting = 7.0
+    blind_patience = 1_000_000
+    blind_text = "EKF Failsafe: changed to LAND Mode"
+    doubt_prefix = "PreArm: "
+    repeats_doubts = True
+    checks_mode = False
+    # BATT_LOW_TIMER.
+    battery_patience = 10_000_000
+    repositioning = Mode.GUIDED
+    loiter = Mode.POSITION
+
+    def __init__(self, config: AutopilotConfig) -> None:
+        self.configure(config)
+
+    def configure(self, config: AutopilotConfig) -> None:
+        self._timeout = round(config.guided_timeout * 1e6)
+        self._climb, self._sink = config.waypoint_climb, config.waypoint_sink
+        self._battery = config.battery_failsafe
+        self._follows = config.follow.enabled == "on"
+        fence = config.fence
+        kinds = round(fence.kinds)
+        self.fence_rules = Rules(
+            fence.enabled == "on",
+            False,
+            limit(fence.height, 100.0) if kinds & 1 else math.inf,
+            limit(fence.radius, 300.0) if kinds & 2 else math.inf,
+            fence.action or "return",
+            areas=bool(kinds & 4),
+            floor=fence.floor if kinds & 8 else -math.inf,
+        )
+
+    def custom_mode(self, mode: Mode) -> int:
+        return _NUMBERS[mode]
+
+    def base_mode(self, mode: Mode) -> int:
+        guided = GUIDED_FLAG if mode not in (Mode.STANDBY, Mode.POSITION) else 0
+        return CUSTOM | STABILIZED | MANUAL | guided
+
+    def split(self, custom_mode: int, /) -> tuple[int, int]:
+        return custom_mode, 0
+
+    def requested(self, main: int, _sub: int, /) -> Mode | None:
+        return _MODES.get(main)
+
+    def armable_mode(self, mode: Mode, /) -> bool:
+        return mode not in _NOT_ARMABLE
+
+    def arming_denial(self, status: Status) -> str | None:
+        name = _NAMES.get(status.mode, status.mode.name)
+        return None if self.armable_mode(status.mode) else f"{name} mode is not armable"
+
+    def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
+        if mode is Mode.STANDBY and status.armed and not status.landed:
+            return Denial(FAILED, "STABILIZE in flight needs a pilot")
+        if mode not in (Mode.STANDBY, Mode.LAND) and not status.ready:
+            return Denial(FAILED, "Mode change failed: requires position")
+        if mode is Mode.FOLLOW and not self._follows:
+            return Denial(FAILED, "Mode change to FOLLOW failed: FOLL_ENABLE is 0")
+        if mode is Mode.MISSION and not status.items:
+            return Denial(FAILED, "Mode change to AUTO failed: no mission")
+        if mode is Mode.MISSION and status.armed and status.landed and not status.takes_off:
+            return Denial(FAILED, "Auto: Missing Takeoff Cmd")
+        return None
+
+    def worry(self, charge: Charge, /) -> Worry:
+        battery = self._battery
+        if charge.voltage < battery.critical_voltage:
+            return Worry(2, "critical", ACTIONS[battery.critical_action])
+        if charge.voltage < battery.low_voltage:
+            return Worry(1, "low", ACTIONS[battery.low_action])
+        return Worry(0)
+
+    def takeoff(
+        self, altitude: float, relative: bool | None, _ground: float, status: Status, /
+    ) -> Takeoff | Denial:
+        if relative is False:
+            return Denial(DENIED, "Takeoff needs an altitude above home")
+        if not math.isfinite(altitude) or altitude <= 0.0:
+            return Denial(FAILED, "Takeoff needs a positive altitude")
+        if status.mode is not Mode.GUIDED:
+            return Denial(FAILED, "Takeoff needs GUIDED mode")
+        if not status.armed:
+            return Denial(FAILED, "Takeoff needs armed motors")
+        if not status.landed and not status.taking_off:
+            return Denial(TEMPORARILY_REJECTED, "Takeoff refused: already flying")
+        return Takeoff(altitude, Mode.GUIDED)
+
+    def read(self, message: SetpointLocal, here: Pose) -> Reading:
+        mask = message.type_mask
+        for triple in _TRIPLES:
+            mask |= triple if mask & triple else 0
+        if fault := unusable(message, mask):
+            return Refusal(fault)
+        if message.frame not in _FRAMES:
+            return Stop(f"Set-point stops: frame {message.frame}")
+        position, velocity, acceleration = (not mask & triple for triple in _TRIPLES)
+        if (position and acceleration and not velocity) or not (position or velocity or acceleration):
+            return Stop(f"Set-point stops: mask 0x{message.type_mask:X}")
+
+        level = POSITION if position else VELOCITY if velocity else ACCELERATION
+        body = message.frame in (BODY_NED, BODY_OFFSET_NED)
+        turn = here.yaw if body else 0.0
+        yaw = None if mask & IGNORE_YAW else message.yaw + turn
+        return Setpoint(
+            (level, level, level),
+            _placed(message, here) if position else ZERO,
+            _turned(message.velocity, turn) if velocity else ZERO,
+            _turned(message.acceleration, turn) if acceleration else ZERO,
+            yaw,
+            None if mask & IGNORE_YAW_RATE else message.yaw_rate,
+            complete=position and velocity,
+        )
+
+    def read_attitude(self, message: SetpointAttitude, /) -> Reading:
+        return climbing(message, self._climb, self._sink)
+
+    def steering_denial(self, status: Status) -> str | None:
+        if status.mode is not Mode.GUIDED:
+            return "Set-point ignored: not in GUIDED"
+        if not status.armed:
+            return "Set-point ignored: disarmed"
+        if status.landed:
+            return "Set-point ignored: landed, take off first"
+        return None
+
+    def timeout(self, setpoint: Setpoint, /) -> int | None:
+        return self._timeout if setpoint.moves else None
+
+
+def _turned(vector: Vector, yaw: float) -> Vector:
+    return rotated(vector, yaw) if yaw else vector
+
+
+def _placed(message: SetpointLocal, here: Pose) -> Vector:
+    """Frame 1: from the origin. 7: from here, along north and east. 8 and 9: from here, along the body."""
+    if message.frame == LOCAL_NED:
+        return message.position
+    turn = 0.0 if message.frame == LOCAL_OFFSET_NED else here.yaw
+    dx, dy, dz = _turned(message.position, turn)
+    x, y, z = here.position
+    return x + dx, y + dy, z + dz

@@ -1,0 +1,116 @@
+"""The follow modes: beside or behind someone who tells where he is, by FOLLOW_TARGET (144) or
+GLOBAL_POSITION_INT (33)."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from mavlink_bridge.messages import FollowTarget, GlobalPosition, Vector
+from sitl.autopilot.guidance import Activity, Guidance
+from sitl.config.autonomy import FollowConfig
+from sitl.values.home import Home
+from sitl.values.origin import Origin
+from sitl.values.setpoints import POSITION, ZERO, Pose, Setpoint, rotated
+
+# Slower than that (m/s) it has no course.
+_MOVING: Final = 0.3
+# Nearer than this (m) there is no bearing to turn to.
+_NEAR: Final = 1.0
+# PX4 has no limit of its own; what is further off (m) is no leader but damage.
+_FARTHEST: Final = 1000.0
+_FIRM: Final = (POSITION, POSITION, POSITION)
+
+
+class Following:
+    """Keeps station on the one who is heard; without one it holds."""
+
+    def __init__(
+        self, guidance: Guidance, origin: Origin, home: Home, config: FollowConfig, *, px4: bool
+    ) -> None:
+        """``px4``: FOLLOW_TARGET alone counts, and the place is one of distance, angle and height."""
+        self._guidance = guidance
+        self._origin = origin
+        self._home = home
+        self._px4 = px4
+        self._offset: Vector | None = None
+        self._course = 0.0
+        self._heard = -math.inf
+        self._config = config
+        self._system = round(config.system)
+
+    def configure(self, config: FollowConfig) -> None:
+        """Other settings from now on."""
+        if config != self._config:
+            self._config = config
+            self._system = round(config.system)
+            self._offset = None
+
+    def choose(self, system: int) -> None:
+        """As DO_FOLLOW (32): this one from now on."""
+        self._system = system
+        self._offset = None
+
+    def begin(self) -> None:
+        """Hold until the one is heard."""
+        self._guidance.hold()
+        self._offset = None
+        self._heard = -math.inf
+
+    def receive(self, message: FollowTarget | GlobalPosition, here: Pose, now: int) -> None:
+        """Someone says where he is, at ``now`` (µs); followed if it is the one."""
+        if not self._is_meant(message):
+            return
+        self._system = self._system or message.source.system
+        there, velocity = self._motion(message)
+        if math.dist(there, here.position) > (_FARTHEST if self._px4 else self._config.limit):
+            return
+        self._heard = now
+        station = self._station(there, message, velocity, here)
+        north, east = there[0] - here.position[0], there[1] - here.position[1]
+        yaw = math.atan2(east, north) if math.hypot(north, east) > _NEAR else None
+        setpoint = Setpoint(_FIRM, station, velocity, yaw=yaw, complete=True)
+        self._guidance.track(setpoint, now, None, here, now)
+
+    def advance(self, now: int) -> None:
+        """To be called in each step at ``now`` (µs)."""
+        lost = now - self._heard > self._config.patience * 1e6
+        if lost and self._guidance.activity is Activity.TRACK:
+            self._guidance.hold()
+
+    def _is_meant(self, message: FollowTarget | GlobalPosition) -> bool:
+        if self._px4:
+            return isinstance(message, FollowTarget)
+        return self._system in (0, message.source.system)
+
+    def _motion(self, message: FollowTarget | GlobalPosition) -> tuple[Vector, Vector]:
+        """Position (m) and velocity (m/s), local NED. Heights count from each one's home, as by default."""
+        x, y, z = self._origin.local(message.latitude, message.longitude, message.altitude)
+        if isinstance(message, GlobalPosition):
+            z = -(self._home.height + message.relative_altitude)
+            return (x, y, z), message.velocity_ned
+        return (x, y, z), message.velocity or ZERO
+
+    def _station(
+        self, there: Vector, message: FollowTarget | GlobalPosition, velocity: Vector, here: Pose
+    ) -> Vector:
+        config = self._config
+        if math.hypot(velocity[0], velocity[1]) > _MOVING:
+            self._course = math.atan2(velocity[1], velocity[0])
+        if self._px4:
+            bearing = self._course + math.radians(config.angle)
+            x, y = config.distance * math.cos(bearing), config.distance * math.sin(bearing)
+            return there[0] + x, there[1] + y, -(self._home.height + config.height)
+        offset = (config.x, config.y, config.z)
+        if offset == ZERO:
+            if self._offset is None:
+                self._offset = _minus(here.position, there)
+            offset = self._offset
+        elif config.axes == "heading":
+            yaw = message.yaw if isinstance(message, GlobalPosition) else None
+            offset = rotated(offset, self._course if yaw is None else yaw)
+        return there[0] + offset[0], there[1] + offset[1], there[2] + offset[2]
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]

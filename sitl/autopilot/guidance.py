@@ -1,0 +1,270 @@
+"""What the autopilot is doing, as a reference to track: stand, take off, follow set-points, hold, land.
+
+All in the vehicle's own local NED. Every motion goes through the shaper, so that none of them begins with a
+step; and from there, if the configuration says so, through a firmware's response.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from typing import Final
+
+from mavlink_bridge.messages import Vector
+from sitl.autopilot.position_control.airframe import Motion
+from sitl.autopilot.response import response_of
+from sitl.autopilot.shaper import Heading, Limits, Shaper
+from sitl.config.autopilot import AutopilotConfig
+from sitl.values.setpoints import POSITION, VELOCITY, ZERO, Pose, Setpoint
+
+_STAY: Final = Setpoint((VELOCITY, VELOCITY, VELOCITY))
+_FOR_EVER: Final = 1 << 62
+_REACHED: Final = (0.05, 0.1)  # m, m/s
+
+
+class Activity(Enum):
+    """What the guidance is busy with. IDLE: no reference, motors off or idling."""
+
+    IDLE = "idle"
+    TAKEOFF = "takeoff"
+    GO = "go"
+    TRACK = "track"
+    HOLD = "hold"
+    LAND = "land"
+
+
+_INTERRUPTIBLE: Final = (Activity.GO, Activity.TRACK, Activity.HOLD)
+
+
+class Guidance:
+    """One reference, moved on in steps of some ms.
+
+    ``motion`` (SI, local NED) and ``yaw``, ``yaw_rate`` are what to track now. ``timed_out`` becomes true
+    when set-points stop for longer than they may: it brakes and holds where it comes to rest.
+    """
+
+    def __init__(self, config: AutopilotConfig) -> None:
+        self._limits: dict[Activity, Limits] = {}
+        self._response = response_of(config)
+        self.configure(config)
+        self._shaper = Shaper()
+        self._heading = Heading(config.max_yaw_rate, config.max_yaw_acceleration)
+        self._setpoint = _STAY
+        self._received = 0
+        self._deadline = _FOR_EVER
+        self._interrupted: tuple[Activity, Setpoint] | None = None
+        self._asked: Motion | None = None
+        self.activity = Activity.IDLE
+        self.timed_out = False
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        limits = config.max_speed, config.max_acceleration, config.max_jerk
+        gentle = config.gentle_acceleration, config.max_jerk
+        self._config = config
+        # The way that is being flown keeps its own speed.
+        going = self._limits.get(Activity.GO, Limits(config.waypoint_speed, *gentle))
+        self._limits = {
+            Activity.GO: Limits(going.speed, *gentle),
+            Activity.TAKEOFF: Limits(config.takeoff_speed, *gentle),
+            Activity.TRACK: Limits(*limits),
+            Activity.HOLD: Limits(config.max_speed, *gentle),
+            Activity.LAND: Limits(config.max_speed, *gentle),
+        }
+        if self._response is not None:
+            self._response.configure(config)
+
+    @property
+    def motion(self) -> Motion:
+        """Position, velocity, acceleration."""
+        if self._response is not None:
+            return self._response.motion
+        shaper = self._shaper
+        return shaper.position, shaper.velocity, shaper.acceleration
+
+    @property
+    def asked(self) -> Motion:
+        """What set-points ask for now; where none do, the motion."""
+        return self._asked if self._asked is not None and self._chased else self.motion
+
+    @property
+    def yaw(self) -> float:
+        return self._heading.yaw
+
+    @property
+    def yaw_rate(self) -> float:
+        return self._heading.yaw_rate
+
+    @property
+    def reached(self) -> bool:
+        """Whether a takeoff is where it leads, and all but at rest; what lags behind it comes along."""
+        gap = self._setpoint.position[2] - self._shaper.position[2]
+        return abs(gap) < _REACHED[0] and math.hypot(*self._shaper.velocity) < _REACHED[1]
+
+    def wanted(self, now: int) -> Setpoint:
+        """The set-point that is followed, extrapolated to ``now`` (µs) and within the limits."""
+        config = self._config
+        age = (now - self._received) * 1e-6
+        if self.activity is Activity.GO:
+            return self._setpoint
+        if self._chased:
+            # ArduPilot carries a set-point forward until its time-out; PX4 leaves it as it came.
+            return self._setpoint.after(age if config.flavour == "ardupilot" else 0.0, math.inf)
+        return self._setpoint.after(age, config.thrusting).limited(config.max_speed, config.max_acceleration)
+
+    def idle(self) -> None:
+        """No reference."""
+        self.activity = Activity.IDLE
+        self._interrupted = None
+
+    def takeoff(self, height: float, here: Pose) -> None:
+        """Straight up to ``height`` (m above the origin)."""
+        self._leave_ground(here)
+        x, y, _ = self._shaper.position
+        self._begin(Activity.TAKEOFF, Setpoint((POSITION, POSITION, POSITION), (x, y, -height)))
+
+    def go(self, position: Vector, speed: float, yaw: float | None, here: Pose) -> None:
+        """To ``position`` (m) at up to ``speed`` (m/s), looking to ``yaw`` (rad; None: as it looks now)."""
+        self._leave_ground(here)
+        gentle = self._config.gentle_acceleration, self._config.max_jerk
+        self._limits[Activity.GO] = Limits(speed, *gentle)
+        self._begin(Activity.GO, Setpoint((POSITION, POSITION, POSITION), position, yaw=yaw))
+
+    def track(self, setpoint: Setpoint, received: int, timeout: int | None, here: Pose, now: int) -> None:
+        """Follow ``setpoint``, which is for the time ``received`` (µs), until ``timeout`` µs after that."""
+        self._leave_ground(here)
+        self._received = received
+        self._deadline = _FOR_EVER if timeout is None else received + timeout
+        if self._interrupted is not None:
+            self._interrupted = Activity.TRACK, setpoint
+            return
+        self._begin(Activity.TRACK, setpoint)
+        if self._chased:
+            return
+        # A trajectory that is being passed through takes effect at once, not at the end of the next step.
+        self._shaper.advance(self.wanted(now), self._limits[Activity.TRACK], 0.0)
+
+    def hasten(self, speed: float) -> None:
+        """From now on at up to ``speed`` (m/s) to where it goes."""
+        if self.activity is Activity.GO or (self._interrupted and self._interrupted[0] is Activity.GO):
+            self._limits[Activity.GO] = self._limits[Activity.GO]._replace(speed=speed)
+
+    def look(self, yaw: float) -> None:
+        """To ``yaw`` (rad), until something else says where to look."""
+        self._setpoint = self._setpoint._replace(yaw=yaw, yaw_rate=None)
+
+    @property
+    def paused(self) -> bool:
+        """Whether it stays on ``pause``."""
+        return self._interrupted is not None
+
+    def pause(self) -> bool:
+        """Brake and stay. ``go_on`` goes on with what it does now, or what ``track`` is told meanwhile.
+        False where there is nothing to interrupt."""
+        if self._interrupted is None and self.activity in _INTERRUPTIBLE:
+            interrupted = self.activity, self._setpoint
+            self.hold()
+            self._interrupted = interrupted
+        return self.paused
+
+    def go_on(self) -> None:
+        """End of ``pause``."""
+        if self._interrupted is not None:
+            activity, setpoint = self._interrupted
+            self._begin(activity, setpoint)
+
+    def hover(self, here: Pose) -> None:
+        """Stay ``here``, where it is at rest in the air."""
+        self._leave_ground(here)
+        self.hold()
+
+    def hold(self) -> None:
+        """Brake, and stay where that ends."""
+        self._begin(Activity.HOLD, _STAY)
+
+    def settle(self) -> None:
+        """Stay where the takeoff led."""
+        self.activity = Activity.HOLD
+
+    def land(self, speed: float) -> None:
+        """Brake, and sink at ``speed`` (m/s)."""
+        self._begin(Activity.LAND, _STAY._replace(velocity=(0.0, 0.0, speed)))
+
+    def relocate(self, position: Vector, velocity: Vector) -> None:
+        """The frame has slipped: what is being tracked is now here, and goes on from here.
+
+        A takeoff still leads straight up. A set-point stays what it says, and is chased within the limits.
+        """
+        if self.activity is Activity.IDLE:
+            return
+        shaper = self._shaper
+        if self.activity is Activity.TAKEOFF:
+            z = self._setpoint.position[2]
+            self._setpoint = self._setpoint._replace(position=(position[0], position[1], z))
+        shaper.position, shaper.velocity, shaper.captured = position, velocity, False
+        if self._response is not None:
+            self._response.relocate(position, velocity)
+
+    def advance(self, now: int, step: int, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
+        """Move the reference from ``now`` to ``now + step`` (µs), in air that moves with ``wind`` (m/s); the
+        estimated position moves by ``drift`` (m/s) more than the estimated velocity says."""
+        activity = self.activity
+        if activity is Activity.IDLE:
+            return
+        end = now + step
+        dt = step * 1e-6
+        if activity is Activity.TRACK:
+            if end > self._deadline:
+                self._expire(self.wanted(self._deadline))
+            wanted = self.wanted(end)
+        else:
+            wanted = self._setpoint
+            if activity is Activity.HOLD and wanted.yaw is None and self._resting:
+                return
+        self._heading.advance(wanted.yaw, wanted.yaw_rate, dt)
+        shaper, response = self._shaper, self._response
+        if response is not None and self._chased:
+            self._asked = wanted.position, wanted.velocity, wanted.acceleration
+            response.advance(self._asked, dt, wind, drift)
+            # What comes after the stream begins where the firmware has got to.
+            shaper.position, shaper.velocity, shaper.acceleration = response.desired
+            return
+        shaper.advance(wanted, self._limits[self.activity], dt)
+        if response is not None:
+            response.advance((shaper.position, shaper.velocity, shaper.acceleration), dt, wind, drift)
+
+    def _expire(self, last: Setpoint) -> None:
+        """Set-points come no more: brake and hold. ArduPilot forgets what velocity it was told, but not the
+        position, which stops where it has got to; the vehicle goes back there."""
+        persists = self._response is not None and self._config.flavour == "ardupilot"
+        if persists and last.levels[0] == POSITION:
+            self._shaper.restart(last.position)
+        self.hold()
+        self.timed_out = True
+
+    @property
+    def _chased(self) -> bool:
+        """Whether the firmware's own position controller has the set-points, as they are."""
+        return (
+            self._response is not None
+            and self.activity is Activity.TRACK
+            and self._setpoint.levels == (POSITION, POSITION, POSITION)
+        )
+
+    @property
+    def _resting(self) -> bool:
+        """Whether nothing would move; a response goes on for ever, ever slower."""
+        return self._shaper.at_rest and self._heading.yaw_rate == 0.0 and self._response is None
+
+    def _begin(self, activity: Activity, setpoint: Setpoint) -> None:
+        self.activity = activity
+        self.timed_out = False
+        self._interrupted = None
+        self._setpoint = setpoint
+
+    def _leave_ground(self, here: Pose) -> None:
+        if self.activity is Activity.IDLE:
+            self._shaper.restart(here.position)
+            if self._response is not None:
+                self._response.restart(here.position)
+            self._heading.restart(here.yaw)

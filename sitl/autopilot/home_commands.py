@@ -1,0 +1,80 @@
+"""Home and origin as others set them: DO_SET_HOME (179), SET_HOME_POSITION (243), SET_GPS_GLOBAL_ORIGIN
+(48)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from mavlink_bridge.messages import SetGpsGlobalOrigin, SetHomePosition
+from sitl.autopilot.command_protocol import Handler, Order
+from sitl.autopilot.firmware import DENIED, TEMPORARILY_REJECTED, Denial
+from sitl.estimation.sensors import Estimate
+from sitl.telemetry.reports import ORIGIN
+from sitl.telemetry.schedule import Telemetry
+from sitl.telemetry.status_reports import HOME
+from sitl.telemetry.status_text import Voice
+from sitl.values.home import Home
+from sitl.values.origin import Origin
+
+SET_HOME: Final = 179
+# A home further off (m) is a mistake.
+_FAR: Final = 100_000.0
+
+
+class Homing:
+    """Moves ``home``, and tells it whenever it moved. The origin of a filter that has one stays, as on a real
+    ArduPilot; who wants to set it is told where it is."""
+
+    def __init__(
+        self,
+        home: Home,
+        origin: Origin,
+        telemetry: Telemetry,
+        estimate: Callable[[], Estimate],
+        ready: Callable[[], bool],
+        voice: Voice,
+    ) -> None:
+        """``ready``: whether there is a position."""
+        self._home = home
+        self._origin = origin
+        self._telemetry = telemetry
+        self._estimate = estimate
+        self._ready = ready
+        self._voice = voice
+        self.commands: dict[int, Handler] = {SET_HOME: self._set_home}
+
+    def set_home(self, message: SetHomePosition, now: int) -> None:
+        """SET_HOME_POSITION (243)."""
+        denial = self._move(message.latitude, message.longitude, message.altitude)
+        if denial is not None:
+            self._voice.complain(denial.reason, now)
+
+    def set_origin(self, _message: SetGpsGlobalOrigin, now: int) -> None:
+        """SET_GPS_GLOBAL_ORIGIN (48)."""
+        self._voice.complain("Origin refused: it is set already", now)
+        self._telemetry.request(ORIGIN)
+
+    def _set_home(self, order: Order) -> Denial | None:
+        """Parameter 1: here; else parameters 5 to 7, degrees and metres above mean sea level, or as the frame
+        says."""
+        if order.params[0] == 1.0:
+            if not self._ready():
+                return Denial(TEMPORARILY_REJECTED, "Home refused: no position yet")
+            return self._move(*self._origin.geodetic(self._estimate().position))
+        if order.integer and order.relative is None:
+            return Denial(DENIED, "Home refused: this frame is not known")
+        latitude, longitude, altitude = order.place
+        if order.relative:
+            altitude += self._home.altitude
+        return self._move(latitude, longitude, altitude)
+
+    def _move(self, latitude: float, longitude: float, altitude: float) -> Denial | None:
+        if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and abs(altitude) <= _FAR):
+            return Denial(DENIED, "Home refused: no such place on the globe")
+        if math.dist(self._origin.local(latitude, longitude, altitude), (0.0, 0.0, 0.0)) > _FAR:
+            return Denial(DENIED, "Home refused: more than 100 km from here")
+        self._home.move(latitude, longitude, altitude)
+        self._telemetry.request(HOME)
+        return None

@@ -1,0 +1,187 @@
+"""Commands that move a flying vehicle, or hold it up: DO_REPOSITION and its kind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from sitl.autopilot.command_protocol import Handler, Order
+from sitl.autopilot.commander import Commander
+from sitl.autopilot.firmware import DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Denial, Flavour, Mode
+from sitl.autopilot.following import Following
+from sitl.autopilot.guidance import Activity, Guidance
+from sitl.autopilot.missions.itinerary import Itinerary
+from sitl.estimation.sensors import Estimate
+from sitl.values.home import Home
+from sitl.values.origin import Origin
+
+# MAV_CMD
+LOITER: Final = 17
+FOLLOW: Final = 32
+YAW: Final = 115
+CHANGE_SPEED: Final = 178
+TERMINATE: Final = 185
+REPOSITION: Final = 192
+PAUSE: Final = 193
+CHECK: Final = 401
+
+_CHANGE_MODE: Final = 1
+# SPEED_TYPE: air and ground, which are one without wind in the plan; up, down.
+_LEVEL, _UP, _DOWN = (0.0, 1.0), 2.0, 3.0
+# DO_CHANGE_SPEED: no change, the usual one.
+_SAME, _USUAL = -1.0, -2.0
+_FASTEST: Final = 100.0
+_LAST: Final = (90.0, 180.0)
+
+
+class Maneuvers:
+    """``commands`` by MAV_CMD. What a firmware does not have it answers with UNSUPPORTED, as the real one."""
+
+    def __init__(
+        self,
+        commander: Commander,
+        flavour: Flavour,
+        guidance: Guidance,
+        origin: Origin,
+        home: Home,
+        itinerary: Itinerary,
+        following: Following,
+        estimate: Callable[[], Estimate],
+        say_doubts: Callable[[int], None],
+    ) -> None:
+        """``say_doubts``: what speaks against arming at a time (µs), as texts."""
+        self._commander = commander
+        self._flavour = flavour
+        self._guidance = guidance
+        self._origin = origin
+        self._home = home
+        self._itinerary = itinerary
+        self._following = following
+        self._estimate = estimate
+        self._say_doubts = say_doubts
+        self._speed: tuple[Mode, float] | None = None
+        self.commands: dict[int, Handler] = {
+            LOITER: self._loiter,
+            CHANGE_SPEED: self._change_speed,
+            TERMINATE: self._terminate,
+            REPOSITION: self._reposition,
+            CHECK: self._check,
+        }
+        if flavour.stops:
+            self.commands |= {FOLLOW: self._follow, YAW: self._turn, PAUSE: self._pause}
+
+    def _loiter(self, order: Order) -> Denial | None:
+        return self._commander.enter(self._flavour.loiter, order.now)
+
+    def _terminate(self, order: Order) -> Denial | None:
+        if order.params[0] > 0.5:
+            self._commander.cut("Flight terminated")
+        return None
+
+    def _check(self, order: Order) -> Denial | None:
+        # PX4 runs its checks in flight as well.
+        if self._commander.armed and self._flavour.stops:
+            return Denial(TEMPORARILY_REJECTED, "Checks refused: armed")
+        self._say_doubts(order.now)
+        return None
+
+    def _follow(self, order: Order) -> Denial | None:
+        system = order.params[0]
+        if not 1.0 <= system <= 255.0:
+            return Denial(DENIED, "Follow refused: the system id must be 1 to 255")
+        self._following.choose(int(system))
+        return None
+
+    def _change_speed(self, order: Order) -> Denial | None:
+        """Until another mode is entered."""
+        kind, speed = order.params[:2]
+        if speed == _SAME:
+            return None
+        if kind in (_UP, _DOWN):
+            return Denial(UNSUPPORTED, "Speed refused: only the level one can be changed")
+        if kind not in _LEVEL or not (speed == _USUAL or 0.0 < speed <= _FASTEST):
+            return Denial(DENIED, "Speed refused: 0 to 100 m/s of kind 0 or 1")
+        wanted = None if speed == _USUAL else speed
+        self._speed = None if wanted is None else (self._commander.mode, wanted)
+        if self._commander.mode is Mode.MISSION:
+            self._itinerary.hasten(wanted)
+        self._guidance.hasten(self._commander.level_speed if wanted is None else wanted)
+        return None
+
+    def _pause(self, order: Order) -> Denial | None:
+        wish = order.params[0]
+        if self._commander.mode not in (Mode.MISSION, Mode.GUIDED):
+            return Denial(DENIED, "Pause refused: neither in AUTO nor in GUIDED")
+        if wish == 0.0:
+            if not self._guidance.pause():
+                return Denial(FAILED, "Pause refused: neither on the way nor holding")
+        elif wish == 1.0:
+            self._guidance.go_on()
+        else:
+            return Denial(DENIED, "Pause refused: parameter 1 must be 0 or 1")
+        return None
+
+    def _turn(self, order: Order) -> Denial | None:
+        """CONDITION_YAW: parameter 1 the angle (degrees), 3 the direction, 4 whether it is relative."""
+        angle, _, direction, relative = order.params[:4]
+        if not (0.0 <= angle <= 360.0 and relative in (0.0, 1.0)):
+            return Denial(DENIED, "Yaw refused: the angle must be 0 to 360 degrees")
+        if self._commander.mode is not Mode.GUIDED or self._guidance.activity is Activity.IDLE:
+            return Denial(FAILED, "Yaw refused: not flying in GUIDED")
+        turn = math.radians(angle)
+        if relative == 1.0:
+            turn = self._guidance.yaw + (-turn if direction < 0.0 else turn)
+        self._guidance.look(turn)
+        return None
+
+    def _reposition(self, order: Order) -> Denial | None:
+        """Parameter 1 the speed (m/s), 2 bit 0 whether the mode may change, 4 the yaw (rad), 5 to 7 the
+        place."""
+        commander, guided = self._commander, self._flavour.repositioning
+        if not commander.ready:
+            return Denial(TEMPORARILY_REJECTED, "Reposition refused: no position yet")
+        target = self._target(order)
+        if isinstance(target, Denial):
+            return target
+        flags = order.params[1]
+        may_change = math.isfinite(flags) and int(flags) & _CHANGE_MODE
+        if commander.mode is not guided:
+            if not may_change:
+                return Denial(DENIED, f"Reposition refused: not in {guided.name}")
+            if denial := commander.enter(guided, order.now):
+                return denial
+        if commander.armed and not commander.landed:
+            here = self._estimate().pose
+            self._guidance.go(target, self._leg_speed(order.params[0]), self._yaw(order.params[3]), here)
+        return None
+
+    def _target(self, order: Order) -> tuple[float, float, float] | Denial:
+        """m, local NED. PX4 takes what is not a number for *as it is*."""
+        latitude, longitude, altitude = order.place
+        here = self._estimate().position
+        if order.relative is None and self._flavour.stops:
+            return Denial(DENIED, "Reposition refused: this frame is not known")
+        if not self._flavour.stops and (order.nowhere or not math.isfinite(latitude + longitude)):
+            x, y, level = here[0], here[1], 0.0
+        elif not (abs(latitude) <= _LAST[0] and abs(longitude) <= _LAST[1]) or latitude == longitude == 0.0:
+            return Denial(DENIED, "Reposition refused: no such place on the globe")
+        else:
+            # Where level ground is: the Earth's curve bends it away.
+            x, y, level = self._origin.local(latitude, longitude, self._origin.altitude)
+        if not math.isfinite(altitude) and not self._flavour.stops:
+            return x, y, here[2]
+        if not abs(altitude) <= 10_000.0:
+            return Denial(DENIED, "Reposition refused: the altitude is out of range")
+        above = self._home.altitude if order.relative else 0.0
+        return x, y, level - (altitude + above - self._origin.altitude)
+
+    def _leg_speed(self, asked: float) -> float:
+        if 0.0 < asked <= _FASTEST:
+            return asked
+        mode, speed = self._speed or (None, 0.0)
+        return speed if mode is self._commander.mode else self._commander.level_speed
+
+    def _yaw(self, asked: float) -> float | None:
+        """PX4's parameter 4; ArduPilot keeps its heading."""
+        return asked if not self._flavour.stops and math.isfinite(asked) else None

@@ -1,0 +1,94 @@
+"""What is to be told: commands and messages that ask for other messages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from mavlink_bridge.messages import Message, MessageInterval, RequestDataStream, Source
+from sitl.autopilot.command_protocol import Handler, Order
+from sitl.autopilot.firmware import DENIED, FAILED, UNSUPPORTED, Denial, Flavour
+from sitl.telemetry import status_reports as q
+from sitl.telemetry.schedule import Telemetry
+from sitl.telemetry.streams import members
+
+# MAV_CMD
+GET_HOME: Final = 410
+GET_INTERVAL: Final = 510
+SET_INTERVAL: Final = 511
+REQUEST: Final = 512
+CAPABILITIES: Final = 520
+
+_LAST_ID: Final = 0xFFFF
+# µs, half an hour: more does not fit into MESSAGE_INTERVAL.
+_LONGEST: Final = 0x7FFFFFFF
+
+
+class Requests:
+    """Obeys the commands that ask for messages: SET_MESSAGE_INTERVAL (511), GET_MESSAGE_INTERVAL (510),
+    REQUEST_MESSAGE (512), and the older 410 and 520; and REQUEST_DATA_STREAM (66)."""
+
+    def __init__(self, source: Source, flavour: Flavour, telemetry: Telemetry, outbox: list[Message]) -> None:
+        self._source = source
+        self._flavour = flavour
+        self._telemetry = telemetry
+        self._outbox = outbox
+
+    @property
+    def commands(self) -> dict[int, Handler]:
+        """Who obeys what, by MAV_CMD."""
+        return {
+            SET_INTERVAL: self._set_interval,
+            GET_INTERVAL: self._get_interval,
+            REQUEST: self._request,
+            GET_HOME: self._always(q.HOME),
+            CAPABILITIES: self._always(q.AUTOPILOT_VERSION),
+        }
+
+    def stream(self, message: RequestDataStream, now: int) -> None:
+        """REQUEST_DATA_STREAM (66), which only ArduPilot still knows: the rate of a whole group."""
+        if self._flavour.groups_streams:
+            self.set_rate(message.stream, message.rate if message.start else 0, now)
+
+    def set_rate(self, stream: int, rate: float | None, now: int) -> None:
+        """All messages of a MAV_DATA_STREAM at ``rate`` (Hz), as far as it is granted; 0 for none, None for
+        the usual one."""
+        if rate is None:
+            interval = 0
+        else:
+            interval = max(self._flavour.shortest_interval, round(1e6 / rate)) if rate > 0 else -1
+        for message_id in members(stream):
+            self._telemetry.set_interval(message_id, interval, now)
+
+    def _set_interval(self, order: Order) -> Denial | None:
+        message_id, interval = order.params[:2]
+        if not (math.isfinite(message_id) and math.isfinite(interval)):
+            return Denial(DENIED, "Interval refused: not a number")
+        if 0.0 < interval < self._flavour.shortest_interval:
+            return Denial(FAILED, f"Interval refused: {interval:.0f} us is too short")
+        wanted = min(round(interval), _LONGEST)
+        if not self._telemetry.set_interval(int(message_id), wanted, order.now):
+            return Denial(DENIED, f"Interval refused: no message {message_id:.0f}")
+        return None
+
+    def _get_interval(self, order: Order) -> Denial | None:
+        message_id = order.params[0]
+        if not 0 <= message_id <= _LAST_ID:
+            return Denial(DENIED, "Interval refused: no such number")
+        interval = self._telemetry.interval(int(message_id))
+        self._outbox.append(MessageInterval(self._source, interval, int(message_id)))
+        return None
+
+    def _request(self, order: Order) -> Denial | None:
+        message_id = order.params[0]
+        if math.isfinite(message_id) and self._telemetry.request(int(message_id)):
+            return None
+        return Denial(UNSUPPORTED, f"Request refused: no message {message_id:.0f}")
+
+    def _always(self, message_id: int) -> Callable[[Order], Denial | None]:
+        def obey(_order: Order) -> Denial | None:
+            self._telemetry.request(message_id)
+            return None
+
+        return obey

@@ -1,0 +1,298 @@
+"""Which item of the mission is flown, and what becomes of it: the way through a plan.
+
+Items that take time (NAV) are flown one after the other; those between them (DO) happen on the way. What
+moves is the guidance: a waypoint is a destination with a speed, and is passed when the estimate is near
+enough.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from typing import Final
+
+from mavlink_bridge.messages import Vector
+from sitl.autopilot.guidance import Activity, Guidance
+from sitl.autopilot.missions.items import (
+    ABOVE_HOME,
+    CHANGE_SPEED,
+    DELAY,
+    FLOWN,
+    JUMP,
+    LAND,
+    LOITER_TIME,
+    LOITER_UNLIMITED,
+    RETURN,
+    TAKEOFF,
+    WAYPOINT,
+    Item,
+    Type,
+)
+from sitl.autopilot.missions.plans import Plans
+from sitl.config.autopilot import AutopilotConfig
+from sitl.estimation.sensors import Estimate
+from sitl.values.home import Home
+from sitl.values.origin import Origin
+
+# A height is reached this near (m).
+_LEVEL: Final = 0.3
+# Nearer than this (m) there is no bearing to turn to.
+_NEAR: Final = 1.0
+_FOR_EVER: Final = -1
+# Ground and air speed; without wind in the plan they are one.
+_SPEEDS: Final = (0.0, 1.0)
+
+
+class Phase(Enum):
+    """What of an item is being done."""
+
+    IDLE = "idle"
+    LIFTING = "lifting"
+    GOING = "going"
+    WAITING = "waiting"
+    LANDING = "landing"
+    DONE = "done"
+
+
+class Event(Enum):
+    """What the commander has to know."""
+
+    FINISHED = "finished"
+    RETURNS = "returns"
+
+
+class Itinerary:
+    """The progress through the mission of ``plans``. ``current`` is the item that is flown or will be;
+    ``reached`` collects the items that are done, until someone has told them."""
+
+    def __init__(
+        self,
+        plans: Plans,
+        guidance: Guidance,
+        home: Home,
+        origin: Origin,
+        config: AutopilotConfig,
+        first: int,
+        *,
+        px4: bool,
+    ) -> None:
+        """``first``: item 0 is home for ArduPilot. ``px4``: a mission that begins on the ground without a
+        takeoff takes off all the same, and a waypoint may say its own radius (parameter 2) and heading
+        (4)."""
+        self._plans = plans
+        self._guidance = guidance
+        self._home = home
+        self._origin = origin
+        self._config = config
+        self._first = first
+        self._px4 = px4
+        self._speed: float | None = None
+        self._jumps: dict[int, int] = {}
+        self._until = 0
+        self._target: Vector = (0.0, 0.0, 0.0)
+        self.phase = Phase.IDLE
+        self.current = first
+        self.reached: list[int] = []
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        self._config = config
+
+    @property
+    def _items(self) -> tuple[Item, ...]:
+        return self._plans.items(Type.MISSION)
+
+    @property
+    def total(self) -> int:
+        """Items, without home."""
+        return max(0, len(self._items) - self._first)
+
+    @property
+    def begun(self) -> bool:
+        """Whether it is beyond its beginning."""
+        return self.current > self._first
+
+    @property
+    def takes_off(self) -> bool:
+        """Whether the first thing to fly is a takeoff."""
+        flown = [item.command for item in self._items[self._first :] if item.command in FLOWN]
+        return flown[:1] == [TAKEOFF]
+
+    def rewind(self) -> None:
+        """To the beginning, at rest."""
+        self.phase, self.current = Phase.IDLE, self._first
+        self._speed = None
+        self._jumps.clear()
+
+    def replaced(self) -> None:
+        """The mission is another: from its beginning; ArduPilot in flight goes on with the item of the same
+        number."""
+        if self._px4 or self._guidance.activity is Activity.IDLE or self.current >= len(self._items):
+            self.rewind()
+        else:
+            self.pause()
+
+    def select(self, seq: int) -> bool:
+        """Go on with item ``seq``; False if there is none such. Begins when ``advance`` is called."""
+        if not 0 <= seq < len(self._items):
+            return False
+        self.phase, self.current = Phase.IDLE, max(seq, self._first)
+        self._jumps.clear()
+        return True
+
+    def hasten(self, speed: float | None) -> None:
+        """Fly on at ``speed`` (m/s); None: the usual one."""
+        self._speed = speed
+
+    def pause(self) -> None:
+        """Something else flies now; it goes on with the same item."""
+        if self.phase is not Phase.DONE:
+            self.phase = Phase.IDLE
+
+    def advance(self, now: int, here: Estimate) -> Event | None:
+        """Fly on: to be called in each step at ``now`` (µs) while the mission flies."""
+        match self.phase:
+            case Phase.IDLE:
+                return self._begin(here)
+            case Phase.LIFTING if self._is_high(here):
+                return self._fly(here)
+            case Phase.GOING if self._is_there(here):
+                return self._arrive(now)
+            case Phase.WAITING if now >= self._until:
+                return self._complete(here)
+        return None
+
+    def landed(self) -> None:
+        """The motors were stopped on the ground, which ends a landing."""
+        if self.phase is Phase.LANDING:
+            self.reached.append(self.current)
+            self.phase = Phase.DONE
+
+    # Within
+
+    def _begin(self, here: Estimate) -> Event | None:
+        """Do what can be done at once, up to the next item that is flown."""
+        items = self._items
+        # A plan of nothing but jumps would go round for ever.
+        for _ in range(2 * len(items) + 1):
+            if self.current >= len(items):
+                break
+            item = items[self.current]
+            if item.command in FLOWN:
+                return self._depart(item, here)
+            self._do(item)
+        self.phase = Phase.DONE
+        return Event.FINISHED
+
+    def _do(self, item: Item) -> None:
+        first, second = item.params[:2]
+        if item.command == CHANGE_SPEED and first in _SPEEDS and second > 0.0:
+            self._speed = second
+        if item.command == JUMP:
+            done = self._jumps.get(self.current, 0)
+            if second == _FOR_EVER or done < second:
+                self._jumps[self.current] = done + 1
+                self.current = max(int(first), self._first)
+                return
+        self.current += 1
+
+    def _depart(self, item: Item, here: Estimate) -> Event | None:
+        guidance = self._guidance
+        if guidance.activity is Activity.IDLE and (self._px4 or item.command == TAKEOFF):
+            height = self._config.takeoff_height + self._home.height
+            if item.command == TAKEOFF:
+                height = max(self._height(item), 0.1)
+            self._target = (here.position[0], here.position[1], -height)
+            guidance.takeoff(height, here.pose)
+            self.phase = Phase.LIFTING
+            return None
+        return self._fly(here)
+
+    def _fly(self, here: Estimate) -> Event | None:
+        """Leave for the current item, in the air."""
+        item = self._items[self.current]
+        match item.command:
+            case command if command == RETURN:
+                self.reached.append(self.current)
+                self.phase = Phase.DONE
+                return Event.RETURNS
+            case command if command == DELAY:
+                self._guidance.hold()
+                self._target = here.position
+            case _:
+                self._target = self._place(item, here)
+                speed, yaw = self._leg_speed(here), self._yaw(item, here)
+                self._guidance.go(self._target, speed, yaw, here.pose)
+        self.phase = Phase.GOING
+        return None
+
+    def _arrive(self, now: int) -> Event | None:
+        item = self._items[self.current]
+        pause = item.params[0] if item.command in (WAYPOINT, LOITER_TIME, DELAY) else 0.0
+        if item.command == LAND:
+            self._guidance.land(self._config.land_speed)
+            self.phase = Phase.LANDING
+        elif item.command != LOITER_UNLIMITED:
+            self._until = now + (round(pause * 1e6) if pause > 0.0 else 0)
+            self.phase = Phase.WAITING
+        return None
+
+    def _complete(self, here: Estimate) -> Event | None:
+        self.reached.append(self.current)
+        self.current += 1
+        event = self._begin(here)
+        if event is Event.FINISHED:
+            self.current = max(self.current - 1, self._first)
+        return event
+
+    def _is_high(self, here: Estimate) -> bool:
+        return abs(here.position[2] - self._target[2]) <= _LEVEL
+
+    def _is_there(self, here: Estimate) -> bool:
+        item = self._items[self.current]
+        if item.command == TAKEOFF:
+            return self._is_high(here)
+        if item.command == LAND:
+            # It sinks from the height that it has.
+            return math.dist(here.position[:2], self._target[:2]) <= min(0.3, self._config.acceptance_radius)
+        return math.dist(here.position, self._target) <= self._radius(item)
+
+    def _radius(self, item: Item) -> float:
+        own = item.params[1] if self._px4 and item.command == WAYPOINT else 0.0
+        return own if 0.0 < own < math.inf else self._config.acceptance_radius
+
+    def _height(self, item: Item) -> float:
+        """m above the origin."""
+        above = self._home.height if item.frame in ABOVE_HOME else -self._origin.altitude
+        return item.z + above
+
+    def _place(self, item: Item, here: Estimate) -> Vector:
+        """Where an item leads, m, local NED."""
+        north, east, down = here.position
+        if item.command == LAND or item.command == TAKEOFF:
+            if item.here or item.command == TAKEOFF:
+                # A takeoff in the air leads up or nowhere.
+                return north, east, down if item.command == LAND else min(down, -self._height(item))
+            x, y, _ = self._origin.local(item.x / 1e7, item.y / 1e7, self._origin.altitude)
+            return x, y, down
+        if item.here:
+            return north, east, -self._height(item)
+        height = self._height(item)
+        x, y, z = self._origin.local(item.x / 1e7, item.y / 1e7, self._origin.altitude + height)
+        return x, y, z
+
+    def _leg_speed(self, here: Estimate) -> float:
+        """The speed (m/s) along the leg that neither climbs nor sinks too fast."""
+        speed = self._speed or self._config.waypoint_speed
+        length = math.dist(here.position, self._target)
+        rise = here.position[2] - self._target[2]
+        limit = self._config.waypoint_climb if rise > 0.0 else self._config.waypoint_sink
+        speed = min(speed, self._config.max_speed)
+        return min(speed, limit * length / abs(rise)) if rise else speed
+
+    def _yaw(self, item: Item, here: Estimate) -> float | None:
+        """rad: to where it flies, or as PX4's parameter 4 says (degrees)."""
+        if self._px4 and math.isfinite(item.params[3]) and item.command != LAND:
+            return math.radians(item.params[3])
+        north, east = self._target[0] - here.position[0], self._target[1] - here.position[1]
+        return math.atan2(east, north) if math.hypot(north, east) > _NEAR else None

@@ -1,0 +1,135 @@
+"""The mission's messages and commands, and who acts on them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+from mavlink_bridge.messages import (
+    Message,
+    MissionAck,
+    MissionClearAll,
+    MissionCount,
+    MissionCurrent,
+    MissionItem,
+    MissionItemFloat,
+    MissionItemReached,
+    MissionRequest,
+    MissionRequestFloat,
+    MissionRequestList,
+    MissionSetCurrent,
+    MissionWritePartialList,
+    Source,
+)
+from sitl.autopilot.command_protocol import Handler, Order
+from sitl.autopilot.commander import Commander
+from sitl.autopilot.firmware import DENIED, Denial, Mode
+from sitl.autopilot.missions.items import Type
+from sitl.autopilot.missions.itinerary import Itinerary, Phase
+from sitl.autopilot.missions.plans import Plans
+from sitl.autopilot.missions.transfer import Transfer
+from sitl.telemetry import status_reports as q
+from sitl.telemetry.schedule import Telemetry
+from sitl.telemetry.status_text import Voice
+
+# MAV_CMD
+RETURN: Final = 20
+SET_CURRENT: Final = 224
+START: Final = 300
+
+# MISSION_STATE: there is none, not begun, active, paused, complete; MISSION_CURRENT.mission_mode
+_NONE, _NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
+_IN_MODE, _SUSPENDED = 1, 2
+
+
+class MissionService:
+    """``handlers`` and ``commands`` of missions; MISSION_CURRENT (42) and MISSION_ITEM_REACHED (46)."""
+
+    def __init__(
+        self,
+        source: Source,
+        plans: Plans,
+        itinerary: Itinerary,
+        commander: Commander,
+        telemetry: Telemetry,
+        outbox: list[Message],
+        voice: Voice,
+        *,
+        asks_int: bool,
+    ) -> None:
+        self._source = source
+        self._plans = plans
+        self._itinerary = itinerary
+        self._commander = commander
+        self._telemetry = telemetry
+        self._outbox = outbox
+        self._voice = voice
+        self.transfer = Transfer(source, plans, outbox, voice, asks_int=asks_int)
+        plans.changed = itinerary.replaced
+        transfer = self.transfer
+        self.handlers: dict[type[Any], Callable[[Any, int], None]] = {
+            MissionCount: transfer.count,
+            MissionItem: transfer.item,
+            MissionItemFloat: transfer.item,
+            MissionAck: transfer.acknowledged,
+            MissionClearAll: transfer.clear,
+            MissionRequestList: transfer.list,
+            MissionRequest: self._request,
+            MissionRequestFloat: self._request,
+            MissionWritePartialList: transfer.write_partial,
+            MissionSetCurrent: self._set_current,
+        }
+        self.commands: dict[int, Handler] = {
+            RETURN: self._return,
+            SET_CURRENT: self._order_current,
+            START: self._start,
+        }
+
+    def tell(self) -> None:
+        """Say what was reached since the last time."""
+        reached = self._itinerary.reached
+        if reached:
+            self._outbox += [MissionItemReached(self._source, seq) for seq in reached]
+            reached.clear()
+            self._telemetry.request(q.MISSION_CURRENT)
+
+    def current(self) -> MissionCurrent:
+        """MISSION_CURRENT (42)."""
+        itinerary, plans = self._itinerary, self._plans
+        flying = self._commander.mode is Mode.MISSION
+        if not itinerary.total:
+            state = _NONE
+        elif itinerary.phase is Phase.DONE:
+            state = _COMPLETE
+        elif flying and self._commander.armed:
+            state = _ACTIVE
+        else:
+            state = _PAUSED if itinerary.begun else _NOT_STARTED
+        ids = (plans.identity(of) for of in Type)
+        mode = _IN_MODE if flying else _SUSPENDED
+        return MissionCurrent(self._source, itinerary.current, itinerary.total, state, mode, *ids)
+
+    def _request(self, message: MissionRequest | MissionRequestFloat, _now: int) -> None:
+        self.transfer.request(message, self._itinerary.current)
+
+    def _set_current(self, message: MissionSetCurrent, now: int) -> None:
+        if not self._itinerary.select(message.seq):
+            self._voice.complain(f"No mission item {message.seq}", now)
+        self._telemetry.request(q.MISSION_CURRENT)
+
+    def _order_current(self, order: Order) -> Denial | None:
+        """DO_SET_MISSION_CURRENT: parameter 1 the item, −1 for none other; 2 from the beginning."""
+        seq, anew = order.params[:2]
+        if anew == 1.0:
+            self._itinerary.rewind()
+        if seq != -1.0 and not (math.isfinite(seq) and self._itinerary.select(int(seq))):
+            return Denial(DENIED, f"No mission item {seq:.0f}")
+        self._telemetry.request(q.MISSION_CURRENT)
+        return None
+
+    def _start(self, order: Order) -> Denial | None:
+        return self._commander.start_mission(order.now)
+
+    def _return(self, order: Order) -> Denial | None:
+        return self._commander.enter(Mode.RETURN, order.now)

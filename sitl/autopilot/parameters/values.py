@@ -1,0 +1,116 @@
+"""The parameters of one vehicle: what each is now, and what that makes of the autopilot's settings."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
+from typing import Final
+
+from sitl.autopilot.parameters.encoding import encoded
+from sitl.autopilot.parameters.parameter import Bound, Parameter
+from sitl.config.autopilot import AutopilotConfig
+
+_ALL_ONES: Final = 0xFFFFFFFF
+
+
+class Values:
+    """Values by name, in the order of the table. What is not ``saved`` is as the table and ``config`` say."""
+
+    def __init__(
+        self, table: Sequence[Parameter], config: AutopilotConfig, saved: Mapping[str, float]
+    ) -> None:
+        """Of ``saved`` what is no parameter, or not allowed, is left out."""
+        self.table = tuple(table)
+        self._numbers = {parameter.name: number for number, parameter in enumerate(self.table)}
+        self._initial = [_initial(parameter, config) for parameter in self.table]
+        self._values = list(self._initial)
+        self._digest: int | None = None
+        for name, value in saved.items():
+            number = self._numbers.get(name)
+            if number is not None and self.table[number].denial(value) is None:
+                self._values[number] = self.table[number].fitted(value)
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def number(self, name: str) -> int | None:
+        """Its place in the table, None if there is none such."""
+        return self._numbers.get(name)
+
+    def value(self, number: int) -> float:
+        """The present value of the parameter at ``number``."""
+        return self._values[number]
+
+    def named(self, name: str) -> float:
+        """The present value by name; KeyError if there is none such."""
+        return self._values[self._numbers[name]]
+
+    def set(self, number: int, value: float) -> str | None:
+        """Give the parameter at ``number`` a value, or say why not."""
+        parameter = self.table[number]
+        if math.isfinite(value) and abs(value) <= 3e38:
+            value = parameter.fitted(value)
+        denial = parameter.denial(value)
+        if denial is None:
+            self._values[number] = value
+            self._digest = None
+        return denial
+
+    def reset(self) -> None:
+        """All as at first."""
+        self._values = list(self._initial)
+        self._digest = None
+
+    @property
+    def changed(self) -> dict[str, float]:
+        """What differs from the beginning: what there is to save."""
+        triples = zip(self.table, self._initial, self._values, strict=True)
+        return {parameter.name: value for parameter, initial, value in triples if value != initial}
+
+    def configured(self, config: AutopilotConfig) -> AutopilotConfig:
+        """``config`` with the settings that changed parameters are."""
+        changed = self.changed
+        update: dict[str, object] = {}
+        groups: dict[str, dict[str, object]] = {}
+        for parameter in self.table:
+            if parameter.bound is None or parameter.name not in changed:
+                continue
+            value = _setting(parameter.bound, changed[parameter.name])
+            group, _, setting = parameter.bound.setting.rpartition(".")
+            (groups.setdefault(group, {}) if group else update)[setting] = value
+        for group, settings in groups.items():
+            update[group] = getattr(config, group).model_copy(update=settings)
+        return config.model_copy(update=update) if update else config
+
+    def digest(self) -> int:
+        """PX4's ``_HASH_CHECK``: CRC-32 over names and values, without inversion at either end."""
+        if self._digest is None:
+            self._digest = self._summed()
+        return self._digest
+
+    def _summed(self) -> int:
+        crc = 0
+        for parameter, value in zip(self.table, self._values, strict=True):
+            data = parameter.name.encode() + encoded(value, parameter.kind, bytewise=True)
+            crc = zlib.crc32(data, crc ^ _ALL_ONES) ^ _ALL_ONES
+        return crc
+
+
+def _initial(parameter: Parameter, config: AutopilotConfig) -> float:
+    bound = parameter.bound
+    value = None if bound is None else attrgetter(bound.setting)(config)
+    if bound is None or value is None:
+        return parameter.fitted(parameter.default)
+    for number, word in bound.options:
+        if word == value:
+            return number
+    # A setting that this firmware has no number for reads as its usual one.
+    return parameter.fitted(parameter.default if bound.options else value / bound.scale)
+
+
+def _setting(bound: Bound, value: float) -> object:
+    if bound.options:
+        return dict(bound.options)[round(value)]
+    return int(value) if bound.setting == "system_id" else value * bound.scale

@@ -1,0 +1,176 @@
+"""The vehicle in its air, and what its autopilot believes of it: guidance in, motion and estimate out."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from mavlink_bridge.messages import Vector
+from sitl.autopilot.course import Course, Level, believed
+from sitl.autopilot.guidance import Guidance
+from sitl.backends.selection import Start, physics
+from sitl.config.autopilot import AutopilotConfig
+from sitl.environment.weather import Weather, WeatherConfig
+from sitl.estimation.profiles import PROFILES
+from sitl.estimation.sensors import Estimate, Sensors
+from sitl.values.origin import Origin
+from sitl.values.setpoints import ZERO
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.multirotor import Reference, VehicleState
+
+# The reference is renewed at least this often (µs), as real position loops run at 50 to 100 Hz; the vehicle's
+# controller extrapolates it in between.
+_RENEWAL: Final = 10_000
+
+
+class Plant:
+    """Moves the vehicle and the guidance that leads it, in strides on a fixed grid from time 0.
+
+    ``sensors`` is the estimator, ``course`` what is tracked.
+    """
+
+    def __init__(
+        self,
+        config: AutopilotConfig,
+        vehicle: VehicleConfig,
+        weather: WeatherConfig,
+        guidance: Guidance,
+        origin: Origin,
+        patience: float,
+        seed: int,
+    ) -> None:
+        """At rest at ``origin``, or as high above it as ``config`` says. ``patience`` and ``seed`` as for
+        ``Sensors``."""
+        ground = float(origin.position[2]) + vehicle.rest_height
+        start = origin.motion_to_site([(0.0, 0.0, -config.start_height)])[0]
+        flying = config.start_height > 0.0
+        begin = Start(start, config.yaw + origin.turn, ground, flying)
+        self.vehicle = physics(config.physics, vehicle, begin, origin.site, weather, seed, config.system_id)
+        self.course = Course(guidance, origin)
+        profile = PROFILES[config.sensors]
+        self.sensors = Sensors(profile, origin, self.vehicle.state, patience, seed, config.system_id)
+        air = Weather(weather, seed, config.system_id)
+        self._weather = None if air.still else air
+        self._guidance = guidance
+        self._origin = origin
+        self._ground = ground
+        self._level = Level.of(vehicle)
+        self._period = vehicle.physics_period
+        self._stride = max(1, _RENEWAL // self._period)
+        self._resets = 0
+        self._steps = 0
+        self._truth: VehicleState | None = None
+        self._belief: Estimate | None = None
+        self._trace: list[npt.NDArray[np.float64]] = []
+        self._trace_start = 0
+
+    def move(self, now: int, *, armed: bool) -> None:
+        """All physics steps that end by ``now`` (µs, not decreasing), under a reference that is renewed on a
+        fixed grid. Without one the motors stand still, or idle when ``armed``."""
+        vehicle, guidance, period, stride = self.vehicle, self._guidance, self._period, self._stride
+        if not armed:
+            # Whatever was asked for: nothing turns the motors of a vehicle that is not armed.
+            guidance.idle()
+        self._trace_start = self._steps
+        self._trace.clear()
+        last = now // period
+        while self._steps < last:
+            count = min(last - self._steps, stride - self._steps % stride)
+            begin, step = self._steps * period, count * period
+            wind = self._air(begin)
+            reference = self.course.next(step)
+            if reference is not None and not self.sensors.exact:
+                reference = self._believed(reference)
+            idle = armed and reference is None
+            self._trace.append(vehicle.advance(count, reference, wind, idle=idle))
+            guidance.advance(begin, step, self._local(wind), self.sensors.drift)
+            self._steps += count
+            self._truth = self._belief = None
+            if not self.sensors.exact:
+                self._sense()
+
+    @property
+    def time(self) -> int:
+        """µs, of the last physics step."""
+        return self._steps * self._period
+
+    @property
+    def state(self) -> VehicleState:
+        """The true state after the last physics step; read once, so leave it as it is."""
+        if self._truth is None:
+            self._truth = self.vehicle.state
+        return self._truth
+
+    @property
+    def wind(self) -> Vector:
+        """Velocity of the air (m/s, site NED) in the last physics step."""
+        return self.vehicle.air
+
+    def estimate(self) -> Estimate:
+        """What is believed of it."""
+        if self._belief is None:
+            self._belief = self.sensors.estimate(self.state)
+        return self._belief
+
+    @property
+    def estimate_error(self) -> npt.NDArray[np.float64]:
+        """Estimated minus true position (3,) (m, site NED)."""
+        return np.zeros(3) if self.sensors.exact else self.sensors.deviation(self.state).position
+
+    @property
+    def trace(self) -> npt.NDArray[np.float64]:
+        """Positions (n, 3) (m, site NED) after each physics step of the last ``move``."""
+        if len(self._trace) == 1:
+            return self._trace[0]
+        return np.concatenate(self._trace) if self._trace else np.empty((0, 3))
+
+    @property
+    def trace_times(self) -> npt.NDArray[np.int64]:
+        """When (n,) it was there (µs)."""
+        return np.arange(self._trace_start + 1, self._steps + 1, dtype=np.int64) * self._period
+
+    # Events and faults, from the next stride on
+
+    def begin(self, now: int) -> None:
+        """The goal event (µs)."""
+        if self._weather is not None:
+            self._weather.begin(now)
+
+    def lose_gps(self) -> None:
+        """No more GPS."""
+        self.sensors.lose_gps(self.time, self.state)
+
+    def shift_gps(self, offset: Vector) -> None:
+        """GPS is off by ``offset`` (m, local NED) in all."""
+        self.sensors.shift_gps(offset, self.time, self.state)
+
+    # Within a stride
+
+    def _air(self, now: int) -> Vector:
+        weather = self._weather
+        if weather is None:
+            return ZERO
+        if not weather.turbulent:
+            return weather.wind(now)
+        u, v, w = self.state.velocity.tolist()
+        return weather.wind(now, self._ground - float(self.state.position[2]), (u, v, w))
+
+    def _local(self, wind: Vector) -> Vector:
+        """A velocity in the site's NED, in the vehicle's own."""
+        return wind if wind == ZERO else self._origin.vector_to_local(np.array(wind))
+
+    def _believed(self, reference: Reference) -> Reference:
+        """The reference that makes the physics fly as on the estimate."""
+        off = self.sensors.deviation(self.state)
+        if self.sensors.gps.located:
+            return believed(reference, off)
+        return self._level.unlocated(reference, off, self.state)
+
+    def _sense(self) -> None:
+        self.sensors.advance(self.time, self.state)
+        if self.sensors.gps.resets != self._resets:
+            self._resets = self.sensors.gps.resets
+            estimate = self.estimate()
+            self._guidance.relocate(estimate.position, estimate.velocity)

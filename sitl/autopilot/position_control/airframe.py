@@ -1,0 +1,109 @@
+"""The airframe of a firmware's simulator as a point mass: tilt that follows late, thrust, drag in the air.
+
+Both simulators fly a quadrotor whose horizontal acceleration is g·tan(tilt) less drag. The attitude loop is
+taken as a second-order lag on each tilt angle; yaw does not matter to a point mass.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from mavlink_bridge.messages import Vector
+from sitl.values.setpoints import ZERO
+
+GRAVITY: Final = 9.80665
+
+Motion = tuple[Vector, Vector, Vector]
+"""Position (m), velocity (m/s), acceleration (m/s²), in one inertial frame, z down."""
+
+
+class Airframe(NamedTuple):
+    """``angle_rate`` 1/s: tilt rate asked for per angle of error; ``angle_acceleration`` rad/s²: bound on how
+    fast that rate changes; ``angle_lag`` s: first-order lag from the angle asked for to the tilt;
+    ``thrust_lag`` s: of vertical thrust. ``drag`` 1/s and ``square_drag`` 1/m: deceleration per speed, and
+    per square of speed, relative to the air. ``vertical_drag``: whether drag acts upwards, too."""
+
+    angle_rate: float
+    angle_acceleration: float
+    angle_lag: float
+    thrust_lag: float
+    drag: float
+    square_drag: float
+    vertical_drag: bool
+
+
+ARDUPILOT: Final = Airframe(
+    # ATC_INPUT_TC 0.15 s and ATC_ACCEL_R_MAX 1100 °/s²; the lag stands for the attitude and rate loops.
+    angle_rate=1.0 / 0.15,
+    angle_acceleration=math.radians(1100.0),
+    angle_lag=0.04,
+    thrust_lag=0.08,
+    # Its 3 kg quadrotor: momentum drag of four rotors at hover thrust, 0.74 N per m/s, and 0.10 N per (m/s)².
+    drag=0.246,
+    square_drag=0.0336,
+    vertical_drag=False,
+)
+PX4: Final = Airframe(
+    # MC_ROLL_P; the rate loop is quicker than the angle loop by far.
+    angle_rate=6.5,
+    angle_acceleration=40.0,
+    angle_lag=0.05,
+    thrust_lag=0.06,
+    # SIH_KDV 1 N per m/s on SIH_MASS 1 kg.
+    drag=1.0,
+    square_drag=0.0,
+    vertical_drag=True,
+)
+
+
+class PointMass:
+    """``position``, ``velocity``, ``acceleration`` of a vehicle that is asked for accelerations; z down."""
+
+    def __init__(self, airframe: Airframe) -> None:
+        self._airframe = airframe
+        self.restart(ZERO)
+
+    def restart(self, position: Vector) -> None:
+        """Rest at ``position``, level."""
+        self.position: Vector = position
+        self.velocity: Vector = ZERO
+        self.acceleration: Vector = ZERO
+        self._asked = [0.0, 0.0]
+        self._rate = [0.0, 0.0]
+        self._tilt = [0.0, 0.0]
+        self._lift = 0.0
+
+    def advance(self, wanted: Vector, wind: Vector, dt: float, drift: Vector = (0.0, 0.0, 0.0)) -> None:
+        """Move by ``dt`` seconds in air that moves with ``wind`` (m/s), asked for the acceleration ``wanted``
+        (m/s²) without drag. The position is the estimated one, which moves by ``drift`` (m/s) more than the
+        velocity says."""
+        frame = self._airframe
+        share = -math.expm1(-dt / frame.angle_lag)
+        most = frame.angle_acceleration * dt
+        for axis in (0, 1):
+            error = math.atan(wanted[axis] / GRAVITY) - self._asked[axis]
+            change = error * frame.angle_rate - self._rate[axis]
+            self._rate[axis] += max(-most, min(most, change))
+            self._asked[axis] += self._rate[axis] * dt
+            self._tilt[axis] += share * (self._asked[axis] - self._tilt[axis])
+        self._lift += -math.expm1(-dt / frame.thrust_lag) * (wanted[2] - self._lift)
+        north, east, down = (v - w for v, w in zip(self.velocity, wind, strict=True))
+        drag, square = frame.drag, frame.square_drag
+        self._integrate(
+            (
+                GRAVITY * math.tan(self._tilt[0]) - (drag + square * abs(north)) * north,
+                GRAVITY * math.tan(self._tilt[1]) - (drag + square * abs(east)) * east,
+                self._lift - (drag * down if frame.vertical_drag else 0.0),
+            ),
+            dt,
+        )
+        x, y, z = self.position
+        self.position = (x + drift[0] * dt, y + drift[1] * dt, z + drift[2] * dt)
+
+    def _integrate(self, acceleration: Vector, dt: float) -> None:
+        half = 0.5 * dt * dt
+        (x, y, z), (u, v, w), (a, b, c) = self.position, self.velocity, acceleration
+        self.position = (x + u * dt + a * half, y + v * dt + b * half, z + w * dt + c * half)
+        self.velocity = (u + a * dt, v + b * dt, w + c * dt)
+        self.acceleration = acceleration

@@ -1,0 +1,116 @@
+"""PX4 1.16's OFFBOARD position controller: set-point → position → velocity → tilt, with nothing in between.
+
+PX4 takes an offboard set-point as it is: no trajectory is shaped, and neither MPC_ACC_HOR nor MPC_JERK_MAX
+counts. What limits it is the tilt, the speed, and how late the attitude follows. Between two messages a
+set-point stands still.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mavlink_bridge.messages import Vector
+from sitl.autopilot.position_control.airframe import GRAVITY, PX4, Motion, PointMass
+from sitl.autopilot.position_control.square_root import Pair, cut
+from sitl.config.autopilot import AutopilotConfig
+from sitl.config.gains import Px4Gains
+from sitl.values.setpoints import ZERO
+
+
+class Px4Response:
+    """Where a PX4 is that is sent set-points: ``motion``, local NED."""
+
+    def __init__(self, gains: Px4Gains) -> None:
+        self._gains = gains
+        self._mass = PointMass(PX4)
+        self.restart(ZERO)
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other parameters from now on."""
+        self._gains = config.px4
+
+    @property
+    def motion(self) -> Motion:
+        mass = self._mass
+        return mass.position, mass.velocity, mass.acceleration
+
+    @property
+    def desired(self) -> Motion:
+        """PX4 has no trajectory of its own: the vehicle's motion."""
+        return self.motion
+
+    def restart(self, position: Vector) -> None:
+        """Rest at ``position``, with nothing learnt."""
+        self._mass.restart(position)
+        self._asked: Vector = ZERO
+        self._learnt: Vector = ZERO
+        self._speed: Vector = ZERO
+        self._change: Pair = (0.0, 0.0)
+
+    def relocate(self, position: Vector, velocity: Vector) -> None:
+        """The estimate has jumped to here."""
+        self._mass.position, self._mass.velocity = position, velocity
+        self._speed = velocity
+
+    def advance(self, wanted: Motion, dt: float, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
+        """Move by ``dt`` seconds after ``wanted``, in air that moves with ``wind`` (m/s)."""
+        self._mass.advance(self._asked, wind, dt, drift)
+        gains, mass = self._gains, self._mass
+        self._differentiate(dt)
+        place, velocity, acceleration = wanted
+        closing = tuple(
+            gain * (goal - here)
+            for gain, goal, here in zip(
+                (gains.position, gains.position, gains.position_z), place, mass.position, strict=True
+            )
+        )
+        aim = _within((closing[0], closing[1]), (velocity[0], velocity[1]), gains.speed)
+        sink = max(-gains.speed_up, min(gains.speed_down, closing[2] + velocity[2]))
+        slip = aim[0] - mass.velocity[0], aim[1] - mass.velocity[1], sink - mass.velocity[2]
+        north, east = (
+            acceleration[axis]
+            + gains.velocity * slip[axis]
+            + self._learnt[axis]
+            - gains.derivative * self._change[axis]
+            for axis in (0, 1)
+        )
+        tilted = cut((north, east), GRAVITY * math.tan(gains.tilt))
+        self._asked = (*tilted, acceleration[2] + gains.velocity_z * slip[2] + self._learnt[2])
+        self._learn(slip, (north - tilted[0], east - tilted[1]), dt)
+
+    def _differentiate(self, dt: float) -> None:
+        """The vehicle's acceleration as it is read from its velocity."""
+        share = dt / (dt + 1.0 / (2.0 * math.pi * self._gains.filter_hz))
+        u, v, _ = self._mass.velocity
+        before = self._change
+        self._change = (
+            before[0] + share * ((u - self._speed[0]) / dt - before[0]),
+            before[1] + share * ((v - self._speed[1]) / dt - before[1]),
+        )
+        self._speed = self._mass.velocity
+
+    def _learn(self, slip: Vector, excess: Pair, dt: float) -> None:
+        """The integrals; what tilt could not give is taken back from them."""
+        gains = self._gains
+        back = 2.0 / gains.velocity
+        x, y, z = self._learnt
+        x += gains.integral * (slip[0] - back * excess[0]) * dt
+        y += gains.integral * (slip[1] - back * excess[1]) * dt
+        z += gains.integral_z * slip[2] * dt
+        self._learnt = (x, y, max(-GRAVITY, min(GRAVITY, z)))
+
+
+def _within(first: Pair, second: Pair, most: float) -> Pair:
+    """The sum of two velocities, no faster than ``most``; ``first`` is kept where only the other has to be
+    cut."""
+    total = first[0] + second[0], first[1] + second[1]
+    if math.hypot(*total) <= most:
+        return total
+    size = math.hypot(*first)
+    if size >= most:
+        return cut(first, most)
+    # |first + s·second| = most, 0 ≤ s < 1.
+    square = second[0] ** 2 + second[1] ** 2
+    half = first[0] * second[0] + first[1] * second[1]
+    s = (math.sqrt(half * half + square * (most * most - size * size)) - half) / square
+    return first[0] + s * second[0], first[1] + s * second[1]

@@ -1,0 +1,111 @@
+"""One message in, its answer out: who is meant, and who takes care of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from mavlink_bridge.messages import (
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    FollowTarget,
+    GlobalPosition,
+    Message,
+    Ping,
+    SetMode,
+    SetpointAttitude,
+    SetpointGlobal,
+    SetpointLocal,
+    Source,
+    Timesync,
+)
+from sitl.autopilot.command_protocol import Orders
+from sitl.autopilot.commander import Commander
+from sitl.autopilot.following import Following
+from sitl.autopilot.setpoint_reception import Steering
+from sitl.estimation.sensors import Estimate
+from sitl.telemetry.status_text import Voice
+
+
+class Reception:
+    """Hands messages for this vehicle to ``orders``, ``steering`` and ``services``, answers TIMESYNC (111)
+    and PING (4) itself, and leaves alone what is for others. Answers go to ``outbox``."""
+
+    def __init__(
+        self,
+        source: Source,
+        outbox: list[Message],
+        voice: Voice,
+        commander: Commander,
+        orders: Orders,
+        steering: Steering,
+        following: Following,
+        services: Mapping[type[Any], Callable[[Any, int], None]],
+        set_mode_ack: int,
+    ) -> None:
+        """``services``: who handles a message that arrived at some time (µs), by its type.
+        ``set_mode_ack``: the command that COMMAND_ACK names when SET_MODE (11) was obeyed."""
+        self._source = source
+        self._outbox = outbox
+        self._voice = voice
+        self._commander = commander
+        self._orders = orders
+        self._steering = steering
+        self._following = following
+        self._services = services
+        self._set_mode_ack = set_mode_ack
+
+    def handle(self, message: Message, now: int, estimate: Estimate) -> None:
+        """Act on a message that arrived at ``now`` (µs since boot), when ``estimate`` was believed."""
+        match message:
+            case SetpointLocal() | SetpointGlobal() | SetpointAttitude():
+                if self._is_mine(message.target_system, message.target_component):
+                    self._steer(message, now, estimate)
+            case CommandLong() | CommandInt():
+                if self._is_mine(message.target_system, message.target_component):
+                    self._obey(message, now)
+            case FollowTarget() | GlobalPosition():
+                if self._commander.follows and message.source.system != self._source.system:
+                    self._following.receive(message, estimate.pose, now)
+            case Timesync(tc1=0):
+                # Zero would make the reply a request.
+                self._outbox.append(Timesync(self._source, max(1, now * 1000), message.ts1))
+            case Ping(target_system=0):
+                system, component = message.source
+                self._outbox.append(Ping(self._source, message.time, message.sequence, system, component))
+            case SetMode():
+                if self._is_mine(message.target_system, 0):
+                    self._change_mode(message, now)
+            case _:
+                self._serve(message, now)
+
+    def _steer(
+        self, message: SetpointLocal | SetpointGlobal | SetpointAttitude, now: int, estimate: Estimate
+    ) -> None:
+        if self._steering.steer(message, self._commander.status(now), estimate.pose, now):
+            self._commander.steered(now)
+
+    def _obey(self, message: CommandLong | CommandInt, now: int) -> None:
+        result, reason = self._orders.obey(message, now)
+        self._outbox.append(CommandAck(self._source, message.command, result, 0, 0, *message.source))
+        if reason:
+            self._voice.complain(reason, now)
+
+    def _change_mode(self, message: SetMode, now: int) -> None:
+        result, reason = self._orders.set_mode(message.custom_mode, message.base_mode, now)
+        self._outbox.append(CommandAck(self._source, self._set_mode_ack, result, 0, 0, *message.source))
+        if reason:
+            self._voice.complain(reason, now)
+
+    def _serve(self, message: Message, now: int) -> None:
+        handle = self._services.get(type(message))
+        if handle is None:
+            return
+        # Not every message says a component; each of these says a system.
+        component: int = getattr(message, "target_component", 0)
+        if self._is_mine(getattr(message, "target_system", -1), component):
+            handle(message, now)
+
+    def _is_mine(self, system: int, component: int) -> bool:
+        return system in (0, self._source.system) and component in (0, self._source.component)

@@ -1,0 +1,76 @@
+"""The way home: up, over, a pause, and down."""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from typing import Final
+
+from mavlink_bridge.messages import Vector
+from sitl.autopilot.guidance import Guidance
+from sitl.config.autopilot import AutopilotConfig
+from sitl.estimation.sensors import Estimate
+from sitl.values.home import Home
+
+_THERE: Final = 0.5  # m
+_NEAR: Final = 1.0
+
+
+class _Stage(Enum):
+    IDLE = "idle"
+    CLIMB = "climb"
+    OVER = "over"
+    PAUSE = "pause"
+    DOWN = "down"
+
+
+class Returning:
+    """RTL of both firmwares: first to the return height, or as high as it is; then over home; then it
+    lands."""
+
+    def __init__(self, guidance: Guidance, home: Home, config: AutopilotConfig) -> None:
+        self._guidance = guidance
+        self._home = home
+        self._config = config
+        self._stage = _Stage.IDLE
+        self._target: Vector = (0.0, 0.0, 0.0)
+        self._until = 0
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        self._config = config
+
+    def begin(self, here: Estimate) -> None:
+        """From ``here``."""
+        north, east, down = here.position
+        height = max(self._home.height + self._config.return_height, -down)
+        self._go((north, east, -height), self._config.waypoint_climb, None, here)
+        self._stage = _Stage.CLIMB
+
+    def end(self) -> None:
+        """Nothing is on its way any more."""
+        self._stage = _Stage.IDLE
+
+    def advance(self, now: int, here: Estimate) -> None:
+        """Fly on: to be called in each step at ``now`` (µs)."""
+        if self._stage is _Stage.PAUSE:
+            if now >= self._until and self._config.return_pause >= 0.0:
+                self._guidance.land(self._config.land_speed)
+                self._stage = _Stage.DOWN
+        elif self._stage in (_Stage.CLIMB, _Stage.OVER) and self._is_there(here):
+            if self._stage is _Stage.CLIMB:
+                x, y, _ = self._home.position
+                north, east = x - here.position[0], y - here.position[1]
+                yaw = math.atan2(east, north) if math.hypot(north, east) > _NEAR else None
+                self._go((x, y, self._target[2]), self._config.waypoint_speed, yaw, here)
+                self._stage = _Stage.OVER
+            else:
+                self._until = now + round(max(0.0, self._config.return_pause) * 1e6)
+                self._stage = _Stage.PAUSE
+
+    def _is_there(self, here: Estimate) -> bool:
+        return math.dist(here.position, self._target) <= _THERE
+
+    def _go(self, target: Vector, speed: float, yaw: float | None, here: Estimate) -> None:
+        self._target = target
+        self._guidance.go(target, speed, yaw, here.pose)

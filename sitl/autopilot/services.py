@@ -1,0 +1,143 @@
+"""All that an autopilot does beside flying: parameters, requests, files, home. One place that knows who takes
+care of which message and which command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from mavlink_bridge.messages import (
+    FileTransfer,
+    Message,
+    ParamRequestList,
+    ParamRequestRead,
+    ParamSet,
+    RequestDataStream,
+    SetGpsGlobalOrigin,
+    SetHomePosition,
+    Source,
+)
+from sitl.autopilot import files
+from sitl.autopilot.command_protocol import Handler, Order
+from sitl.autopilot.failures import Failures
+from sitl.autopilot.firmware import DENIED, Denial, Flavour
+from sitl.autopilot.home_commands import Homing
+from sitl.autopilot.message_requests import Requests
+from sitl.autopilot.missions.service import MissionService
+from sitl.autopilot.parameters.ardupilot import STREAMS
+from sitl.autopilot.parameters.protocol import ParameterProtocol
+from sitl.autopilot.parameters.values import Values
+from sitl.telemetry.schedule import Telemetry
+from sitl.telemetry.status_text import Voice
+
+# MAV_CMD_PREFLIGHT_STORAGE, and its first parameter
+STORAGE: Final = 245
+FENCE_ENABLE: Final = 207
+_READ, _WRITE, _RESET = 0.0, 1.0, 2.0
+
+
+class Services:
+    """``handlers`` by type of message, ``commands`` by MAV_CMD; ``next_due`` (µs): before it there is nothing
+    to do."""
+
+    def __init__(
+        self,
+        source: Source,
+        flavour: Flavour,
+        values: Values,
+        telemetry: Telemetry,
+        homing: Homing,
+        missions: MissionService,
+        failures: Failures,
+        outbox: list[Message],
+        voice: Voice,
+        configure: Callable[[], None],
+    ) -> None:
+        """``configure`` is called when a parameter has changed."""
+        self._source = source
+        self._values = values
+        self._outbox = outbox
+        self._configure = configure
+        self._requests = Requests(source, flavour, telemetry, outbox)
+        self._rates = dict.fromkeys(STREAMS, 0.0) if flavour.groups_streams else {}
+        self._now = 0
+        self._missions = missions
+        self.parameters = ParameterProtocol(
+            source, values, outbox, voice, self._changed, bytewise=flavour.bytewise
+        )
+        self.handlers: dict[type[Any], Callable[[Any, int], None]] = {
+            ParamRequestList: self.parameters.handle,
+            ParamRequestRead: self.parameters.handle,
+            ParamSet: self._set_parameter,
+            RequestDataStream: self._requests.stream,
+            FileTransfer: self._refuse_file,
+            SetHomePosition: homing.set_home,
+            SetGpsGlobalOrigin: homing.set_origin,
+            **missions.handlers,
+        }
+        self.commands: dict[int, Handler] = {
+            **self._requests.commands,
+            **homing.commands,
+            **missions.commands,
+            **failures.commands,
+            STORAGE: self._store,
+        }
+        if flavour.stops:
+            self.commands[FENCE_ENABLE] = self._enable_fence
+        self._stream(0)
+
+    @property
+    def next_due(self) -> int:
+        """µs."""
+        return min(self.parameters.next_due, self._missions.transfer.next_due)
+
+    def work(self, now: int) -> None:
+        """Do what is due at ``now`` (µs)."""
+        for part in (self.parameters, self._missions.transfer):
+            if now >= part.next_due:
+                part.work(now)
+
+    def _set_parameter(self, message: ParamSet, now: int) -> None:
+        self._now = now
+        self.parameters.handle(message, now)
+
+    def _changed(self) -> None:
+        self._configure()
+        self._stream(self._now)
+
+    def _stream(self, now: int, *, resets: bool = False) -> None:
+        """Give the groups of messages the rates that ArduPilot's SR0_ parameters say, where they changed."""
+        for group, rate in self._rates.items():
+            wanted = self._values.named(f"SR0_{group}")
+            if wanted != rate:
+                self._rates[group] = wanted
+                # 0 is how it began: what flows then flows again.
+                usual = wanted == 0.0 and resets
+                self._requests.set_rate(STREAMS[group], None if usual else wanted, now)
+
+    def _refuse_file(self, message: FileTransfer, _now: int) -> None:
+        answer = files.answer(message, self._source)
+        if answer is not None:
+            self._outbox.append(answer)
+
+    def _enable_fence(self, order: Order) -> Denial | None:
+        """DO_FENCE_ENABLE, as ArduPilot has it: parameter 1 is FENCE_ENABLE."""
+        number = self._values.number("FENCE_ENABLE")
+        if number is None or order.params[0] not in (0.0, 1.0):
+            return Denial(DENIED, "Fence refused: parameter 1 must be 0 or 1")
+        self._values.set(number, order.params[0])
+        self._now = order.now
+        self._changed()
+        return None
+
+    def _store(self, order: Order) -> Denial | None:
+        """PREFLIGHT_STORAGE: what is set is kept anyhow; all can be made as at first."""
+        wish = order.params[0]
+        if wish == _RESET:
+            self._values.reset()
+            self._configure()
+            self._stream(order.now, resets=True)
+            return None
+        if wish in (_READ, _WRITE):
+            return None
+        return Denial(DENIED, "Storage refused: parameter 1 must be 0, 1 or 2")

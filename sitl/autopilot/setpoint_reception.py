@@ -1,0 +1,111 @@
+"""Set-points: read, timed, followed or answered.
+
+A set-point that is not followed is answered with STATUSTEXT (253), the same reason at most once a second, and
+the vehicle goes on as before, or brakes where the firmware understands "stop".
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from mavlink_bridge.messages import SetpointAttitude, SetpointGlobal, SetpointLocal
+from sitl.autopilot.firmware import Flavour, Status
+from sitl.autopilot.global_setpoints import localised
+from sitl.autopilot.guidance import Activity, Guidance
+from sitl.telemetry.status_text import Voice
+from sitl.values.home import Home
+from sitl.values.origin import Origin
+from sitl.values.setpoints import POSITION, Pose, Reading, Setpoint, Stop
+
+_SECOND: Final = 1_000_000
+# A set-point takes off when it is this far above, or rises with this speed or acceleration (m, m/s, m/s²).
+_RISING: Final = (0.2, 0.1, 0.1)
+# A pause as long as this (µs) begins a new stream.
+_PAUSE: Final = 2 * _SECOND
+
+
+class Stream(NamedTuple):
+    """The newest usable set-point, when it came and when the one before (µs)."""
+
+    setpoint: Setpoint | None = None
+    newest: float = -math.inf
+    older: float = -math.inf
+
+    def age(self, now: int) -> float:
+        """Seconds since the newest; ∞ before the first."""
+        return (now - self.newest) / _SECOND
+
+    @property
+    def gap(self) -> float:
+        """Seconds between the last two; 0 for the first of a stream."""
+        gap = self.newest - self.older
+        return gap / _SECOND if gap < _PAUSE else 0.0
+
+
+class Steering:
+    """Turns set-point messages into what the guidance follows."""
+
+    def __init__(
+        self, flavour: Flavour, guidance: Guidance, origin: Origin, home: Home, voice: Voice
+    ) -> None:
+        """``origin`` and ``home`` are what places on the globe and heights count from."""
+        self._flavour = flavour
+        self._guidance = guidance
+        self._origin = origin
+        self._home = home
+        self._voice = voice
+        self.stream = Stream()
+
+    def steer(
+        self,
+        message: SetpointLocal | SetpointGlobal | SetpointAttitude,
+        status: Status,
+        here: Pose,
+        now: int,
+    ) -> bool:
+        """Act on one set-point addressed to this vehicle that arrived at ``now`` (µs); whether it is one that
+        can be flown."""
+        reading = self._read(message, here)
+        if not isinstance(reading, Setpoint):
+            denial = self._flavour.steering_denial(status)
+            self._voice.complain(denial or reading.reason, now)
+            if isinstance(reading, Stop) and denial is None and self._guidance.activity is Activity.TRACK:
+                self._guidance.hold()
+            return False
+        self.stream = Stream(reading, now, self.stream.newest)
+        denial = self._flavour.steering_denial(status)
+        if denial is None:
+            self._follow(reading, here, now)
+        elif denial:
+            self._voice.complain(denial, now)
+        return True
+
+    def resume(self, here: Pose, now: int) -> None:
+        """Follow the newest set-point of a stream that began before it was allowed to steer, or hold."""
+        setpoint = self.stream.setpoint
+        if self._flavour.stream_first and setpoint is not None:
+            self._follow(setpoint, here, now)
+        else:
+            self._guidance.hold()
+
+    def _read(self, message: SetpointLocal | SetpointGlobal | SetpointAttitude, here: Pose) -> Reading:
+        if isinstance(message, SetpointAttitude):
+            return self._flavour.read_attitude(message)
+        if isinstance(message, SetpointGlobal):
+            local = localised(message, self._origin, self._home, stops=self._flavour.stops)
+            return self._flavour.read(local, here) if isinstance(local, SetpointLocal) else local
+        return self._flavour.read(message, here)
+
+    def _follow(self, setpoint: Setpoint, here: Pose, now: int) -> None:
+        if self._guidance.activity is Activity.IDLE and not _rises(setpoint, here):
+            return
+        received = int(self.stream.newest)
+        self._guidance.track(setpoint, received, self._flavour.timeout(setpoint), here, now)
+
+
+def _rises(setpoint: Setpoint, here: Pose) -> bool:
+    """Whether a set-point leads off the ground."""
+    level = setpoint.levels[2]
+    z = (setpoint.position, setpoint.velocity, setpoint.acceleration)[level][2]
+    return (here.position[2] if level == POSITION else 0.0) - z > _RISING[level]

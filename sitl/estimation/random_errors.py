@@ -1,0 +1,103 @@
+"""The random errors of an estimate, sample by sample on the estimator's own clock of 100 Hz.
+
+Position wanders as a two-pole Gauss–Markov process, so that the wandering has a speed, and the velocity
+carries that same speed: the two do not contradict each other. What is asked does not move anything on.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mavlink_bridge.messages import Vector
+from sitl.environment.noise import one_pole, two_poles
+from sitl.estimation.profiles import SensorProfile
+from sitl.values.setpoints import ZERO
+
+PERIOD: Final = 10_000
+"""µs between samples: both filters run at 100 Hz."""
+
+_DT: Final = PERIOD * 1e-6
+_BLOCK: Final = 100
+_ONE_POLES: Final = 9  # velocity, roll, pitch, yaw, gyro bias
+_DRAWS: Final = 6 + _ONE_POLES + 6  # two poles per axis; one poles; white position and rates
+
+Array = npt.NDArray[np.float64]
+
+
+class Errors(NamedTuple):
+    """Estimate minus truth: position (m) and velocity (m/s) in local NED, roll, pitch and yaw (rad), body
+    rates (rad/s, FRD). ``drift``: how fast (m/s) the position wanders that the velocity does not tell."""
+
+    position: Vector
+    velocity: Vector
+    roll: float
+    pitch: float
+    yaw: float
+    body_rates: Vector
+    drift: Vector = ZERO
+
+
+class Wandering:
+    """The errors of one profile from one generator; ``advance`` to a sample, then read ``errors``."""
+
+    def __init__(self, profile: SensorProfile, random: np.random.Generator) -> None:
+        """In its steady state from the first sample on."""
+        p = profile
+        poles = two_poles(_DT / p.drift_time, _DT / p.drift_onset)
+        self._turn = np.array([[poles.f11, poles.f12], [poles.f21, poles.f22]])
+        self._kick = np.array([[poles.g11, 0.0], [poles.g21, poles.g22]])
+        times = [p.velocity_time] * 3 + [p.tilt_time] * 2 + [p.yaw_time] + [p.rate_bias_time] * 3
+        steps = [one_pole(_DT / time) for time in times]
+        self._keep = np.array([step.keep for step in steps])
+        self._gain = np.array([step.gain for step in steps])
+        drift = np.array([p.horizontal_drift, p.horizontal_drift, p.vertical_drift])
+        self._drift = drift
+        speed = drift / np.sqrt(p.drift_time * p.drift_onset)
+        self._told: Array = speed if p.drift_told else np.zeros(3)
+        self._untold: Array = speed - self._told
+        self._sizes = np.array([p.velocity] * 3 + [p.tilt] * 2 + [p.yaw] + [p.rate_bias] * 3)
+        self._white = np.array([p.position_white] * 3 + [p.rate_white] * 3)
+        self._random = random
+        self._walks: Array = random.standard_normal((2, 3))
+        self._biases: Array = random.standard_normal(_ONE_POLES)
+        self._first = 0
+        self._rows = self._block()
+        self._sample = 0
+
+    def advance(self, sample: int) -> None:
+        """Go to a sample; back is not possible."""
+        while sample - self._first >= _BLOCK:
+            self._first += _BLOCK
+            self._rows = self._block()
+        self._sample = sample - self._first
+
+    @property
+    def errors(self) -> Errors:
+        """Those of the present sample."""
+        x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, *drift = self._rows[self._sample].tolist()
+        return Errors((x, y, z), (vx, vy, vz), roll, pitch, yaw, (p, q, r), (drift[0], drift[1], drift[2]))
+
+    def _block(self) -> Array:
+        """The next rows (_BLOCK, 15) of errors."""
+        draws = self._random.standard_normal((_BLOCK, _DRAWS))
+        kicks = self._kick @ draws[:, :6].reshape(_BLOCK, 2, 3)
+        nudges = self._gain * draws[:, 6 : 6 + _ONE_POLES]
+        walks, biases = np.empty((_BLOCK, 2, 3)), np.empty((_BLOCK, _ONE_POLES))
+        for k in range(_BLOCK):
+            walks[k], biases[k] = self._walks, self._biases
+            self._walks = self._turn @ self._walks + kicks[k]
+            self._biases = self._keep * self._biases + nudges[k]
+        biases *= self._sizes
+        white = self._white * draws[:, -6:]
+        return np.hstack(
+            [
+                self._drift * walks[:, 0] + white[:, :3],
+                self._told * walks[:, 1] + biases[:, :3],
+                biases[:, 3:6],
+                biases[:, 6:] + white[:, 3:],
+                self._untold * walks[:, 1],
+            ]
+        )

@@ -1,5 +1,0 @@
-"""Missions, fences and rally points: held, sent up and down, and the mission flown.
-
-messages → transfer → plans → itinerary → guidance. Fences are watched by ``sitl.failsafes``; their
-return points, and rally points, are kept and given back and change no flight.
-"""

@@ -1,0 +1,143 @@
+"""All that telemetry may tell of an autopilot at one moment, read off its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from mavlink_bridge.messages import MissionCurrent, Source
+from sitl.autopilot.commander import Commander
+from sitl.autopilot.failsafes import Failsafes
+from sitl.autopilot.firmware import ARMED, Flavour, Mode
+from sitl.autopilot.guidance import Activity, Guidance
+from sitl.autopilot.plant import Plant
+from sitl.config.autopilot import AutopilotConfig
+from sitl.telemetry.identity import version
+from sitl.telemetry.reports import IN_AIR, LANDING, ON_GROUND, TAKING_OFF, Snapshot
+from sitl.values.home import Home
+from sitl.values.origin import Origin
+from sitl.values.setpoints import Setpoint
+from sitl.vehicle.airframe import hover_speeds
+from sitl.vehicle.battery import Battery
+from sitl.vehicle.config import VehicleConfig
+from sitl.vehicle.ground import GRAVITY
+
+# In the air; with thrust cut it is about to be on the ground.
+_LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, Activity.IDLE: LANDING}
+# MAV_SYS_STATUS_GEOFENCE: MAVProxy takes a bit that is not set for a breach, as ArduPilot sets it always.
+_GEOFENCE: Final = 0x100000
+
+
+class Gauges:
+    """Makes snapshots for ``Telemetry``."""
+
+    def __init__(
+        self,
+        config: AutopilotConfig,
+        vehicle: VehicleConfig,
+        source: Source,
+        origin: Origin,
+        home: Home,
+        flavour: Flavour,
+        commander: Commander,
+        guidance: Guidance,
+        plant: Plant,
+        battery: Battery | None,
+        mission: Callable[[], MissionCurrent],
+        failsafes: Failsafes,
+    ) -> None:
+        self._config = config
+        self._source = source
+        self._origin = origin
+        self._home = home
+        self._flavour = flavour
+        self._commander = commander
+        self._guidance = guidance
+        self._plant = plant
+        self._battery = battery
+        self._mission = mission
+        self._failsafes = failsafes
+        self._version = version(source, config.flavour)
+        self._rotors = len(vehicle.rotors)
+        self._hovering = _squares(hover_speeds(vehicle).tolist())
+        told = config.streams == "normal" and config.flavour == "ardupilot"
+        self._unbreached = _GEOFENCE if told else 0
+        self._now = 0
+
+    def configure(self, config: AutopilotConfig) -> None:
+        """Other settings from now on."""
+        self._config = config
+
+    def read(self, now: int) -> Snapshot:
+        """At ``now`` (µs since boot)."""
+        self._now = now
+        commander, flavour, plant = self._commander, self._flavour, self._plant
+        return Snapshot(
+            self._source,
+            now,
+            plant.estimate(),
+            self._origin,
+            commander.ready,
+            commander.armed,
+            self._rotors,
+            flavour.autopilot,
+            flavour.base_mode(commander.mode) | (ARMED if commander.armed else 0),
+            flavour.custom_mode(commander.mode),
+            self._landed_state(),
+            self._target,
+            flavour.echoes_yaw,
+            plant.sensors.gps.located,
+            plant.sensors.gps.fixed,
+            plant.sensors.gps.strain,
+            plant.sensors.gps.spread,
+            plant.sensors.silent(now),
+            self._waking(),
+            self._home,
+            None if self._battery is None else self._battery.charge,
+            self._throttle,
+            0 if self._failsafes.breached else self._unbreached,
+            self._config.epoch,
+            self._version,
+            self._mission,
+            commander.ready and (commander.armed or self._armable(now)),
+            self._failsafes.fence_status,
+            self._lift,
+            lambda: plant.state,
+        )
+
+    def _armable(self, now: int) -> bool:
+        return not self._failsafes.doubts() and self._commander.mode_doubt(now) is None
+
+    def _landed_state(self) -> int:
+        """MAV_LANDED_STATE. Who sinks because nobody steers is not landing."""
+        if self._commander.landed:
+            return ON_GROUND
+        if self._commander.mode is Mode.POSITION:
+            return IN_AIR
+        return _LANDED_STATES.get(self._guidance.activity, IN_AIR)
+
+    def _target(self) -> Setpoint | None:
+        guidance = self._guidance
+        follows = guidance.activity is Activity.TRACK or guidance.activity is Activity.GO
+        return guidance.wanted(self._now) if follows else None
+
+    def _waking(self) -> float:
+        """How far GPS and filter have come up, 0…1."""
+        config = self._config
+        if self._now >= config.ready_after * 1e6:
+            return 1.0
+        return self._now * 1e-6 / config.ready_after if config.startup == "in stages" else 0.0
+
+    def _lift(self) -> float:
+        """m/s²."""
+        if self._plant.vehicle.on_ground:
+            return GRAVITY
+        return GRAVITY * _squares(self._plant.state.rotor_speeds.tolist()) / self._hovering
+
+    def _throttle(self) -> float:
+        """Thrust as a part of twice what hovering takes, 0…1."""
+        return min(1.0, 0.5 * _squares(self._plant.state.rotor_speeds.tolist()) / self._hovering)
+
+
+def _squares(speeds: list[float]) -> float:
+    return sum(speed * speed for speed in speeds)

@@ -1,0 +1,51 @@
+"""What the inertial sensors tell: RAW_IMU, HIGHRES_IMU, and the simulation's truth, SIMSTATE."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from mavlink_bridge.messages import HighresImu, Message, RawImu, SimState, Vector
+from sitl.telemetry.reports import Snapshot
+from sitl.values.attitudes import euler, quaternion, to_body
+
+RAW_IMU: Final = 27
+HIGHRES_IMU: Final = 105
+SIM_STATE: Final = 164
+
+# gauss, NED, as in Zurich.
+_EARTH_FIELD: Final = (0.2155, 0.0120, 0.4240)
+_SEA_LEVEL: Final = 1013.25
+_SCALE_HEIGHT: Final = 8434.0
+_WARM: Final = 25.0
+
+
+def raw_imu(s: Snapshot) -> Message:
+    return RawImu(s.source, s.time, _force(s), s.estimate.body_rates, _field(s))
+
+
+def highres_imu(s: Snapshot) -> Message:
+    altitude = s.origin.altitude - s.estimate.position[2]
+    pressure = _SEA_LEVEL * math.exp(-altitude / _SCALE_HEIGHT)
+    return HighresImu(
+        s.source, s.time, _force(s), s.estimate.body_rates, _field(s), pressure, altitude, _WARM
+    )
+
+
+def sim_state(s: Snapshot) -> Message:
+    truth = s.truth()
+    w, x, y, z = truth.attitude.tolist()
+    latitude, longitude, _ = s.origin.geodetic(s.origin.position_to_local(truth.position))
+    p, q, r = truth.body_rates.tolist()
+    # The site's axes are turned against the local ones by some millionths.
+    return SimState(s.source, *euler((w, x, y, z)), _force(s), (p, q, r), latitude, longitude)
+
+
+def _force(s: Snapshot) -> Vector:
+    """Of the rotors, which push along the axis of the body. Drag, a tenth of it at most, is not told."""
+    return 0.0, 0.0, -s.lift()
+
+
+def _field(s: Snapshot) -> Vector:
+    e = s.estimate
+    return to_body(quaternion(e.roll, e.pitch, e.yaw), _EARTH_FIELD)

@@ -1,0 +1,123 @@
+"""When the autopilot tells what: integer due times, one list of messages per step."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from mavlink_bridge.messages import Message
+from sitl.config.autopilot import TelemetryRates
+from sitl.telemetry import inertial_reports as n
+from sitl.telemetry import reports as r
+from sitl.telemetry import status_reports as q
+from sitl.telemetry.reports import Build, Snapshot
+
+_NEVER: Final = 1 << 62
+
+
+class _Stream:
+    """One message and when it is due (µs); ``usual`` is the configured interval, 0 for none."""
+
+    __slots__ = ("build", "due", "interval", "usual")
+
+    def __init__(self, build: Build, rate: float) -> None:
+        self.build = build
+        self.usual = round(1e6 / rate) if rate else 0
+        self.interval = self.usual
+        self.due = _NEVER
+
+
+class Telemetry:
+    """The streams of one autopilot. ``next_due`` (µs): before it there is nothing to send."""
+
+    def __init__(self, rates: TelemetryRates, reports_ekf: bool) -> None:
+        """``reports_ekf``: as ArduPilot, EKF_STATUS_REPORT (193), RAW_IMU (27) and SIMSTATE (164); else as
+        PX4, ESTIMATOR_STATUS (230), HIGHRES_IMU (105) and ALTITUDE (141)."""
+        self._streams = {
+            r.HEARTBEAT: _Stream(r.heartbeat, rates.heartbeat),
+            r.SYS_STATUS: _Stream(r.sys_status, rates.sys_status),
+            r.ATTITUDE: _Stream(r.attitude, rates.attitude),
+            r.LOCAL_POSITION: _Stream(r.local_position, rates.local_position),
+            r.GLOBAL_POSITION: _Stream(r.global_position, rates.global_position),
+            r.ORIGIN: _Stream(r.origin, rates.gps_global_origin),
+            r.POSITION_TARGET: _Stream(r.position_target, rates.position_target),
+            r.EXTENDED_SYS_STATE: _Stream(r.extended_sys_state, rates.extended_sys_state),
+        }
+        if reports_ekf:
+            self._streams[r.EKF_STATUS] = _Stream(r.ekf_status, rates.ekf_status)
+            self._streams[n.RAW_IMU] = _Stream(n.raw_imu, 0.0)
+            self._streams[n.SIM_STATE] = _Stream(n.sim_state, 0.0)
+        self._streams |= {
+            q.SYSTEM_TIME: _Stream(q.system_time, rates.system_time),
+            q.GPS_RAW: _Stream(q.gps_raw, rates.gps_raw),
+            q.ATTITUDE_QUATERNION: _Stream(q.attitude_quaternion, rates.attitude_quaternion),
+            q.MISSION_CURRENT: _Stream(q.mission_current, rates.mission_current),
+            q.VFR_HUD: _Stream(q.vfr_hud, rates.vfr_hud),
+            q.BATTERY_STATUS: _Stream(q.battery_status, rates.battery_status),
+            q.AUTOPILOT_VERSION: _Stream(q.autopilot_version, 0.0),
+            q.HOME: _Stream(q.home, rates.home_position),
+            q.FENCE_STATUS: _Stream(q.fence_status, 0.0),
+        }
+        if not reports_ekf:
+            self._streams[n.HIGHRES_IMU] = _Stream(n.highres_imu, 0.0)
+            self._streams[q.ALTITUDE] = _Stream(q.altitude, rates.altitude)
+            self._streams[q.ESTIMATOR_STATUS] = _Stream(q.estimator_status, rates.estimator_status)
+        # Those that flow; most do not, and a step should not have to look at them.
+        self._flowing: list[_Stream] = []
+        self._requested: list[int] = []
+        self.next_due = _NEVER
+
+    def start(self, now: int) -> None:
+        """Every stream is due at ``now``, and from then on at whole intervals."""
+        for stream in self._streams.values():
+            stream.due = now if stream.interval else _NEVER
+        self._gather()
+
+    def set_interval(self, message_id: int, interval: int, now: int) -> bool:
+        """As SET_MESSAGE_INTERVAL (511): µs, 0 for the usual one, −1 for none. False when there is no such
+        message."""
+        stream = self._streams.get(message_id)
+        if stream is None:
+            return False
+        wanted = max(0, stream.usual if interval == 0 else interval)
+        if wanted != stream.interval:
+            stream.interval = wanted
+            stream.due = now + wanted if wanted else _NEVER
+            self._gather()
+        return True
+
+    def interval(self, message_id: int) -> int:
+        """As MESSAGE_INTERVAL (244) says it: µs, −1 when it does not flow, 0 when there is no such
+        message."""
+        stream = self._streams.get(message_id)
+        return 0 if stream is None else stream.interval or -1
+
+    def request(self, message_id: int) -> bool:
+        """Send one at the next opportunity, whatever its stream does. False when there is no such message."""
+        if message_id not in self._streams:
+            return False
+        # One answers all who ask before it goes out.
+        if message_id not in self._requested:
+            self._requested.append(message_id)
+        self.next_due = 0
+        return True
+
+    def collect(self, now: int, snapshot: Snapshot) -> list[Message]:
+        """All that is due at ``now``. A stream that fell behind skips what it missed."""
+        builds = [self._streams[message_id].build for message_id in self._requested]
+        self._requested.clear()
+        for stream in self._flowing:
+            if stream.due <= now:
+                builds.append(stream.build)
+                stream.due += stream.interval
+                if stream.due <= now:
+                    stream.due += (now - stream.due) // stream.interval * stream.interval + stream.interval
+        self._schedule()
+        return [message for build in builds if (message := build(snapshot)) is not None]
+
+    def _gather(self) -> None:
+        self._flowing = [stream for stream in self._streams.values() if stream.interval]
+        self._schedule()
+
+    def _schedule(self) -> None:
+        dues = (stream.due for stream in self._flowing)
+        self.next_due = 0 if self._requested else min(dues, default=_NEVER)

@@ -1,0 +1,132 @@
+"""Rows of vehicles of one type through the compiled pipeline, in blocks or one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sitl.vehicle.airframe import FloatArray
+from sitl.vehicle.compiled import entry, kernel, sources_digest
+from sitl.vehicle.pipeline import COMMAND_SIZE, advance
+from sitl.vehicle.simd import LANES
+
+_WORTH_A_BLOCK = 3
+"""From so many vehicles on a block is faster than one after the other, though the rest of it is idle."""
+
+
+@kernel
+def fill_block(rows: FloatArray, first: int, block: FloatArray) -> None:
+    """Put rows side by side into a block, from ``first`` on; the last one as often as it takes."""
+    for lane in range(LANES):
+        row = min(first + lane, rows.shape[0] - 1)
+        for column in range(rows.shape[1]):
+            block[column, lane] = rows[row, column]
+
+
+@kernel
+def read_block(rows: FloatArray, first: int, block: FloatArray) -> None:
+    """Take the rows from ``first`` on back out of a block."""
+    for lane in range(min(LANES, rows.shape[0] - first)):
+        for column in range(rows.shape[1]):
+            rows[first + lane, column] = block[column, lane]
+
+
+@kernel
+def first_not_finite(rows: FloatArray) -> int:
+    """The index of the first row with something that is not finite; −1 when there is none."""
+    for k in range(rows.shape[0]):
+        if not np.isfinite(np.sum(rows[k])):
+            return k
+    return -1
+
+
+_Rows = Callable[[FloatArray, FloatArray, NDArray[np.void], int, FloatArray, int], int]
+
+
+def _build(digest: int) -> tuple[_Rows, _Rows]:
+    # The digest is in the closures, and so in the keys of numba's cache.
+    @entry
+    def singly(
+        states: FloatArray,
+        commands: FloatArray,
+        airframes: NDArray[np.void],
+        steps: int,
+        tracks: FloatArray,
+        start: int,
+    ) -> int:
+        _ = digest
+        bad = first_not_finite(commands)
+        if bad >= 0:
+            return bad
+        airframe = airframes[0]
+        speeds = np.empty(airframe.rotor_x.size)
+        for k in range(start, states.shape[0]):
+            advance(states[k], commands[k], airframe, steps, speeds, tracks[k])
+        return -1
+
+    @entry
+    def in_blocks(
+        states: FloatArray,
+        commands: FloatArray,
+        airframes: NDArray[np.void],
+        steps: int,
+        tracks: FloatArray,
+        end: int,
+    ) -> int:
+        _ = digest
+        bad = first_not_finite(commands)
+        if bad >= 0:
+            return bad
+        airframe = airframes[0]
+        state, command = np.empty((states.shape[1], LANES)), np.empty((COMMAND_SIZE, LANES))
+        speeds, track = np.empty((airframe.rotor_x.size, LANES)), np.empty((3 * steps, LANES))
+        for first in range(0, end, LANES):
+            fill_block(states, first, state)
+            fill_block(commands, first, command)
+            advance(state, command, airframe, steps, speeds, track)
+            read_block(states, first, state)
+            read_block(tracks, first, track)
+        return -1
+
+    return singly, in_blocks
+
+
+_singly, _in_blocks = _build(
+    sources_digest(
+        "lanes.py",
+        "lanes_compiled.py",
+        "vectors.py",
+        "derivatives.py",
+        "angles.py",
+        "body.py",
+        "rotors.py",
+        "allocation.py",
+        "controller.py",
+        "environment.py",
+        "observer.py",
+        "pipeline.py",
+        "batch.py",
+    )
+)
+
+
+def advance_rows(
+    states: FloatArray, commands: FloatArray, airframes: NDArray[np.void], steps: int, tracks: FloatArray
+) -> int:
+    """Advance states (K, STATE_SIZE + 2 n) under commands (K, COMMAND_SIZE) by a number of steps. Compiled.
+
+    ``airframes`` (1,) is the record, ``tracks`` (K, 3 steps) gets the positions after each step. Changes
+    states and tracks in place and returns −1; or returns the index of a command row that is not finite,
+    having changed nothing. All arrays are C-contiguous float64. What a vehicle does depends neither on the
+    others nor on whether it is in a block, so that it goes where it is faster.
+    """
+    count = len(states)
+    rest = count % LANES
+    blocks = count if rest >= _WORTH_A_BLOCK else count - rest
+    if blocks:
+        bad = _in_blocks(states, commands, airframes, steps, tracks, blocks)
+        if bad >= 0 or blocks == count:
+            return bad
+    return _singly(states, commands, airframes, steps, tracks, blocks)

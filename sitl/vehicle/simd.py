@@ -1,0 +1,58 @@
+"""Numbers for the kernels that are one double, or eight: the lanes of eight vehicles side by side.
+
+A kernel is compiled for ``float`` and, for a block of vehicles, for *lanes*: a vector of eight doubles that
+the machine's wide registers calculate at once. The same text gives both, every operation on a lane is the
+IEEE operation on a double, and nothing is reordered or fused, so a vehicle moves in a block as alone, to the
+bit. For lanes a condition is eight conditions, hence a kernel chooses with ``where`` instead of branching;
+rare work may stand behind ``if some(...)``, as long as ``where`` leaves alone the lanes that do not need it.
+
+The annotations of the kernels say ``float`` for both. Constants are written as floats. A *row* (C,) holds
+the numbers of one vehicle, a *block* (C, LANES) those of eight; both are C-contiguous, and no index is
+checked. The bodies here are what the functions mean; ``lanes_compiled`` says how they are compiled.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from sitl.vehicle.airframe import FloatArray
+
+LANES: Final = 8
+"""Doubles in a block: one register of AVX-512, two of AVX2, four of NEON."""
+
+
+def where(condition: bool, a: float, b: float) -> float:
+    """``a`` in the lanes where the condition holds, else ``b``; both are calculated."""
+    return a if condition else b
+
+
+def some(condition: bool) -> bool:
+    """Whether the condition holds in any lane."""
+    return condition
+
+
+def nearest(x: float) -> float:
+    """The integer nearest to ``x``, the even one halfway, as a float."""
+    return float(round(x))
+
+
+def at(row: FloatArray, column: int) -> float:
+    """A column of a row, or the lanes of a block's."""
+    value: float = row[column]
+    return value
+
+
+def put(row: FloatArray, column: int, value: float) -> None:
+    """Set what ``at`` reads."""
+    row[column] = value
+
+
+def three_at(row: FloatArray, column: int) -> tuple[float, float, float]:
+    """Three columns from ``column`` on."""
+    return (row[column], row[column + 1], row[column + 2])
+
+
+def put_three(row: FloatArray, column: int, value: tuple[float, float, float]) -> None:
+    """Set what ``three_at`` reads."""
+    row[column], row[column + 1], row[column + 2] = value
