@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from benchmarks.scenes import APART, HEIGHT, SCENES, SIDE, VEHICLES, crowd, places, scattered
 from outrider.errors import InputError
-from outrider.fleet import Fleet
 from outrider.resources import config_root, find
-from outrider.scenario import Scenario
-from outrider.starts import Starts, starts
-from outrider.yaml_file import load
+from outrider.scenarios.scenario import Scenario
+from outrider.scenarios.starts import Starts, starts
+from outrider.simulation.fleet import Fleet
+from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 SEEDS = st.integers(0, 2**31)

@@ -13,10 +13,10 @@ from companion.config.planning import LimitsConfig
 from companion.flight.autopilots import Loop, Shaping
 from companion.flight.autopilots.limits import limits_of, stock_parameters
 from companion.flight.lowering import lowered
-from outrider.aboard.fly_config import FlyConfig
+from outrider.fly.fly_config import FlyConfig
 from outrider.resources import find
-from outrider.scenario import Scenario
-from outrider.yaml_file import load
+from outrider.scenarios.scenario import Scenario
+from outrider.yaml_files.yaml_file import load
 
 ARDUPILOT, PX4 = PROFILES["ardupilot"], PROFILES["px4"]
 SHIPPED = load(find("companions", "ardupilot"), FlyConfig).companion.limits

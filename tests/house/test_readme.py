@@ -11,8 +11,8 @@ from typer.main import get_command
 from companion.config import CompanionConfig
 from outrider.__main__ import app
 from outrider.resources import find
-from outrider.scenario import Scenario
-from outrider.yaml_file import load, read
+from outrider.scenarios.scenario import Scenario
+from outrider.yaml_files.yaml_file import load, read
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 

@@ -189,10 +189,10 @@ def test_a_core_install_has_neither_compiler_nor_simulator_nor_viewer(core: Inst
         "mavlink_bridge.tlog.log",
         "outrider.report.command",
         "outrider.resources",
-        "outrider.yaml_file",
-        "outrider.scenario",
-        "outrider.sweeps.grid",
-        "outrider.exports.ulog_export",
+        "outrider.yaml_files.yaml_file",
+        "outrider.scenarios.scenario",
+        "outrider.sweep.grid",
+        "outrider.export.ulog_export",
         "sitl.environment.weather",
     ],
 )
@@ -212,8 +212,8 @@ def test_a_core_install_plans_and_speaks(core: Installed) -> None:
         "from mavlink_bridge.messages import Heartbeat, Source\n"
         "from mavlink_bridge.node import Datagram\n"
         "from outrider.resources import find\n"
-        "from outrider.scenario import Scenario\n"
-        "from outrider.yaml_file import load\n"
+        "from outrider.scenarios.scenario import Scenario\n"
+        "from outrider.yaml_files.yaml_file import load\n"
         "config = load(find('scenarios', 'escort'), Scenario).companion\n"
         "node = Companion(config, 11, 1, FleetFrame(47.0, 8.0, 400.0), lambda: 0)\n"
         "beat = Codec().encode(Heartbeat(Source(11, 1), 2, 3, 1, 0, 4))\n"

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from said import Ended, Run
 
-from outrider import progress_lines
 from outrider.__main__ import main
+from outrider.terminal import progress_lines
 
 
 @pytest.fixture(autouse=True)

@@ -25,9 +25,9 @@ from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.wire.codec import Codec
-from outrider.beacon import Beacon
-from outrider.paths import Motion
 from outrider.resources import find
+from outrider.simulation.beacon import Beacon
+from outrider.simulation.paths import Motion
 
 HOST: Final = "127.0.0.1"
 PATIENCE: Final = 60.0

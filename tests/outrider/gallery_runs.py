@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from outrider.errors import OutriderError
-from outrider.scenario import Scenario
-from outrider.sweeps.cells import scenario_of
-from outrider.sweeps.tasks import Task
+from outrider.scenarios.scenario import Scenario
+from outrider.sweep.cells import scenario_of
+from outrider.sweep.tasks import Task
 
 
 def straight(task: Task) -> dict[str, Any]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from outrider.paper.flying import TRACED
-from outrider.sweeps.cells import scenario_of
-from outrider.sweeps.tasks import Task
+from outrider.sweep.cells import scenario_of
+from outrider.sweep.tasks import Task
 
 
 def table(task: Task) -> dict[str, Any]:

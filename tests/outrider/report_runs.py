@@ -24,8 +24,8 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.tlog.log import TlogWriter
 from mavlink_bridge.wire.codec import Codec
-from outrider import names
-from outrider.scenario import Scenario
+from outrider.runs import names
+from outrider.scenarios.scenario import Scenario
 
 BOOT = 1_767_225_600_000_000
 BEFORE = 3.0

@@ -6,8 +6,8 @@ from copy import deepcopy
 from typing import Any
 
 from outrider.resources import config_root, find
-from outrider.scenario import Scenario
-from outrider.yaml_file import load
+from outrider.scenarios.scenario import Scenario
+from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 LOGS = config_root() / "logs"

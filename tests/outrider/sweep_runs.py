@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from outrider.sweeps.tasks import Task
+from outrider.sweep.tasks import Task
 
 FOLDER = "OUTRIDER_TEST_FOLDER"
 """In the environment: where the runs that are not the same each time keep count."""

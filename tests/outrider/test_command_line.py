@@ -14,7 +14,7 @@ from shipped import LOGS, SCENARIOS
 
 from outrider import swarm
 from outrider.errors import InputError, OutriderError
-from outrider.flight import Flight
+from outrider.simulation.flight import Flight
 
 ANTIPODAL, ESCORT = SCENARIOS["antipodal-8"].read_text(), SCENARIOS["escort"].read_text()
 

@@ -10,11 +10,11 @@ import pytest
 from shipped import scenario
 
 from mavlink_bridge.frames import FleetFrame
-from outrider.conductor import HOLD, Conductor, Sight, Stage
-from outrider.operator import Operator
-from outrider.scenario import Scenario
-from outrider.starts import starts
-from outrider.truth import SAMPLE
+from outrider.scenarios.scenario import Scenario
+from outrider.scenarios.starts import starts
+from outrider.simulation.conductor import HOLD, Conductor, Sight, Stage
+from outrider.simulation.ground_truth import SAMPLE
+from outrider.simulation.operator import Operator
 
 EPOCH = 1_000_000
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)

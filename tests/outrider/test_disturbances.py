@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from shipped import FIREFLY, LOGS, scenario
 
-from outrider.disturbances import Event, events, strike_autopilot, strike_computer
-from outrider.fleet import Fleet
+from outrider.simulation.disturbances import Event, events, strike_autopilot, strike_computer
+from outrider.simulation.fleet import Fleet
 
 Call = tuple[Any, ...]
 

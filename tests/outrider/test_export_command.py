@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from outrider.errors import InputError
-from outrider.exports import mcap_export
-from outrider.exports.command import Result, show
-from outrider.exports.command import export as exporting
-from outrider.exports.place import FORMATS
+from outrider.export import mcap_export
+from outrider.export.command import Result, show
+from outrider.export.command import export as exporting
+from outrider.export.place import FORMATS
 
 LOG = Path(__file__).parents[2] / "config" / "logs" / "escort-target.tlog"
 
@@ -166,7 +166,7 @@ def test_without_the_extra_it_says_what_to_install(
     package: str,
 ) -> None:
     for name in [*sys.modules]:
-        if name.startswith("outrider.exports") or name.partition(".")[0] == package:
+        if name.startswith("outrider.export") or name.partition(".")[0] == package:
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     ended = export(spoilt, "--format", form)

@@ -20,8 +20,8 @@ from jsonschema import Draft202012Validator
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Channel, Message, Schema
 
-from outrider.exports.attitude import along_down, quaternions
-from outrider.exports.px4_topics import quaternion
+from outrider.export.attitude import along_down, quaternions
+from outrider.export.px4_topics import quaternion
 
 One = tuple[Schema, Channel, Message]
 SCENES = {"vehicles", "paths", "target", "obstacles", "moving", "trails"}
@@ -63,7 +63,7 @@ def flight(run: Path) -> dict[str, np.ndarray]:  # noqa: F811
 
 
 def exported(source: Path, out: Path) -> bytes:
-    from outrider.exports.command import export as exporting
+    from outrider.export.command import export as exporting
 
     exporting(source, "mcap", out, as_json=True)
     return out.read_bytes()

@@ -17,10 +17,10 @@ from export_runs import SYSTEMS, Heard, all_same, everything, heard, run  # noqa
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.tlog.log import read_tlog
-from outrider.exports import mavlink_tables
-from outrider.exports.command import export
-from outrider.exports.dialect import identifiers, kind
-from outrider.exports.mavlink_tables import HEAD, columns
+from outrider.export import mavlink_tables
+from outrider.export.command import export
+from outrider.export.dialect import identifiers, kind
+from outrider.export.mavlink_tables import HEAD, columns
 
 AXES = ("east", "north", "up")
 

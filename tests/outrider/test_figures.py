@@ -11,9 +11,9 @@ import pytest
 from matplotlib.figure import Figure
 from shipped import scenario
 
-from outrider.figures import draw
-from outrider.outcome import Outcome
-from outrider.truth import Samples
+from outrider.runs.figures import draw
+from outrider.runs.outcome import Outcome
+from outrider.simulation.ground_truth import Samples
 
 
 def circling(vehicles: int, count: int = 60) -> Samples:

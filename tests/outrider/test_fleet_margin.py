@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from shipped import FIREFLY, LOGS, scenario
 
-from outrider.fleet import Fleet
+from outrider.simulation.fleet import Fleet
 from sitl.estimation.profiles import PROFILES, ProfileName
 
 

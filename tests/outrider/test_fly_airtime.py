@@ -21,7 +21,9 @@ from mavlink_bridge.messages import CommandLong, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
-from outrider.aboard.airtime import (
+from outrider.errors import InputError
+from outrider.fly.fly_config import RADIOS, FleetOrigin, FlyConfig
+from outrider.fly.link_budget import (
     FLEET,
     SHARE,
     carried,
@@ -33,8 +35,6 @@ from outrider.aboard.airtime import (
     steered,
     told,
 )
-from outrider.aboard.fly_config import RADIOS, FleetOrigin, FlyConfig
-from outrider.errors import InputError
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
 

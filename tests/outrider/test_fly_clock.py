@@ -9,7 +9,7 @@ from companion.config import CompanionConfig
 from companion.estimation.tracks import Track
 from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.clocks.followed_clock import FollowedClock
-from outrider.aboard.news import judgement
+from outrider.fly.status import judgement
 
 SECOND = 1_000_000
 PERIOD = 20_000

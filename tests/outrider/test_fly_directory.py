@@ -10,9 +10,9 @@ import pytest
 import yaml
 from said import Run
 
-from outrider.aboard.fly_config import FlyConfig
+from outrider.fly.fly_config import FlyConfig
 from outrider.resources import config_root, find
-from outrider.yaml_file import load
+from outrider.yaml_files.yaml_file import load
 
 LOG = config_root() / "logs" / "escort-target.tlog"
 

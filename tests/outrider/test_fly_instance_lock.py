@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from mavlink_bridge.links.endpoints import Endpoint, parse_endpoint
-from outrider.aboard import instance_lock as module
-from outrider.aboard.instance_lock import instance_lock
 from outrider.errors import InputError
+from outrider.fly import instance_lock as module
+from outrider.fly.instance_lock import instance_lock
 
 AUTOPILOT = parse_endpoint("udpin:127.0.0.1:14550")
 OTHER = parse_endpoint("tcp:127.0.0.1:5760")
@@ -22,7 +22,7 @@ HOLDS = """
 import os, sys
 sys.argv = ["/usr/bin/outrider", "fly", "--system", "1"]
 from mavlink_bridge.links.endpoints import parse_endpoint
-from outrider.aboard.instance_lock import instance_lock
+from outrider.fly.instance_lock import instance_lock
 with instance_lock(1, parse_endpoint(sys.stdin.readline().strip())):
     if sys.stdin.readline() == "leave a child\\n" and os.fork():
         os.write(1, b"held by a child\\n")

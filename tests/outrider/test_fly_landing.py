@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.flight.landing import Landing
-from outrider.aboard.diary import Diary
-from outrider.aboard.figures import summary
-from outrider.aboard.flight import Flight
-from outrider.aboard.fly_config import FleetOrigin, FlyConfig
-from outrider.aboard.landing import verdict
-from outrider.aboard.request import Request
+from outrider.fly.event_log import Diary
+from outrider.fly.figures import summary
+from outrider.fly.flight import Flight
+from outrider.fly.fly_config import FleetOrigin, FlyConfig
+from outrider.fly.landing import verdict
+from outrider.fly.request import Request
 
 CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))
 
@@ -63,7 +63,7 @@ def test_what_the_process_that_flew_measured_is_what_is_reported(
     def at_once(_ends, _timeout):
         return []
 
-    monkeypatch.setattr("outrider.aboard.flight.wait", at_once)
+    monkeypatch.setattr("outrider.fly.flight.wait", at_once)
     said = Said({"kind": "landing", **landing}, {"kind": "event", "what": "phase", "text": "done", "at": 1.0})
     diary = Diary(tmp_path, lambda: 0.0)
     typed = type("Typed", (), {"lines": lambda self: []})()

@@ -19,12 +19,12 @@ from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.aboard.crew import FAREWELL, KILLED, Crew
-from outrider.aboard.diary import Diary
-from outrider.aboard.log import BATCH, MOST, Log
-from outrider.aboard.terminal import Terminal
-from outrider.aboard.worker import Worker
-from outrider.steps_file import read_steps
+from outrider.fly.child_process import FAREWELL, KILLED, Crew
+from outrider.fly.event_log import Diary
+from outrider.fly.log import BATCH, MOST, Log
+from outrider.fly.terminal import Terminal
+from outrider.fly.worker import Worker
+from outrider.runs.steps_file import read_steps
 
 BEAT = Datagram("autopilot", Codec().encode(Heartbeat(Source(1, 1), 2, 3, 0, 0, 3)))
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from outrider.aboard.intercom import ALONE, Desk, OrderLink, intercom
-from outrider.aboard.pulse import FIRST, HUNG, Pulse
+from outrider.fly.process_channel import ALONE, Desk, OrderLink, intercom
+from outrider.fly.watchdog import FIRST, HUNG, Pulse
 
 LOOK = 0.05
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from outrider.aboard.request import Options, checked
 from outrider.errors import InputError
+from outrider.fly.request import Options, checked
 from outrider.resources import find
 
 AUTOPILOT, SWARM = "udpin:127.0.0.1:14550", "mcast:,127.0.0.1"

@@ -26,13 +26,13 @@ from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Mes
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import Header
-from outrider.aboard.cockpit import CLOCK, TWIN, Cockpit
-from outrider.aboard.departures import Departures
-from outrider.aboard.fly_config import FleetOrigin, FlyConfig
-from outrider.aboard.gate import Gate
-from outrider.aboard.news import News
-from outrider.aboard.orders import Orders
-from outrider.aboard.twin import REMEMBERED, Twin
+from outrider.fly.duplicate_ids import REMEMBERED, Twin
+from outrider.fly.fly_config import FleetOrigin, FlyConfig
+from outrider.fly.orders import Orders
+from outrider.fly.status import News
+from outrider.fly.supervised_node import CLOCK, TWIN, Cockpit
+from outrider.fly.takeoff_inhibit import Gate
+from outrider.fly.transmit_statistics import Departures
 
 SECOND = 1_000_000
 OWN = Source(1, COMPONENT)

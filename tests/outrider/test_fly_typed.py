@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from outrider.aboard.typed import FEW, Typed
+from outrider.fly.line_input import FEW, Typed
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from companion.config import CompanionConfig
 from companion.telemetry.reception import LINKS, accepts
 from companion.values.components import COMPONENT
 from mavlink_bridge.wire.header import Header
-from outrider.aboard.wiring import wants
+from outrider.fly.wiring import wants
 
 OWN, TARGET = 1, 100
 CONFIGS = [

@@ -13,9 +13,9 @@ from outrider.gallery.flying import fly
 from outrider.gallery.page import page
 from outrider.gallery.showings import WAYS, cells_of, chosen, scenarios, showings
 from outrider.resources import config_root
-from outrider.sweeps.cells import scenario_of, task
-from outrider.sweeps.runs import Ending, Run, run_of
-from outrider.sweeps.tasks import Entry
+from outrider.sweep.cells import scenario_of, task
+from outrider.sweep.runs import Ending, Run, run_of
+from outrider.sweep.tasks import Entry
 
 
 def test_every_scenario_is_flown_in_every_way() -> None:

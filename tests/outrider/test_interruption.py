@@ -11,9 +11,9 @@ import pytest
 from shipped import FIREFLY, scenario
 
 from mavlink_bridge.tlog.log import read_tlog
-from outrider.conductor import Stage
 from outrider.errors import OutriderError
 from outrider.interruption import Came, insisted, interruptible, noted
+from outrider.simulation.conductor import Stage
 from outrider.swarm import Prepared, fly
 
 

@@ -19,14 +19,14 @@ from mavlink_bridge.messages import GlobalPosition, Message, Source, Tunnel
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import KNOTS, unpack
-from outrider import names
-from outrider.fleet import Fleet
-from outrider.moving import STEP, MovingObstacle, places
-from outrider.paths import ClosedPath
-from outrider.realtime.muster import rough
-from outrider.scenario import Scenario
-from outrider.scenario_moving import MovingPostPart, MovingSpherePart
-from outrider.truth import Limits, Truth
+from outrider.realtime.spawn import rough
+from outrider.runs import names
+from outrider.scenarios.moving import MovingPostPart, MovingSpherePart
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.fleet import Fleet
+from outrider.simulation.ground_truth import Limits, Truth
+from outrider.simulation.moving import STEP, MovingObstacle, places
+from outrider.simulation.paths import ClosedPath
 
 FLEET = FleetFrame(47.4, 8.5, 488.0)
 START = 1_767_225_600_000_000

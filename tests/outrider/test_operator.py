@@ -12,7 +12,7 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from outrider.operator import DO_REPOSITION, LINK, NAV_LAND, NAV_TAKEOFF, Operator
+from outrider.simulation.operator import DO_REPOSITION, LINK, NAV_LAND, NAV_TAKEOFF, Operator
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 TICK = 10_000

@@ -10,7 +10,7 @@ import pytest
 from outrider.paper.command import paper
 from outrider.paper.flying import fly
 from outrider.paper.rows import ROWS, SENSORS, Row, cells_of
-from outrider.sweeps.cells import scenario_of, task
+from outrider.sweep.cells import scenario_of, task
 
 THREE = (
     Row("scenario-2", "baseline", "30"),

@@ -11,11 +11,11 @@ from ways import bent_ring
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import GlobalPosition
 from mavlink_bridge.wire.codec import Codec
-from outrider.options import Options
-from outrider.paths import ClosedPath
-from outrider.scenario import PathTarget
+from outrider.scenarios.options import Options
+from outrider.scenarios.scenario import PathTarget
+from outrider.simulation.paths import ClosedPath
+from outrider.simulation.targets import Walking
 from outrider.swarm import prepare
-from outrider.targets import Walking
 
 FLEET = FleetFrame(47.4, 8.5, 488.0)
 LAWS = settings(deadline=None, max_examples=40)

@@ -8,11 +8,11 @@ from itertools import count
 
 import pytest
 
-from outrider import progress_lines
-from outrider.conductor import Stage
-from outrider.console import progress
-from outrider.progress_lines import LINE_S
-from outrider.share_progress import share_progress
+from outrider.simulation.conductor import Stage
+from outrider.terminal import progress_lines
+from outrider.terminal.console import progress
+from outrider.terminal.progress_lines import LINE_S
+from outrider.terminal.share_progress import share_progress
 
 
 @pytest.fixture

@@ -15,14 +15,15 @@ from shipped import FIREFLY, LOGS, scenario
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.links.udp import MulticastLink
 from mavlink_bridge.node import Datagram
-from outrider import console, names
-from outrider.conductor import PREPARE_CAP, Conductor, Stage
-from outrider.fleet import Fleet
 from outrider.realtime import wiring as wirings
-from outrider.realtime.board import Board
 from outrider.realtime.flight import _Leader
-from outrider.realtime.muster import operators_turn, rough, turns
-from outrider.truth import SAMPLE
+from outrider.realtime.shared_page import Board
+from outrider.realtime.spawn import operators_turn, rough, turns
+from outrider.runs import names
+from outrider.simulation.conductor import PREPARE_CAP, Conductor, Stage
+from outrider.simulation.fleet import Fleet
+from outrider.simulation.ground_truth import SAMPLE
+from outrider.terminal import console
 
 OF = scenario("antipodal-8", vehicles=2, airborne=True)
 FLEET = Fleet(OF, FIREFLY, 1, LOGS)

@@ -16,11 +16,11 @@ from shipped import FIREFLY, scenario
 
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from outrider import swarm
-from outrider.options import METHODS
-from outrider.replaying.runs import again
+from outrider.replay.run_replay import again
 from outrider.resources import config_root
-from outrider.scenario import Scenario
-from outrider.steps_file import read_steps
+from outrider.runs.steps_file import read_steps
+from outrider.scenarios.options import METHODS
+from outrider.scenarios.scenario import Scenario
 
 SHORT: dict[str, Any] = {"cap_s": 2.0, "airborne": True}
 SCENARIOS = sorted(path.stem for path in (config_root() / "scenarios").glob("*.yaml"))

@@ -24,11 +24,11 @@ from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 from outrider import swarm
-from outrider.replaying.casting import Cast, Part, survey
-from outrider.replaying.rehearsal import STEP, rehearse, steps
-from outrider.replaying.setpoints import facts
-from outrider.replaying.telemetry import TELEMETRY, Forwarder, paced
-from outrider.replaying.timeline import on_one_line
+from outrider.replay.roles import Cast, Part, survey
+from outrider.replay.setpoints import facts
+from outrider.replay.shadow_run import STEP, rehearse, steps
+from outrider.replay.telemetry import TELEMETRY, Forwarder, paced
+from outrider.replay.timeline import on_one_line
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "tlogs"
 REAL = [("ap_copter463_guided_full", 9), ("ap_copter463_guided_pvy", 1), ("px4_1161_offboard_pvay", 1)]
@@ -278,7 +278,7 @@ def test_a_file_of_anything_is_refused_in_a_line(data: bytes) -> None:
     from tempfile import TemporaryDirectory
 
     from outrider.errors import InputError
-    from outrider.replaying.request import Request
+    from outrider.replay.request import Request
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "noise.tlog"

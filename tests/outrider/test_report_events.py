@@ -14,8 +14,8 @@ from mavlink_bridge.tlog.log import TlogReport
 from outrider.report.command import make
 from outrider.report.distances import encounters
 from outrider.report.events import Event, together
+from outrider.report.log_events import Saying, command, mode, sayings
 from outrider.report.run import Log, Motions, Said, Stream, Utterance
-from outrider.report.sayings import Saying, command, mode, sayings
 
 AUTOPILOT = Source(11, 1)
 NONE = np.empty(0, dtype=np.int64)

@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from shipped import FIREFLY, LOGS, scenario
 
 from mavlink_bridge.network.simulated import Ether, Faults
-from outrider.fleet import Fleet
-from outrider.scenario_links import Links
+from outrider.scenarios.links import Links
+from outrider.simulation.fleet import Fleet
 
 COMPANION, AUTOPILOT = ("companion", 11), ("autopilot", 11)
 

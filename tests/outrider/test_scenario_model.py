@@ -15,10 +15,10 @@ from shipped import FIREFLY, LOGS, SCENARIOS, scenario
 
 from companion.config import CompanionConfig
 from outrider.errors import InputError
-from outrider.flight import EPOCH, Flight
-from outrider.scenario import FIRST_SYSTEM, TARGET_SYSTEM, Points, RecordedTarget, Scenario
-from outrider.starts import starts
-from outrider.yaml_file import load, read
+from outrider.scenarios.scenario import FIRST_SYSTEM, TARGET_SYSTEM, Points, RecordedTarget, Scenario
+from outrider.scenarios.starts import starts
+from outrider.simulation.flight import EPOCH, Flight
+from outrider.yaml_files.yaml_file import load, read
 
 NAMES = sorted(SCENARIOS)
 TEXTS = {name: path.read_text() for name, path in SCENARIOS.items()}

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from companion.obstacles.static import FixedObstacles
 from outrider.errors import InputError
 from outrider.resources import config_root
-from outrider.scenario import Scenario
-from outrider.scenario_places import FixedTarget, Points
-from outrider.sweeps.draw import dials, draw, vehicles
-from outrider.sweeps.scenes import DECIDED, Scene
-from outrider.yaml_file import load, read
+from outrider.scenarios.places import FixedTarget, Points
+from outrider.scenarios.scenario import Scenario
+from outrider.sweep.draw import dials, draw, vehicles
+from outrider.sweep.scenes import DECIDED, Scene
+from outrider.yaml_files.yaml_file import load, read
 
 SHIPPED = {path.stem: path for path in sorted((config_root() / "scenes").glob("*.yaml"))}
 SEEDS = st.integers(0, 2**31)

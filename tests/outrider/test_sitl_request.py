@@ -13,13 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mavlink_bridge.links.endpoints import Multicast, TcpIn, UdpIn, UdpOut, parse_endpoint
+from outrider.address_scope import exposed
 from outrider.errors import InputError
-from outrider.exposure import exposed
-from outrider.hangar.addresses import addresses, extra
-from outrider.hangar.crew import squads
-from outrider.hangar.request import MOST_ID, Options, Request, checked
-from outrider.hangar.worker import PERIOD, period
-from outrider.scenario_places import Origin
+from outrider.scenarios.places import Origin
+from outrider.sitl_server.addresses import addresses, extra
+from outrider.sitl_server.processes import squads
+from outrider.sitl_server.request import MOST_ID, Options, Request, checked
+from outrider.sitl_server.worker import PERIOD, period
 from sitl.autopilot.saved import Saved
 
 Found = TypeVar("Found")

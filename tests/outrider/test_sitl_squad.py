@@ -24,17 +24,17 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Framer
 from mavlink_bridge.wire.signing import EPOCH, Signing
 from outrider.errors import InputError, OutriderError
-from outrider.hangar.addresses import addresses
-from outrider.hangar.board import SAYINGS, Board, Gauges, Pace
-from outrider.hangar.cabinet import Cabinet, prepare
-from outrider.hangar.chronicle import Chronicle
-from outrider.hangar.figures import factor
-from outrider.hangar.modes import mode_name
-from outrider.hangar.request import Options, Request, checked
-from outrider.hangar.screen import Screen
-from outrider.hangar.squad import SPREAD, Squad, boot_times
-from outrider.hangar.traffic import Traffic
-from outrider.hangar.watch import watching
+from outrider.sitl_server.addresses import addresses
+from outrider.sitl_server.display import watching
+from outrider.sitl_server.event_feed import Chronicle
+from outrider.sitl_server.figures import factor
+from outrider.sitl_server.modes import mode_name
+from outrider.sitl_server.persistence import Cabinet, prepare
+from outrider.sitl_server.request import Options, Request, checked
+from outrider.sitl_server.screen import Screen
+from outrider.sitl_server.shared_page import SAYINGS, Board, Gauges, Pace
+from outrider.sitl_server.traffic import Traffic
+from outrider.sitl_server.vehicle_group import SPREAD, Squad, boot_times
 
 GCS = Source(255, 190)
 PERIOD = 20_000

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shipped import scenario
 
-from outrider.scenario import Ring, Scenario
-from outrider.starts import starts
+from outrider.scenarios.scenario import Ring, Scenario
+from outrider.scenarios.starts import starts
 
 SEEDS = st.integers(0, 2**63)
 

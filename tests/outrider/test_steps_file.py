@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from hypothesis import given
 from hypothesis import strategies as st
 
-from outrider.steps_file import StepsFile, read_steps
+from outrider.runs.steps_file import StepsFile, read_steps
 
 GAPS = st.lists(st.tuples(st.sampled_from([4, 20_000, 20_004, 3_000_000]), st.integers(1, 30)), max_size=20)
 

@@ -16,9 +16,8 @@ from hypothesis.extra import numpy as hnp
 from shipped import scenario
 
 from companion.planning import Tally
-from outrider.outcome import Messages, Outcome, Punctuality
-from outrider.scenario import Scenario
-from outrider.summary import (
+from outrider.runs.outcome import Messages, Outcome, Punctuality
+from outrider.runs.summary import (
     WALL_FIELDS,
     Cost,
     Value,
@@ -28,7 +27,8 @@ from outrider.summary import (
     write,
     yaw_errors,
 )
-from outrider.truth import Samples
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.ground_truth import Samples
 
 KEYS = {
     "scenario", "method", "avoidance", "planar", "turning_sense", "seed", "vehicles", "sensors",

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from shipped import FIREFLY, SCENARIOS, scenario
 
 from outrider.errors import InputError
-from outrider.scenario import Scenario
+from outrider.scenarios.scenario import Scenario
 from outrider.swarm import METHODS, Options, apply, prepare, run_directory
 
 BASE = scenario("antipodal-8")

@@ -19,10 +19,10 @@ import sweep_runs
 from dask_machines import Machines
 
 from outrider.errors import InputError
-from outrider.sweeps import scheduler
-from outrider.sweeps.cluster import Cluster
-from outrider.sweeps.command import sweep
-from outrider.sweeps.tasks import AbandonedError, Entry, Task
+from outrider.sweep import scheduler
+from outrider.sweep.cluster import Cluster
+from outrider.sweep.command import sweep
+from outrider.sweep.tasks import AbandonedError, Entry, Task
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]

@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
-from outrider.sweeps import cluster, crew
-from outrider.sweeps.cluster import Cluster
-from outrider.sweeps.tasks import Entry, Task
+from outrider.sweep import cluster
+from outrider.sweep import dask_tasks as crew
+from outrider.sweep.cluster import Cluster
+from outrider.sweep.tasks import Entry, Task
 
 Answer = Callable[[], Any]
 

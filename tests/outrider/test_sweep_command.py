@@ -15,12 +15,12 @@ import pytest
 import sweep_runs
 
 from outrider.errors import InputError
-from outrider.scenario import Scenario
+from outrider.scenarios.scenario import Scenario
 from outrider.swarm import Options, prepare
-from outrider.sweeps.cells import cells, scenario_of, task
-from outrider.sweeps.command import sweep
-from outrider.sweeps.grid import Sweep
-from outrider.yaml_file import load
+from outrider.sweep.cells import cells, scenario_of, task
+from outrider.sweep.command import sweep
+from outrider.sweep.grid import Sweep
+from outrider.yaml_files.yaml_file import load
 
 SWEEP = """
 name: methods
@@ -96,7 +96,7 @@ def test_a_sweep_that_is_killed_goes_on_and_ends_with_the_same_table_to_the_byte
     fly(out="whole")
     expected = capsys.readouterr().out.replace("whole/", "out/")
     program = (
-        "import sys; from pathlib import Path; from outrider.sweeps.command import sweep; "
+        "import sys; from pathlib import Path; from outrider.sweep.command import sweep; "
         "sys.exit(sweep('methods.yaml', jobs=2, out=Path('out'), runs=14, run='sweep_runs:kills_sweep'))"
     )
     environment = {"PYTHONPATH": ":".join(sys.path), sweep_runs.FOLDER: str(tmp_path)}

@@ -14,10 +14,10 @@ import sweep_runs
 
 from outrider.errors import InputError
 from outrider.swarm import Options, prepare
-from outrider.sweeps.cells import cells, scenario_of, task
-from outrider.sweeps.command import sweep
-from outrider.sweeps.grid import Sweep
-from outrider.yaml_file import load
+from outrider.sweep.cells import cells, scenario_of, task
+from outrider.sweep.command import sweep
+from outrider.sweep.grid import Sweep
+from outrider.yaml_files.yaml_file import load
 
 SWEEP = """
 name: methods

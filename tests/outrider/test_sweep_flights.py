@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from outrider.__main__ import app
-from outrider.summary import WALL_FIELDS
-from outrider.sweeps.command import sweep
+from outrider.runs.summary import WALL_FIELDS
+from outrider.sweep.command import sweep
 
 SCENARIO = """
 name: pairs

@@ -13,10 +13,10 @@ from shipped import SCENARIOS, scenario
 
 from outrider.errors import InputError
 from outrider.resources import config_root
-from outrider.scenario import Scenario
-from outrider.sweeps.cells import cells, scenario_of, scenario_text, task
-from outrider.sweeps.grid import MOST_CELLS, Sweep, axis_keys, leaves, overlay, points
-from outrider.yaml_file import load, read
+from outrider.scenarios.scenario import Scenario
+from outrider.sweep.cells import cells, scenario_of, scenario_text, task
+from outrider.sweep.grid import MOST_CELLS, Sweep, axis_keys, leaves, overlay, points
+from outrider.yaml_files.yaml_file import load, read
 
 SWEEPS = sorted((config_root() / "sweeps").glob("*.yaml"))
 KEYS = st.text("abc", min_size=1, max_size=2)

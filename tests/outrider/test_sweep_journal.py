@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from outrider.errors import InputError, OutriderError
-from outrider.sweeps.journal import Header, opened
-from outrider.sweeps.tasks import Entry
+from outrider.sweep.journal import Header, opened
+from outrider.sweep.tasks import Entry
 
 HEADER = Header("swap", "0123", {"outrider": "1", "numpy": "2"})
 ENTRIES = st.builds(
@@ -134,9 +134,9 @@ def test_what_was_written_is_brought_to_the_disk_by_and_by(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now, synced = [100.0], []
-    monkeypatch.setattr("outrider.sweeps.journal.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("outrider.sweep.journal.time.monotonic", lambda: now[0])
     with opened(tmp_path / "journal.jsonl", HEADER) as journal:
-        monkeypatch.setattr("outrider.sweeps.journal.os.fsync", lambda _: synced.append(now[0]))
+        monkeypatch.setattr("outrider.sweep.journal.os.fsync", lambda _: synced.append(now[0]))
         journal.append(entry(1))
         journal.settle()
         assert synced == []
@@ -191,7 +191,7 @@ def test_a_full_disk_is_said_and_what_it_tore_is_cut_away(
     write = os.write
     with opened(path, HEADER) as journal:
         journal.append(entry(1))
-        monkeypatch.setattr("outrider.sweeps.journal.os.write", lambda fd, data: write(fd, data[:10]))
+        monkeypatch.setattr("outrider.sweep.journal.os.write", lambda fd, data: write(fd, data[:10]))
         with pytest.raises(OutriderError, match="disk full"):
             journal.append(entry(2))
         monkeypatch.undo()

@@ -12,9 +12,9 @@ import pytest
 import sweep_runs
 
 from outrider.errors import OutriderError
-from outrider.sweeps import pool, process
-from outrider.sweeps.pool import MOST_STARTS, Pool
-from outrider.sweeps.tasks import Entry, Task
+from outrider.sweep import pool, process
+from outrider.sweep.pool import MOST_STARTS, Pool
+from outrider.sweep.tasks import Entry, Task
 
 LONG = 600.0
 

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from outrider.sweeps.progress import duration
-from outrider.sweeps.report import WORST, CellReport, cell_report, document, exit_status
-from outrider.sweeps.runs import Ending, run_of
-from outrider.sweeps.table import show
-from outrider.sweeps.tasks import Entry
+from outrider.sweep.progress import duration
+from outrider.sweep.report import WORST, CellReport, cell_report, document, exit_status
+from outrider.sweep.runs import Ending, run_of
+from outrider.sweep.table import show
+from outrider.sweep.tasks import Entry
 
 FIGURES = st.none() | st.floats(0.0, 100.0)
 SUMMARIES = st.fixed_dictionaries(

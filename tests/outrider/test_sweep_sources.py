@@ -8,8 +8,8 @@ import pytest
 import sweep_runs
 
 from outrider.errors import InputError
-from outrider.sweeps import command
-from outrider.sweeps.sources import digest, sources
+from outrider.sweep import command
+from outrider.sweep.sources import digest, sources
 
 
 def test_every_package_and_the_recorded_targets_count() -> None:
@@ -46,7 +46,7 @@ def test_a_sweep_does_not_go_on_over_changed_code(tmp_path: Path, monkeypatch: p
     Path("swap.yaml").write_text("name: swap\nscenarios: [antipodal-8]\nruns: 1\n", encoding="utf-8")
     code = tmp_path / "code.py"
     code.write_text("a = 1\n")
-    monkeypatch.setattr("outrider.sweeps.sources.sources", lambda: {"code": code})
+    monkeypatch.setattr("outrider.sweep.sources.sources", lambda: {"code": code})
     command.sweep("swap.yaml", jobs=1, out=Path("out"), run="sweep_runs:swap")
     written = Path("out/journal.jsonl").read_bytes()
     code.write_text("a = 2\n")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from outrider.sweeps.statistics import largest, least, plain, quantile, ranks, rate
+from outrider.sweep.statistics import largest, least, plain, quantile, ranks, rate
 
 FLOATS = st.floats(-1e6, 1e6)
 

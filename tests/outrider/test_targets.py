@@ -17,8 +17,8 @@ from mavlink_bridge.messages import GlobalPosition, Heartbeat, Source
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
-from outrider.scenario import TARGET_SYSTEM, FixedTarget, RecordedTarget
-from outrider.targets import LINK, SHORT, Recorded, Standing, load
+from outrider.scenarios.scenario import TARGET_SYSTEM, FixedTarget, RecordedTarget
+from outrider.simulation.targets import LINK, SHORT, Recorded, Standing, load
 
 ESCORT = scenario("escort")
 assert isinstance(ESCORT.target, RecordedTarget)

@@ -23,14 +23,14 @@ from shipped import FIREFLY, scenario
 from view_flights import logs
 
 from outrider import swarm
-from outrider.flight import Flight
-from outrider.scenario import Scenario
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.flight import Flight
 from outrider.swarm import LOCK_STEP, Prepared
-from outrider.viewing.attendant import Attendant
-from outrider.viewing.line import Line
-from outrider.viewing.lockstep import LockStepView
-from outrider.viewing.palette import VEHICLES, rgb
-from outrider.viewing.show import Show
+from outrider.view.datagram_channel import Line
+from outrider.view.lockstep import LockStepView
+from outrider.view.palette import VEHICLES, rgb
+from outrider.view.show import Show
+from outrider.view.viewer_client import Attendant
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None

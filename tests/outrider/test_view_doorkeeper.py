@@ -11,8 +11,8 @@ from websockets.asyncio import server as served
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from outrider.viewing.doorkeeper import admits
-from outrider.viewing.theatre import Theatre
+from outrider.view.origin_check import admits
+from outrider.view.page_server import Theatre
 
 PROTOCOL: Any = ["viser-v0"]
 

@@ -11,12 +11,12 @@ import pytest
 from shipped import FIREFLY, LOGS, scenario
 from view_flights import flown, line, logs, moments, small
 
-from outrider.flight import Flight
-from outrider.truth import Samples
-from outrider.viewing.attendant import Attendant
-from outrider.viewing.line import Line
-from outrider.viewing.lockstep import LockStepView, moment
-from outrider.viewing.wishes import Wishes, encoded
+from outrider.simulation.flight import Flight
+from outrider.simulation.ground_truth import Samples
+from outrider.view.datagram_channel import Line
+from outrider.view.lockstep import LockStepView, moment
+from outrider.view.view_commands import Wishes, encoded
+from outrider.view.viewer_client import Attendant
 
 
 class Told(LockStepView):

@@ -21,18 +21,19 @@ from mavlink_bridge.messages import GlobalPosition, Heartbeat, Source, Tunnel
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
-from outrider import names, swarm
-from outrider.flight import Flight
-from outrider.realtime.window import Window
+from outrider import swarm
+from outrider.realtime.view_page import Window
+from outrider.runs import names
+from outrider.simulation.flight import Flight
 from outrider.swarm import Prepared
-from outrider.viewing.glimpse import MODES, Glimpse
-from outrider.viewing.listener import Listener
-from outrider.viewing.moment import KNOTS, NO_PLAN, Moment, State
-from outrider.viewing.orders import Change
-from outrider.viewing.player import Player, load
-from outrider.viewing.recorded import Record
-from outrider.viewing.scene import Scene
-from outrider.viewing.wishes import Wishes
+from outrider.view.companion_snapshot import MODES, Glimpse
+from outrider.view.listener import Listener
+from outrider.view.orders import Change
+from outrider.view.player import Player, load
+from outrider.view.recorded import Record
+from outrider.view.scene import Scene
+from outrider.view.snapshot import KNOTS, NO_PLAN, Moment, State
+from outrider.view.view_commands import Wishes
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +134,7 @@ def test_without_the_extra_it_says_what_to_install(
     import sys
 
     for name in [*sys.modules]:
-        if name.startswith("outrider.viewing") or name.partition(".")[0] == "viser":
+        if name.startswith("outrider.view") or name.partition(".")[0] == "viser":
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "viser", None)
     for arguments in (("view", str(made.directory)), ("swarm", "antipodal-8", "--view")):
@@ -209,7 +210,7 @@ def overheard(of: Any) -> Overhears:
     from mavlink_bridge.loops.lockstep import LockStep
 
     loop = LockStep(flight._schedule(), flight.ether, of.timing.base_tick_us, [found])
-    from outrider.flight import EPOCH, _Computers
+    from outrider.simulation.flight import EPOCH, _Computers
 
     computers = _Computers(loop, flight.ether)
     loop.run(EPOCH + 30_000_000, lambda now: flight._watch(now, computers))

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from outrider.options import METHODS
-from outrider.viewing.orders import FILE, Change, Orders
-from outrider.viewing.pace import LEASE, STEP, Pace
-from outrider.viewing.wishes import FASTEST, Wishes, decoded, encoded
+from outrider.scenarios.options import METHODS
+from outrider.view.orders import FILE, Change, Orders
+from outrider.view.pace import LEASE, STEP, Pace
+from outrider.view.view_commands import FASTEST, Wishes, decoded, encoded
 
 SHARES = st.floats(0.0, 1.0)
 PLACES = st.tuples(*[st.floats(-1000.0, 1000.0)] * 3)

@@ -15,8 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from outrider.errors import Fault, InputError
 from outrider.schemas import schema, schema_line, text
-from outrider.yaml_file import MOST_BYTES, MOST_FAULTS, load, read
-from outrider.yaml_scalars import ScalarError, resolve
+from outrider.yaml_files.scalars import ScalarError, resolve
+from outrider.yaml_files.yaml_file import MOST_BYTES, MOST_FAULTS, load, read
 
 
 class Part(BaseModel):

@@ -10,11 +10,11 @@ from typing import Any
 
 from shipped import FIREFLY, LOGS, scenario
 
-from outrider.flight import Flight
-from outrider.scenario import Scenario
-from outrider.viewing.line import ROOM, Line, pair
-from outrider.viewing.lockstep import LockStepView
-from outrider.viewing.moment import Moment
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.flight import Flight
+from outrider.view.datagram_channel import ROOM, Line, pair
+from outrider.view.lockstep import LockStepView
+from outrider.view.snapshot import Moment
 
 SMALL: dict[str, Any] = {
     "vehicles": 3,

@@ -12,13 +12,13 @@ from companion.values.phase import Phase
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.conductor import Stage
-from outrider.flight import Flight
 from outrider.resources import config_root, find
-from outrider.scenario import Scenario
-from outrider.summary import Cost, Value, summarise
+from outrider.runs.summary import Cost, Value, summarise
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.conductor import Stage
+from outrider.simulation.flight import Flight
 from outrider.testing.scenes import merged
-from outrider.yaml_file import load
+from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 FIREFLY = load(find("vehicles", "firefly"), VehicleConfig)

@@ -17,9 +17,9 @@ from companion.flight.takeoff import ARM_DISARM
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandInt, CommandLong
-from outrider.flight import EPOCH
-from outrider.names import LINK_NUMBERS
-from outrider.summary import exit_status
+from outrider.runs.names import LINK_NUMBERS
+from outrider.runs.summary import exit_status
+from outrider.simulation.flight import EPOCH
 from sitl.autopilot.firmware import Mode
 
 PAIR: dict[str, Any] = {

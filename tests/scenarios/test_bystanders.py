@@ -12,8 +12,8 @@ from lockstep_flights import fly, scenario
 from mavlink_bridge.messages import GlobalPosition, Tunnel
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.bystander import Bystander
-from outrider.summary import exit_status
+from outrider.runs.summary import exit_status
+from outrider.simulation.bystander import Bystander
 
 SHORT = {"airborne": True, "cap_s": 8.0, "sensors": "truth"}
 

@@ -11,8 +11,8 @@ from lockstep_flights import FIREFLY, scenario
 
 from companion.obstacles.neighbours import Neighbours
 from companion.obstacles.relevance_filter import RelevanceFilter
-from outrider.flight import Flight
 from outrider.resources import config_root
+from outrider.simulation.flight import Flight
 
 APART = 90.0
 """m between neighbours on the ring of four: at first all are out of earshot."""

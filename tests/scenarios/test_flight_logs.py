@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import ardupilotmega
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.flight import EPOCH
-from outrider.names import LINK_NUMBERS
-from outrider.scenario import TARGET_SYSTEM
+from outrider.runs.names import LINK_NUMBERS
+from outrider.scenarios.scenario import TARGET_SYSTEM
+from outrider.simulation.flight import EPOCH
 
 OPERATOR = 255
 LINKS = {number: name for name, number in LINK_NUMBERS.items()}

@@ -9,7 +9,7 @@ from lockstep_flights import scenario
 
 from outrider.resources import find
 from outrider.swarm import Prepared, measure
-from outrider.yaml_file import load
+from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 pytestmark = pytest.mark.slow

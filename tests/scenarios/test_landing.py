@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from lockstep_flights import fly, scenario
 
-from outrider import conductor
-from outrider.conductor import Stage
-from outrider.flight import Flight
-from outrider.operator import Operator
+from outrider.simulation import conductor
+from outrider.simulation.conductor import Stage
+from outrider.simulation.flight import Flight
+from outrider.simulation.operator import Operator
 
 
 def test_who_hovers_above_a_landed_vehicle_lands_beside_it(

@@ -22,12 +22,12 @@ from mavlink_bridge.messages import (
     ParamSet,
     SetpointLocal,
 )
-from outrider.aboard.cockpit import Cockpit
-from outrider.aboard.departures import Departures
-from outrider.aboard.fly_config import FlyConfig
-from outrider.aboard.news import News
+from outrider.fly.fly_config import FlyConfig
+from outrider.fly.status import News
+from outrider.fly.supervised_node import Cockpit
+from outrider.fly.transmit_statistics import Departures
 from outrider.resources import find
-from outrider.yaml_file import load
+from outrider.yaml_files.yaml_file import load
 
 FLAVOURS = ("ardupilot", "px4")
 REPOSITION = 192

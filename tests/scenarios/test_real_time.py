@@ -18,15 +18,15 @@ from lockstep_flights import FIREFLY, scenario, setpoints
 from mavlink_bridge.messages import GlobalPosition, Tunnel
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.conductor import Stage
 from outrider.realtime.flight import RealTimeFlight
 from outrider.resources import config_root
-from outrider.summary import Cost, exit_status, summarise
-from outrider.viewing.line import Line, pair
-from outrider.viewing.moment import Moment
-from outrider.viewing.orders import Change
-from outrider.viewing.realtime import RealTimeView
-from outrider.viewing.wishes import Wishes, encoded
+from outrider.runs.summary import Cost, exit_status, summarise
+from outrider.simulation.conductor import Stage
+from outrider.view.datagram_channel import Line, pair
+from outrider.view.orders import Change
+from outrider.view.realtime import RealTimeView
+from outrider.view.snapshot import Moment
+from outrider.view.view_commands import Wishes, encoded
 
 LOGS = config_root() / "logs"
 SMALL: dict[str, Any] = {

@@ -20,9 +20,9 @@ from lockstep_flights import Flown, fly, scenario
 
 from companion.values.phase import Phase
 from mavlink_bridge.messages import SetpointLocal, StatusText, Tunnel
-from outrider.conductor import NEAR
-from outrider.names import LINK_NUMBERS
-from outrider.summary import exit_status
+from outrider.runs.names import LINK_NUMBERS
+from outrider.runs.summary import exit_status
+from outrider.simulation.conductor import NEAR
 from sitl.autopilot.firmware import Mode
 
 STRUCK = 12

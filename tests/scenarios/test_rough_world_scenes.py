@@ -13,9 +13,9 @@ from lockstep_flights import FIREFLY, Flown, check, fly, scenario
 
 from companion.obstacles.static import FixedObstacles
 from mavlink_bridge.messages import GlobalPosition
-from outrider.names import LINK_NUMBERS
-from outrider.standoff import standoff
-from outrider.summary import exit_status
+from outrider.runs.formation_error import standoff
+from outrider.runs.names import LINK_NUMBERS
+from outrider.runs.summary import exit_status
 
 BLOCKED: dict[str, Any] = {
     "vehicles": 3,

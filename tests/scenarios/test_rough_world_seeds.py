@@ -12,7 +12,7 @@ from flight_facts import check_told, clock
 from lockstep_flights import Flown, fly, scenario
 
 from mavlink_bridge.tlog.log import read_tlog
-from outrider.summary import WALL_FIELDS
+from outrider.runs.summary import WALL_FIELDS
 
 CHANGES: dict[str, Any] = {
     "vehicles": 3,

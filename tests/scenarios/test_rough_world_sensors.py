@@ -12,8 +12,8 @@ import pytest
 from flight_facts import arrived, check_told, clock, figure
 from lockstep_flights import fly, scenario
 
-from outrider.conductor import NEAR
-from outrider.summary import exit_status
+from outrider.runs.summary import exit_status
+from outrider.simulation.conductor import NEAR
 from sitl.estimation.profiles import PROFILES
 
 LANES = {

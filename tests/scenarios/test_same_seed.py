@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 from lockstep_flights import Flown, check, fly, scenario
 
-from outrider.summary import WALL_FIELDS, Value
+from outrider.runs.summary import WALL_FIELDS, Value
 
 OF = scenario(
     "antipodal-8",

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from lockstep_flights import fly, setpoints
 
-from outrider.aboard.fly_config import FlyConfig
-from outrider.options import Options, apply
+from outrider.fly.fly_config import FlyConfig
 from outrider.resources import find
-from outrider.scenario import Scenario
+from outrider.scenarios.options import Options, apply
+from outrider.scenarios.scenario import Scenario
 from outrider.testing.scenes import merged
-from outrider.yaml_file import load
+from outrider.yaml_files.yaml_file import load
 
 SORTIE = load(find("scenarios", "sortie"), Scenario)
 

@@ -15,9 +15,9 @@ import pytest
 from lockstep_flights import FIREFLY, scenario
 from numpy.typing import NDArray
 
-from outrider.flight import Flight
 from outrider.resources import config_root
-from outrider.truth import Samples
+from outrider.simulation.flight import Flight
+from outrider.simulation.ground_truth import Samples
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import pytest
 from flight_facts import check_told, clock, spoke
 from lockstep_flights import fly, scenario
 
-from outrider.figures import draw
-from outrider.summary import exit_status
+from outrider.runs.figures import draw
+from outrider.runs.summary import exit_status
 
 
 @pytest.mark.parametrize(

@@ -17,11 +17,11 @@ from mavlink_bridge.messages import CommandLong, Message, SetpointLocal, Source,
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
-from outrider import names
-from outrider.beacon import Beacon
-from outrider.paths import Motion
 from outrider.resources import find
-from outrider.yaml_file import load
+from outrider.runs import names
+from outrider.simulation.beacon import Beacon
+from outrider.simulation.paths import Motion
+from outrider.yaml_files.yaml_file import load
 from sitl.node import Autopilot
 from sitl.vehicle.config import VehicleConfig
 

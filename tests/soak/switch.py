@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from fly_process import FLEET, HOST
 
-from outrider.beacon import Beacon
-from outrider.paths import Motion
+from outrider.simulation.beacon import Beacon
+from outrider.simulation.paths import Motion
 
 
 class Switch:

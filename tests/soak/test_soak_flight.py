@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from lockstep_flights import FIREFLY, scenario
 
-from outrider.conductor import Stage
-from outrider.flight import Flight
 from outrider.resources import config_root
-from outrider.scenario import Scenario
-from outrider.summary import Cost, summarise
+from outrider.runs.summary import Cost, summarise
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.conductor import Stage
+from outrider.simulation.flight import Flight
 
 LEG_S, LEGS = 20.0, 29
 PLACES = ([6.0, 0.0, 0.0], [6.0, 6.0, 0.0], [0.0, 6.0, 0.0], [0.0, 0.0, 0.0])

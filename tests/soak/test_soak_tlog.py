@@ -22,8 +22,8 @@ from mavlink_bridge.wire.framing import LONGEST_FRAME, Flaw, frame_at
 from outrider.errors import InputError
 from outrider.logs.listing import document
 from outrider.logs.tally import count
-from outrider.scenario_places import RecordedTarget
-from outrider.targets import load
+from outrider.scenarios.places import RecordedTarget
+from outrider.simulation.targets import load
 
 LOGS = logs()
 FRAMES = frames_of(messages())

@@ -12,13 +12,13 @@ from damage import EDITS, damaged
 from pydantic import BaseModel
 
 from outrider.errors import Fault, InputError
-from outrider.flight import Flight
 from outrider.resources import config_root, find
-from outrider.scenario import Scenario
-from outrider.sweeps.draw import draw
-from outrider.sweeps.grid import Sweep, points
-from outrider.sweeps.scenes import Scene
-from outrider.yaml_file import MOST_BYTES, load, read
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.flight import Flight
+from outrider.sweep.draw import draw
+from outrider.sweep.grid import Sweep, points
+from outrider.sweep.scenes import Scene
+from outrider.yaml_files.yaml_file import MOST_BYTES, load, read
 from sitl.vehicle.airframe import airframe, hover_speeds
 from sitl.vehicle.config import VehicleConfig
 

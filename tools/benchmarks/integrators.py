@@ -11,8 +11,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from outrider.conductor import HOLD, NEAR, SLOW
-from outrider.starts import Array
+from outrider.scenarios.starts import Array
+from outrider.simulation.conductor import HOLD, NEAR, SLOW
 
 STEP = 0.01
 """s between two choices of a velocity: as often as a companion plans."""

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from benchmarks.integrators import Flown
 from benchmarks.orca_settings import Setting
-from outrider.sweeps.statistics import plain
+from outrider.sweep.statistics import plain
 
 WIDTH = 120
 _HEADS = ("converged", "median, s", "worst, s", "runs below", "below, s", "least separation, m")

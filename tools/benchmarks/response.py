@@ -7,8 +7,8 @@ recorded vehicle was sent. Then the response alone flies the set-points that eac
 swarms was sent by its own companion, and is compared with the true motion.
 
 Only how late attitude and thrust follow was fitted, to the swarms (`angle_lag` and `thrust_lag` in
-`sitl/autopilot/position_control/airframe.py`). Gains and limits are the firmware's defaults, mass and drag those of its
-simulator.
+`sitl/autopilot/position_control/airframe.py`). Gains and limits are the firmware's defaults, mass and drag
+those of its simulator.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from benchmarks.swarm_responses import Deviations, follow
 from mavlink_bridge.errors import LogError
 from outrider.errors import OutriderError
 from outrider.resources import find
-from outrider.yaml_file import load
+from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 LOGS: Final = Path(__file__).parents[2] / "tests" / "data" / "flights"

@@ -18,12 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from outrider.flight import Flight
 from outrider.resources import config_root, find
-from outrider.scenario import Scenario
-from outrider.share_progress import share_progress
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.flight import Flight
+from outrider.terminal.share_progress import share_progress
 from outrider.testing.scenes import merged
-from outrider.yaml_file import load
+from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 VEHICLES = (2, 8, 16, 32, 64, 128, 200)

@@ -11,10 +11,10 @@ import numpy as np
 
 from outrider.errors import InputError
 from outrider.resources import find
-from outrider.scenario import Scenario
-from outrider.starts import Array, Starts, starts
-from outrider.streams import Stream, stream
-from outrider.yaml_file import load
+from outrider.scenarios.scenario import Scenario
+from outrider.scenarios.starts import Array, Starts, starts
+from outrider.simulation.streams import Stream, stream
+from outrider.yaml_files.yaml_file import load
 
 VEHICLES, SIDE, HEIGHT, APART = 12, 12.0, 5.0, 1.5
 """Of a crowd: how many fly, the side of their square (m), their height (m), and how far any two starts, and

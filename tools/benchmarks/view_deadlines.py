@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 from outrider import swarm
 from outrider.swarm import Options, Pace
-from outrider.viewing.attendant import Attendant
-from outrider.viewing.show import Show
+from outrider.view.show import Show
+from outrider.view.viewer_client import Attendant
 
 VEHICLES = 4
 FLIGHTS = ("without", "with")

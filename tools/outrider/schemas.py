@@ -13,10 +13,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from outrider.aboard.fly_config import FlyConfig
-from outrider.scenario import Scenario
-from outrider.sweeps.grid import Sweep
-from outrider.sweeps.scenes import Scene
+from outrider.fly.fly_config import FlyConfig
+from outrider.scenarios.scenario import Scenario
+from outrider.sweep.grid import Sweep
+from outrider.sweep.scenes import Scene
 from sitl.vehicle.config import VehicleConfig
 
 SCHEMAS: list[tuple[str, type[BaseModel]]] = [

@@ -12,25 +12,25 @@ from typing import TYPE_CHECKING, NamedTuple
 import yaml
 
 from mavlink_bridge.frames import FleetFrame
-from outrider import figures
 from outrider.errors import Fault, InputError
-from outrider.flight import Flight, Progress
-from outrider.flight_file import write_flight, write_plan_times
 from outrider.interruption import interruptible
-from outrider.options import METHODS, Options, apply
-from outrider.outcome import Outcome
-from outrider.plans_file import write_plans
 from outrider.resources import config_root, find
-from outrider.run_directories import new_directory
-from outrider.scenario import RecordedTarget, Scenario
-from outrider.scenario_faults import MotorFailure
-from outrider.summary import WALL_FIELDS, Cost, Value, summarise, write
-from outrider.targets import load as load_log
-from outrider.yaml_file import load
+from outrider.runs import figures
+from outrider.runs.directories import new_directory
+from outrider.runs.flight_file import write_flight, write_plan_times
+from outrider.runs.outcome import Outcome
+from outrider.runs.plans_file import write_plans
+from outrider.runs.summary import WALL_FIELDS, Cost, Value, summarise, write
+from outrider.scenarios.faults import MotorFailure
+from outrider.scenarios.options import METHODS, Options, apply
+from outrider.scenarios.scenario import RecordedTarget, Scenario
+from outrider.simulation.flight import Flight, Progress
+from outrider.simulation.targets import load as load_log
+from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 if TYPE_CHECKING:
-    from outrider.viewing.show import Show
+    from outrider.view.show import Show
 
 __all__ = [
     "LOCK_STEP",

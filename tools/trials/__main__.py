@@ -14,9 +14,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from outrider.errors import InputError, OutriderError
-from outrider.run_directories import new_directory
-from outrider.saying import say
-from outrider.scenario_places import Origin
+from outrider.runs.directories import new_directory
+from outrider.scenarios.places import Origin
+from outrider.terminal.lines import say
 from trials.autopilots import autopilots
 from trials.mishaps import ENDED, mishaps
 from trials.plan import FLAVOURS, MISHAPS, SORTIE, STORIES, Plan

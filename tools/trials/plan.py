@@ -9,7 +9,7 @@ from typing import Any, Final
 import yaml
 
 from outrider.resources import find
-from outrider.scenario_places import Origin
+from outrider.scenarios.places import Origin
 from trials.autopilots import USUAL, Autopilot
 
 HOST: Final = "127.0.0.1"

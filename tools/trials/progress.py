@@ -7,7 +7,7 @@ from typing import Self
 from rich.console import Console
 from rich.status import Status
 
-from outrider.saying import say
+from outrider.terminal.lines import say
 from trials.plan import Plan
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.opening import open_link
-from outrider.beacon import Beacon
-from outrider.paths import ClosedPath, Motion, Walk
 from outrider.resources import find
-from outrider.scenario import Scenario
-from outrider.scenario_places import PathTarget
-from outrider.yaml_file import load
+from outrider.scenarios.places import PathTarget
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.beacon import Beacon
+from outrider.simulation.paths import ClosedPath, Motion, Walk
+from outrider.yaml_files.yaml_file import load
 from trials.plan import HOST, SORTIE, TARGET
 
 _RADIUS, _TURN, _RATE = 8.0, 0.1, 5.0

@@ -15,12 +15,12 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import unpack as unpack_plan
 from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 from mavlink_bridge.wire.roster import unpack as unpack_roster
-from outrider import names
 from outrider.certify.evidence import Evidence, Garbled, Log, Sighting, Terms, Word
-from outrider.companion_settings import settings_of
 from outrider.errors import Fault, InputError
-from outrider.resolved import CONFIGURATION, resolved
-from outrider.scenario import Scenario
+from outrider.runs import names
+from outrider.runs.configuration import CONFIGURATION, resolved
+from outrider.scenarios.companion_settings import settings_of
+from outrider.scenarios.scenario import Scenario
 
 _TUNNEL = 385
 _ALLOWED = "allowed: what outrider swarm SCENARIO --avoidance certified --out leaves"

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from outrider.commands.words import AsJson, Begun, Jobs
+from outrider.commands.options import AsJson, Begun, Jobs
 
 
 def sweep(
@@ -27,7 +27,7 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Fly many seeds of a grid of scenarios or random scenes. What was killed can be gone on with."""
-    from outrider.sweeps.command import sweep as sweeping
+    from outrider.sweep.command import sweep as sweeping
 
     raise typer.Exit(
         sweeping(name, runs, jobs, out, as_json, wall_limit, scheduler=scheduler, failures=regressions)

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from outrider.commands.words import (
+from outrider.commands.options import (
     METHODS,
     PHYSICS,
     RESPONSE,
@@ -54,9 +54,9 @@ def swarm(
     """Fly a scenario, in lock-step unless told otherwise, and leave logs, summary and picture in a run
     directory."""
     from outrider import swarm as flying
-    from outrider.console import progress, share_progress, show
     from outrider.report.command import NAME, make, write
-    from outrider.summary import exit_status
+    from outrider.runs.summary import exit_status
+    from outrider.terminal.console import progress, share_progress, show
 
     options = flying.Options(
         method,
@@ -76,7 +76,7 @@ def swarm(
     with ExitStack() as open_:
         shown = None
         if view:
-            from outrider.viewing.show import showing
+            from outrider.view.show import showing
 
             shown = open_.enter_context(showing())
         directory = flying.run_directory(out, prepared.scenario, seed)
@@ -140,8 +140,8 @@ def sitl(
     ] = False,
 ) -> None:
     """Emulate vehicles that MAVSDK, MAVProxy, pymavlink and ground stations can connect to, until Ctrl-C."""
-    from outrider.hangar.command import Terms, run
-    from outrider.hangar.request import Options, checked
+    from outrider.sitl_server.command import Terms, run
+    from outrider.sitl_server.request import Options, checked
 
     options = Options(
         count=count,
@@ -214,8 +214,8 @@ def fly(
 ) -> None:
     """Fly one vehicle as part of a swarm: a companion on a real or emulated autopilot, until it has landed
     or Ctrl-C, which leaves it holding its place. Orders are typed: go, hold, return, land (docs/fly.md)."""
-    from outrider.aboard.command import run
-    from outrider.aboard.request import Options, checked
+    from outrider.fly.command import run
+    from outrider.fly.request import Options, checked
 
     options = Options(
         autopilot,

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from outrider.commands.words import AsJson
+from outrider.commands.options import AsJson
 
 
 def key(file: Annotated[Path, typer.Argument(help="New; only you may read it.")]) -> None:
@@ -24,8 +24,8 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer rounds, no flight.")] = False,
 ) -> None:
     """Measure this machine: plan step, PIQP, physics, codec, tlog, real-time factor (CPU time)."""
-    from outrider.bench import measure
-    from outrider.console import share_progress, show_bench
+    from outrider.bench.command import measure
+    from outrider.terminal.console import share_progress, show_bench
 
     with share_progress() as watch:
         figures = measure(watch, quick=quick)

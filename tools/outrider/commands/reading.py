@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from outrider.commands.words import AsJson
+from outrider.commands.options import AsJson
 from outrider.errors import InputError
 
 
@@ -29,8 +29,8 @@ def view(
 ) -> None:
     """Show vehicles in the browser, in three dimensions: a run that is played, or a live flight that is
     listened to; nothing is sent there."""
-    from outrider.viewing.command import Terms
-    from outrider.viewing.command import view as viewing
+    from outrider.view.command import Terms
+    from outrider.view.command import view as viewing
 
     raise typer.Exit(viewing(sources, Terms(host, port, target, html, seconds)))
 
@@ -71,7 +71,7 @@ def replay(
         from outrider.certify.command import certify as certifying
 
         raise typer.Exit(certifying(log, as_json))
-    from outrider.replaying.request import Request
+    from outrider.replay.request import Request
 
     request = Request(log, own, neighbours, target, like, speed, to, out, as_json)
     raise typer.Exit(request.run())
@@ -84,7 +84,7 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Turn a run or a log into files for Foxglove, PlotJuggler, tables or PX4's tools."""
-    from outrider.exports.command import export as exporting
+    from outrider.export.command import export as exporting
 
     exporting(source, form, out, as_json)
 

@@ -8,12 +8,12 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 from companion.flight.autopilots.limits import STOCK, Limits, limits_of, stock_parameters
-from outrider.aboard.fly_config import FlyConfig
 from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
 from outrider.doctor.finding import Finding, Severity
 from outrider.doctor.identity import ROTORCRAFT
+from outrider.fly.fly_config import FlyConfig
 from outrider.resources import find
-from outrider.yaml_file import load
+from outrider.yaml_files.yaml_file import load
 
 _FILES: Final = {ARDUPILOT_NUMBER: "ardupilot", PX4_NUMBER: "px4"}
 _SPEED: Final = 5.0

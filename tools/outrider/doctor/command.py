@@ -16,14 +16,14 @@ from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.tlog.log import TlogReader
 from mavlink_bridge.wire.framing import Frame, frame_at
 from mavlink_bridge.wire.signing import Signing
-from outrider.console import share_progress
 from outrider.doctor.consultation import Consultation
 from outrider.doctor.examination import Examination
 from outrider.doctor.finding import Verdict
 from outrider.doctor.page import document, show
 from outrider.errors import InputError
 from outrider.key_files import key_of
-from outrider.replaying.timeline import on_one_line
+from outrider.replay.timeline import on_one_line
+from outrider.terminal.console import share_progress
 
 READY, NOT_READY = 0, 1
 _STEP: Final = 20_000

@@ -5,17 +5,17 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from outrider import whole_file
 from outrider.errors import InputError
 from outrider.gallery import figures
 from outrider.gallery.flying import RUN
 from outrider.gallery.page import TITLE, page
 from outrider.gallery.showings import Showing, cells_of, chosen, scenarios, showings
-from outrider.sweeps import directory as places
-from outrider.sweeps.cells import scenario_of, task
-from outrider.sweeps.comparison import Flown, flown
-from outrider.sweeps.execution import header
-from outrider.sweeps.runs import run_of
+from outrider.runs import whole_file
+from outrider.sweep import directory as places
+from outrider.sweep.cells import scenario_of, task
+from outrider.sweep.comparison import Flown, flown
+from outrider.sweep.execution import header
+from outrider.sweep.runs import run_of
 
 INTERRUPTED = 3
 SEED = 1

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from outrider.sweeps.runs import Ending, Run
+from outrider.sweep.runs import Ending, Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from outrider.outcome import Outcome
+from outrider.runs.outcome import Outcome
 from outrider.swarm import measured
-from outrider.sweeps.flying import prepared
-from outrider.sweeps.tasks import Task
+from outrider.sweep.flying import prepared
+from outrider.sweep.tasks import Task
 
 RUN = f"{__name__}:fly"
 _EVERY = 5

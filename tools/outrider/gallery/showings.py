@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from outrider.errors import InputError
 from outrider.resources import config_root
-from outrider.sweeps.cells import Cell, cells
-from outrider.sweeps.grid import Sweep
+from outrider.sweep.cells import Cell, cells
+from outrider.sweep.grid import Sweep
 
 WAYS = ("baseline", "swivel", "approach_angle", "tangential", "certified")
 """The methods, and what stands in their place."""

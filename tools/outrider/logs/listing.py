@@ -9,12 +9,12 @@ from stat import S_ISDIR, S_ISREG
 from typing import Any
 
 from mavlink_bridge.errors import LogError
-from outrider.console import share_progress
 from outrider.errors import Fault, InputError
 from outrider.logs.census import Census, Vehicle
 from outrider.logs.tables import show
 from outrider.logs.tally import count
 from outrider.logs.words import MILLION, enumerated, rates
+from outrider.terminal.console import share_progress
 
 _ALLOWED = "allowed: a .tlog, or a .tlog.gz"
 

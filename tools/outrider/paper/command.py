@@ -7,17 +7,17 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from outrider import whole_file
 from outrider.paper import figures
 from outrider.paper.flying import RUN, TRACED
 from outrider.paper.results import Result, result_of
 from outrider.paper.rows import ROWS, Response, Row, cells_of
 from outrider.paper.table import markdown, show
-from outrider.sweeps import directory as places
-from outrider.sweeps.cells import Cell
-from outrider.sweeps.comparison import Flown, flown
-from outrider.sweeps.execution import header
-from outrider.sweeps.runs import run_of
+from outrider.runs import whole_file
+from outrider.sweep import directory as places
+from outrider.sweep.cells import Cell
+from outrider.sweep.comparison import Flown, flown
+from outrider.sweep.execution import header
+from outrider.sweep.runs import run_of
 
 INTERRUPTED = 3
 

@@ -8,8 +8,8 @@ from math import inf, isfinite
 from typing import Any
 
 from outrider.paper.rows import Row
-from outrider.sweeps.runs import Ending, Run
-from outrider.sweeps.statistics import least, plain
+from outrider.sweep.runs import Ending, Run
+from outrider.sweep.statistics import least, plain
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from outrider.sweeps.cells import Cell, cells
-from outrider.sweeps.grid import Sweep
+from outrider.sweep.cells import Cell, cells
+from outrider.sweep.grid import Sweep
 
 Response = Literal["exact", "firmware"]
 SENSORS = "rtk"

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavlink_bridge.frames import ned_to_enu
-from outrider.moving import MovingObstacle
-from outrider.moving import places as moving_places
-from outrider.targets import Placed, Target
-from outrider.truth import ROW, SAMPLE, Array, Truth
-from outrider.witness import places, rows
+from outrider.simulation.ground_truth import ROW, SAMPLE, Array, Truth
+from outrider.simulation.moving import MovingObstacle
+from outrider.simulation.moving import places as moving_places
+from outrider.simulation.targets import Placed, Target
+from outrider.simulation.truth_observer import places, rows
 from sitl.node import Autopilot
 
 

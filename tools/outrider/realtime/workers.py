@@ -25,18 +25,18 @@ from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.loops.lockstep import Scheduled, Tap
 from mavlink_bridge.loops.priority import LEVEL, ask_for_priority, sharpen_timers
 from mavlink_bridge.loops.realtime import RealTime
-from outrider import names
-from outrider.bystander import Bystander
-from outrider.disturbances import Event, strike_autopilot, strike_computer
-from outrider.moving import MovingObstacle
-from outrider.realtime.board import Board
-from outrider.realtime.rough import Rough
+from outrider.realtime.impaired_link import Rough
+from outrider.realtime.shared_page import Board
 from outrider.realtime.traces import TraceWriter
-from outrider.realtime.window import EVERY, Window
-from outrider.recorder import Recorder
-from outrider.targets import Target
-from outrider.viewing.glimpse import glimpse
-from outrider.viewing.wishes import LOSSY
+from outrider.realtime.view_page import EVERY, Window
+from outrider.runs import names
+from outrider.simulation.bystander import Bystander
+from outrider.simulation.disturbances import Event, strike_autopilot, strike_computer
+from outrider.simulation.moving import MovingObstacle
+from outrider.simulation.recorder import Recorder
+from outrider.simulation.targets import Target
+from outrider.view.companion_snapshot import glimpse
+from outrider.view.view_commands import LOSSY
 from sitl.node import Autopilot
 
 TOLERANCE = 1_000

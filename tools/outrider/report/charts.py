@@ -11,9 +11,9 @@ from outrider.report import distances
 from outrider.report.loss import Losses
 from outrider.report.run import Array, Motions, Plans, PlanTimes, Run
 from outrider.report.thinning import largest, least
-from outrider.standoff import standoff
-from outrider.starts import starts
-from outrider.summary import yaw_errors
+from outrider.runs.formation_error import standoff
+from outrider.runs.summary import yaw_errors
+from outrider.scenarios.starts import starts
 
 BINS = 80
 

@@ -9,7 +9,6 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
-from outrider import whole_file
 from outrider.errors import InputError
 from outrider.report import clocks
 from outrider.report.charts import charts, histogram
@@ -23,6 +22,7 @@ from outrider.report.replay import document
 from outrider.report.run import Log, Motions, Run
 from outrider.report.tables import event_table, fact_list, gap_list, loss_tables, summary_table
 from outrider.report.thinning import chosen
+from outrider.runs import whole_file
 
 NAME = "report.html"
 
@@ -41,7 +41,7 @@ def report(directory: Path, out: Path | None = None, as_json: bool = False) -> i
 
     Raises InputError for what is no run, and for a file that is there and no report.
     """
-    from outrider.console import share_progress
+    from outrider.terminal.console import share_progress
 
     path = directory / NAME if out is None else out
     if directory.is_dir():

@@ -10,7 +10,7 @@ import numpy as np
 from companion.obstacles.moving import MovingObstacles
 from companion.obstacles.static import FixedObstacles
 from outrider.report.run import Array, Motions
-from outrider.scenario import Scenario
+from outrider.scenarios.scenario import Scenario
 
 _ALOFT = 0.2
 """m: lower, a vehicle may stand on the ground beside what it would keep away from."""

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 from outrider.report.clocks import seconds
 from outrider.report.distances import Encounter
+from outrider.report.log_events import sayings
 from outrider.report.run import Log, Run
-from outrider.report.sayings import sayings
-from outrider.scenario import Scenario
-from outrider.scenario_faults import ClockFault, Freeze, GpsJump, GpsLoss, MotorFailure, Sudden, Vanish
-from outrider.scenario_places import FixedTarget
+from outrider.scenarios.faults import ClockFault, Freeze, GpsJump, GpsLoss, MotorFailure, Sudden, Vanish
+from outrider.scenarios.places import FixedTarget
+from outrider.scenarios.scenario import Scenario
 
 TOGETHER = 0.5
 """s within which several vehicles say the same."""

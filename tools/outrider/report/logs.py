@@ -12,8 +12,8 @@ from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.messages import CommandAck, Heartbeat, LocalPosition, Message, StatusText
 from mavlink_bridge.tlog.log import Record, TlogReport, read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider import names
 from outrider.report.run import Log, Sender, Stream, Times, Utterance
+from outrider.runs import names
 
 SWARM = names.LINK_NUMBERS["swarm"]
 AUTOPILOT = 1

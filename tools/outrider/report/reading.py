@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TypeVar
 
 from mavlink_bridge.errors import LogError
-from outrider import names
 from outrider.errors import Fault, InputError
 from outrider.report import arrays
 from outrider.report.logs import read_log
 from outrider.report.run import Gap, Log, Motions, Run
-from outrider.resolved import CONFIGURATION, Resolved
-from outrider.yaml_file import load
+from outrider.runs import names
+from outrider.runs.configuration import CONFIGURATION, Resolved
+from outrider.yaml_files.yaml_file import load
 
 SUMMARY, FLIGHT, PLANS, PLAN_TIMES = "summary.json", "flight.npz", "plans.npz", "plan_times.npz"
 _ALLOWED = "allowed: what outrider swarm leaves"

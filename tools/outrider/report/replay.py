@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from outrider.conductor import HOLD
 from outrider.report.charts import Chart, Histogram
 from outrider.report.events import Event
 from outrider.report.packing import pack
 from outrider.report.run import Array, Motions, Run
 from outrider.report.scene import scene
+from outrider.simulation.conductor import HOLD
 
 MILLIMETRE, TENTH = 1e-3, 1e-4
 """Quanta: of lengths and speeds; of angles, a tenth of a milliradian, and times, of a millisecond."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mavlink_bridge.messages import CommandAck, Heartbeat, StatusText
 from mavlink_bridge.tlog.log import TlogReport
-from outrider.scenario import Scenario
+from outrider.scenarios.scenario import Scenario
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from outrider.report.run import Array, Motions, Run
-from outrider.scenario import Scenario
-from outrider.starts import starts
+from outrider.scenarios.scenario import Scenario
+from outrider.scenarios.starts import starts
 
 SPAN = 0.63
 """m from tip to tip where nothing says otherwise: the firefly's."""

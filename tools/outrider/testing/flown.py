@@ -9,12 +9,12 @@ from typing import NamedTuple
 from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider import names
-from outrider.replaying.chase import setpoints
-from outrider.replaying.rehearsal import Rehearsed
-from outrider.replaying.runs import again
-from outrider.report.sayings import mode
-from outrider.summary import Value
+from outrider.replay.run_replay import again
+from outrider.replay.shadow_run import Rehearsed
+from outrider.replay.target_replay import setpoints
+from outrider.report.log_events import mode
+from outrider.runs import names
+from outrider.runs.summary import Value
 from outrider.testing.golden import Golden
 from outrider.testing.setpoints import Setpoints
 

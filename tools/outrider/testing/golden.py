@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from outrider.replaying.setpoints import Course
+from outrider.replay.setpoints import Course
 
 FLAG = "--update-golden"
 _HEAD = (

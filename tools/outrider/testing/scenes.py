@@ -12,13 +12,13 @@ from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.log import read_tlog
 from outrider import swarm
 from outrider.errors import InputError
-from outrider.replaying.casting import Cast, check, survey
-from outrider.replaying.rehearsal import rehearse
+from outrider.replay.roles import Cast, check, survey
+from outrider.replay.shadow_run import rehearse
 from outrider.resources import find
-from outrider.scenario import Scenario
+from outrider.scenarios.scenario import Scenario
 from outrider.testing.flown import Flown, Replayed
 from outrider.testing.golden import Golden
-from outrider.yaml_file import load
+from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 

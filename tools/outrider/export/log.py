@@ -1,0 +1,101 @@
+"""A tlog as a stream of messages, and what of it could not be read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from mavlink_bridge.errors import LogError
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.framing import Flaw, frame_at
+from mavlink_bridge.wire.signing import SETUP_SIGNING
+from outrider.export.dialect import Kind, kind
+
+LATEST: Final = (1 << 63) // 1000 - 1
+"""µs, in the year 2262: later stamps do not fit the formats that count nanoseconds, and are damage."""
+_OFTEN: Final = 2048
+"""Messages from one look at the progress to the next."""
+
+Watch = Callable[[str, float], None]
+
+
+class Spoken(NamedTuple):
+    """A message of a log: ``time`` Unix µs, the ``link`` (0…3) that it went over, who said it, and its whole
+    payload."""
+
+    time: int
+    link: int
+    system: int
+    component: int
+    kind: Kind
+    payload: bytes
+
+
+class Loss(NamedTuple):
+    """What a pass left out: ``damaged`` stretches, and well-placed messages that the dialect lacks."""
+
+    damaged: int
+    unknown: int
+
+
+class Log:
+    """The tlog at ``path``. ``owner``: the vehicle whose companion recorded it; None for a log of any
+    kind."""
+
+    def __init__(self, path: Path, owner: int | None) -> None:
+        self.path, self.owner = path, owner
+        self.done = 0
+        self.loss = Loss(0, 0)
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return self.path.stat().st_size
+
+    def check(self) -> None:
+        """Raises LogError if it is missing, unreadable or without MAVLink."""
+        read_tlog(self.path)
+
+    def __iter__(self) -> Iterator[Spoken]:
+        """Every message once, in the order of the file, but for the key that SETUP_SIGNING holds; afterwards
+        ``loss`` says what else was left out."""
+        reader = read_tlog(self.path)
+        self.done = late = 0
+        for record in reader:
+            self.done += 8 + len(record.frame)
+            if record.time > LATEST:
+                late += 1
+                continue
+            frame = frame_at(record.frame, 0)
+            if isinstance(frame, Flaw):
+                raise LogError(f"{self.path}: the reader handed out what is no frame")
+            if frame.message_id == SETUP_SIGNING:
+                continue
+            known = kind(frame.message_id)
+            yield Spoken(
+                record.time, record.link, frame.system, frame.component, known, known.whole(frame.payload)
+            )
+        report = reader.report
+        self.loss = Loss(report.bad + report.truncated + late, report.unknown)
+
+
+def watched(logs: list[Log], watch: Watch, share: tuple[float, float] = (0.0, 1.0)) -> list[Iterator[Spoken]]:
+    """The messages of each log; ``watch`` hears how much of all has been read, as a share that goes from one
+    number to the other."""
+    total = max(sum(log.size for log in logs), 1)
+    low, high = share
+
+    def of(log: Log) -> Iterator[Spoken]:
+        for number, spoken in enumerate(log):
+            if number % _OFTEN == 0:
+                done = min(sum(one.done for one in logs) / total, 1.0)
+                watch(log.path.name, low + (high - low) * done)
+            yield spoken
+
+    return [of(log) for log in logs]
+
+
+def total_loss(logs: list[Log]) -> Loss:
+    """Of all of them together."""
+    return Loss(sum(log.loss.damaged for log in logs), sum(log.loss.unknown for log in logs))

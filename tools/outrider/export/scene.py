@@ -1,0 +1,199 @@
+"""A flight to be looked at, for Foxglove's 3-D panel: frames that move, and bodies that hang on them.
+
+Bodies are told once, each fixed to a frame: ``fleet`` (ENU), ``vehicle-N``, ``target``, ``moving-N``. So
+whoever jumps to any moment sees them all, and only the frames cost.
+"""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Iterator, Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from companion.config.companion import Obstacle
+from companion.config.obstacles import Post
+from outrider.errors import InputError
+from outrider.export import foxglove, foxglove_schemas
+from outrider.export.arrays import Array, Motion
+from outrider.export.attitude import quaternions, up_vectors
+from outrider.export.foxglove import Color, Json
+from outrider.export.mcap_file import Entry, entry
+from outrider.resources import find
+from outrider.scenarios.moving import MovingPostPart
+from outrider.scenarios.scenario import Scenario
+from outrider.yaml_files.yaml_file import load
+from sitl.vehicle.config import VehicleConfig
+
+FLEET: Final = "fleet"
+BYSTANDER, TARGET, SOLID, SHELL = Color(0.6, 0.6, 0.6), Color(1.0, 0.8, 0.1), Color(0.45, 0.4, 0.38), 0.12
+TRAIL_US, TRAIL_EVERY_US, TRAIL_POINT = 10_000_000, 200_000, 5
+"""A trail is so long, is drawn so often, and has every fifth sample."""
+_NOT_TURNED = (1.0, 0.0, 0.0, 0.0)
+_SPAN = 0.6
+"""m, of a vehicle whose file is not here."""
+
+
+class Stage(NamedTuple):
+    """What a scene is made of: what the run was, how it moved, and which way vehicles said that they lean (by
+    system id, see ``attitude.leanings``)."""
+
+    scenario: Scenario
+    motion: Motion
+    said: Mapping[int, tuple[Array, Array]]
+
+
+def bodies(stage: Stage) -> Iterator[Entry]:
+    """All that does not change its shape, and the paths as a whole, at the first sample."""
+    scenario, motion = stage.scenario, stage.motion
+    if not len(motion.time):
+        return
+    now = int(motion.time[0])
+    span = _span(scenario)
+
+    def told(topic: str, *entities: Json) -> Entry:
+        return entry(now, f"/scene/{topic}", foxglove_schemas.SCENE_UPDATE, foxglove.update(*entities))
+
+    paint = colors(scenario)
+    vehicles = [_vehicle(now, system, span, scenario.d_min, paint[system]) for system in scenario.systems]
+    yield told("vehicles", *vehicles)
+    yield told("paths", *_paths(stage, paint))
+    if np.isfinite(motion.target).any():
+        yield told("target", _target(now, scenario))
+    if scenario.obstacles:
+        solid = [
+            foxglove.entity(now, FLEET, f"obstacle-{k}", _obstacle(one, scenario.d_min_obstacle))
+            for k, one in enumerate(scenario.obstacles)
+        ]
+        yield told("obstacles", *solid)
+    if scenario.moving:
+        yield told("moving", *_moving(now, scenario))
+
+
+def frames(stage: Stage) -> Iterator[Entry]:
+    """Where every frame is, at each sample. What is nowhere has no transform."""
+    scenario, motion = stage.scenario, stage.motion
+    turned = [
+        quaternions(motion.yaw[:, k].astype(np.float64), up_vectors(motion, k, stage.said.get(system)))
+        for k, system in enumerate(scenario.systems)
+    ]
+    names = [f"vehicle-{system}" for system in scenario.systems]
+    for row, time in enumerate(motion.time.tolist()):
+        found = [(name, motion.position[row, k], turned[k][row].tolist()) for k, name in enumerate(names)]
+        found.append(("target", motion.target[row], _NOT_TURNED))
+        found += [
+            (f"moving-{system}", motion.moving[row, k], _NOT_TURNED)
+            for k, system in enumerate(scenario.moving_systems)
+        ]
+        there = [
+            foxglove.transform(time, FLEET, name, at.tolist(), quaternion)
+            for name, at, quaternion in found
+            if np.isfinite(at).all()
+        ]
+        yield entry(time, "/tf", foxglove_schemas.FRAME_TRANSFORMS, {"transforms": there})
+
+
+def trails(stage: Stage) -> Iterator[Entry]:
+    """Where vehicles have been in the last ten seconds, five times a second."""
+    motion, paint = stage.motion, colors(stage.scenario)
+    due = -1
+    for row, time in enumerate(motion.time.tolist()):
+        if time < due:
+            continue
+        due = time + TRAIL_EVERY_US
+        first = int(np.searchsorted(motion.time, time - TRAIL_US))
+        # Counted from the same samples each time, so that a trail does not shiver.
+        chosen = [*range(-(-first // TRAIL_POINT) * TRAIL_POINT, row, TRAIL_POINT), row]
+        drawn = [
+            foxglove.entity(
+                time,
+                FLEET,
+                f"trail-{system}",
+                {"lines": [foxglove.line(motion.position[chosen, k].tolist(), 2.0, paint[system])]},
+            )
+            for k, system in enumerate(stage.scenario.systems)
+            if np.isfinite(motion.position[chosen, k]).all()
+        ]
+        yield entry(time, "/scene/trails", foxglove_schemas.SCENE_UPDATE, foxglove.update(*drawn))
+
+
+def colors(scenario: Scenario) -> dict[int, Color]:
+    """Of the vehicles by system id: round the circle of hues; bystanders are grey."""
+    result = {}
+    for k, system in enumerate(scenario.systems):
+        red, green, blue = colorsys.hsv_to_rgb(k / max(scenario.vehicles, 1), 0.8, 0.95)
+        own = Color(round(red, 3), round(green, 3), round(blue, 3))
+        result[system] = own if k < scenario.vehicles else BYSTANDER
+    return result
+
+
+def _span(scenario: Scenario) -> float:
+    try:
+        return float(load(find("vehicles", scenario.vehicle), VehicleConfig).span)
+    except InputError:
+        return _SPAN
+
+
+def _vehicle(now: int, system: int, span: float, d_min: float, color: Color) -> Json:
+    """A disc with an arrow to where its nose points, in half of d_min: shells that touch are d_min apart."""
+    return foxglove.entity(
+        now,
+        f"vehicle-{system}",
+        f"vehicle-{system}",
+        {
+            "cylinders": [foxglove.cylinder((0.0, 0.0, 0.0), span, 0.12 * span, color)],
+            "arrows": [foxglove.arrow(span, 0.1 * span, color)],
+            "spheres": [foxglove.sphere((0.0, 0.0, 0.0), d_min, color.faint(SHELL))],
+            "texts": [foxglove.label((0.0, 0.0, span), str(system), 0.5 * span, color)],
+        },
+        locked=True,
+    )
+
+
+def _target(now: int, scenario: Scenario) -> Json:
+    spheres = [foxglove.sphere((0.0, 0.0, 0.0), 0.4, TARGET)]
+    if scenario.d_min_target is not None:
+        spheres.append(foxglove.sphere((0.0, 0.0, 0.0), 2.0 * scenario.d_min_target, TARGET.faint(SHELL)))
+    return foxglove.entity(now, "target", "target", {"spheres": spheres}, locked=True)
+
+
+def _obstacle(one: Obstacle, d_min: float) -> dict[str, list[Json]]:
+    """A ball, or a post from the ground up, and around it where no vehicle's centre may be."""
+    if isinstance(one, Post):
+        return _post((one.at[0], one.at[1], 0.5 * one.height), one.radius, one.height, d_min)
+    return _ball(one.at, one.radius, d_min)
+
+
+def _moving(now: int, scenario: Scenario) -> Iterator[Json]:
+    for system, one in zip(scenario.moving_systems, scenario.moving, strict=True):
+        if isinstance(one, MovingPostPart):
+            # Its frame goes along the ground.
+            shapes = _post((0.0, 0.0, 0.5 * one.height), one.radius, one.height, scenario.d_min_obstacle)
+        else:
+            shapes = _ball((0.0, 0.0, 0.0), one.radius, scenario.d_min_obstacle)
+        yield foxglove.entity(now, f"moving-{system}", f"moving-{system}", shapes, locked=True)
+
+
+def _post(middle: foxglove.Point, radius: float, height: float, d_min: float) -> dict[str, list[Json]]:
+    sizes = ((radius, SOLID), (radius + d_min, SOLID.faint(SHELL)))
+    return {"cylinders": [foxglove.cylinder(middle, 2.0 * size, height, color) for size, color in sizes]}
+
+
+def _ball(middle: foxglove.Point, radius: float, d_min: float) -> dict[str, list[Json]]:
+    sizes = ((radius, SOLID), (radius + d_min, SOLID.faint(SHELL)))
+    return {"spheres": [foxglove.sphere(middle, 2.0 * size, color) for size, color in sizes]}
+
+
+def _paths(stage: Stage, paint: Mapping[int, Color]) -> Iterator[Json]:
+    motion = stage.motion
+    ways = [
+        (f"path-{system}", motion.position[::TRAIL_POINT, k], paint[system])
+        for k, system in enumerate(stage.scenario.systems)
+    ]
+    ways.append(("path-target", motion.target[::TRAIL_POINT], TARGET))
+    for name, way, color in ways:
+        there = way[np.isfinite(way).all(axis=1)]
+        if len(there):
+            line = foxglove.line(there.tolist(), 1.0, color.faint(0.4))
+            yield foxglove.entity(int(motion.time[0]), FLEET, name, {"lines": [line]})

@@ -1,0 +1,144 @@
+"""Logs as ULogs, one for each vehicle.
+
+Every message is a ``mavlink_name`` topic as it was on the wire, with an instance for each sender and link;
+what the vehicle's own autopilot says, and is ordered to do, is there in PX4's words too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import ExitStack
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from outrider.errors import InputError
+from outrider.export.dialect import Kind
+from outrider.export.log import Log, Spoken, Watch, watched
+from outrider.export.px4_topics import TOPICS, Px4Topics
+from outrider.export.run import Run
+from outrider.export.ulog_file import Topic, UlogFile
+from outrider.export.written import Written
+
+AUTOPILOT: Final = 1
+"""MAV_COMP_ID_AUTOPILOT1."""
+SECOND: Final = 1_000_000
+_NO_AUTOPILOT = 8
+_SURVEYED = 0.3
+"""The share of the work that is done when it is known who speaks."""
+_HEAD = (("uint8_t", "link"), ("uint8_t", "system"), ("uint8_t", "component"))
+
+
+class Survey(NamedTuple):
+    """Who is in a log: its first time (Unix µs), the types of its messages, and the system ids of vehicles:
+    those with an autopilot."""
+
+    first: int
+    kinds: frozenset[Kind]
+    vehicles: frozenset[int]
+
+
+def write(run: Run, folder: Path, watch: Watch) -> Written:
+    """``vehicle-N.ulg`` in ``folder`` for each vehicle. All begin a second before the first message of any,
+    to the whole second, so that they can be laid on each other. Raises InputError if there is no vehicle."""
+    logs = list(run.logs)
+    streams = watched(logs, watch, (0.0, _SURVEYED))
+    found = [survey(messages) for messages in streams]
+    zero = max(min((one.first for one in found), default=0) // SECOND * SECOND - SECOND, 0)
+    if not any(_vehicles(log, one) for log, one in zip(logs, found, strict=True)):
+        raise InputError(f"{run.source}: no vehicle speaks in it: no HEARTBEAT of an autopilot")
+    parts = []
+    for log, one, stream in zip(logs, found, watched(logs, watch, (_SURVEYED, 1.0)), strict=True):
+        parts += _write(log, one, stream, folder, zero)
+    return Written(*(sum(column) for column in zip(*parts, strict=True)))
+
+
+def survey(messages: Iterable[Spoken]) -> Survey:
+    """Go through a log once."""
+    first, kinds, vehicles = -1, set(), set()
+    for spoken in messages:
+        first = spoken.time if first < 0 else min(first, spoken.time)
+        kinds.add(spoken.kind)
+        if _is_vehicle(spoken):
+            vehicles.add(spoken.system)
+    return Survey(max(first, 0), frozenset(kinds), frozenset(vehicles))
+
+
+def _is_vehicle(spoken: Spoken) -> bool:
+    """Whether an autopilot gives a sign of life."""
+    if spoken.kind.name != "HEARTBEAT" or spoken.component != AUTOPILOT:
+        return False
+    return bool(spoken.kind.read(spoken.payload)["autopilot"] != _NO_AUTOPILOT)
+
+
+def _vehicles(log: Log, found: Survey) -> list[int]:
+    """Whose files a log becomes: in a run its owner's, else those of all that fly in it."""
+    return sorted(found.vehicles) if log.owner is None else [log.owner]
+
+
+def _write(log: Log, found: Survey, messages: Iterable[Spoken], folder: Path, zero: int) -> list[Written]:
+    vehicles = _vehicles(log, found)
+    kinds = sorted(found.kinds, key=lambda kind: kind.id)
+    with ExitStack() as files:
+        books = {
+            system: _Book(
+                files.enter_context(_file(folder, system, zero, kinds)), system, zero, log.owner is not None
+            )
+            for system in vehicles
+        }
+        for spoken in messages:
+            if len(books) == 1 or spoken.system not in books:
+                for book in books.values():
+                    book.add(spoken)
+            else:
+                books[spoken.system].add(spoken)
+        written = [book.file for book in books.values()]
+        return [Written(file.subscriptions, file.messages, file.out_of_order) for file in written]
+
+
+def _file(folder: Path, system: int, zero: int, kinds: list[Kind]) -> UlogFile:
+    information: dict[str, str | int] = {
+        "sys_name": "outrider",
+        "ver_sw": version("outrider"),
+        "sys_uuid": f"MAVLink system {system}",
+        "time_zero_unix_us": zero,
+    }
+    topics = [*TOPICS, *map(mavlink_topic, kinds)]
+    return UlogFile(folder / f"vehicle-{system}.ulg", 0, information, topics)
+
+
+class _Book:
+    """The file of one vehicle, and what goes into it. ``by_link``: whether links are told apart; where a log
+    is nobody's own, the low bits of its stamps may be no links at all."""
+
+    def __init__(self, file: UlogFile, system: int, zero: int, by_link: bool) -> None:
+        self.file = file
+        self._system, self._zero, self._by_link = system, zero, by_link
+        self._px4 = Px4Topics(system, AUTOPILOT)
+
+    def add(self, spoken: Spoken) -> None:
+        """A message."""
+        kind, payload, time = spoken.kind, spoken.payload, spoken.time - self._zero
+        link = spoken.link if self._by_link else 0
+        head = bytes((spoken.link, spoken.system, spoken.component))
+        self.file.data(time, mavlink_topic(kind), (link, spoken.system, spoken.component), head + payload)
+        own = (spoken.system, spoken.component) == (self._system, AUTOPILOT)
+        for view in (self._px4.said if own else self._px4.told)(kind, payload):
+            self.file.data(time, view.topic, link, view.values)
+        if kind.name == "STATUSTEXT":
+            said = kind.read(payload)
+            who = "" if own else f"[{spoken.system}/{spoken.component}] "
+            self.file.say(time, said["severity"], f"{who}{said['text']}")
+
+
+@cache
+def mavlink_topic(kind: Kind) -> Topic:
+    """Its fields in the order of the wire, so that a payload is written as it is. A field that is called as
+    one of ours gets an underscore."""
+    taken = {"timestamp", *(name for _, name in _HEAD)}
+    fields = []
+    for field in kind.wire:
+        size = f"[{field.length}]" if field.length else ""
+        fields.append((f"{field.type}{size}", f"{field.name}_" if field.name in taken else field.name))
+    return Topic(f"mavlink_{kind.name.lower()}", (*_HEAD, *fields))

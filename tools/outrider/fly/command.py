@@ -1,0 +1,114 @@
+"""``outrider fly``: opens the links, looks after one flight, and says how it was."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, nullcontext, suppress
+from pathlib import Path
+from typing import Final
+
+import yaml
+from rich.console import Console
+
+from mavlink_bridge.clocks.clock import WallClock
+from outrider.errors import InputError
+from outrider.fly.event_log import Diary
+from outrider.fly.figures import summary
+from outrider.fly.flight import Flight
+from outrider.fly.instance_lock import instance_lock
+from outrider.fly.line_input import typing
+from outrider.fly.request import Request
+from outrider.fly.screen import Screen
+from outrider.fly.terminal import Terminal
+from outrider.fly.wiring import Wiring, wire
+from outrider.interruption import Came, noted
+from outrider.runs.directories import new_directory
+from outrider.terminal.lines import say
+
+FAULT: Final = 3
+CONFIGURATION, SUMMARY = "configuration.yaml", "summary.json"
+_STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
+"""Ctrl-Z, and what a terminal says to those in its background."""
+
+
+def run(asked: Request) -> int:
+    """Until it has landed, Ctrl-C, SIGTERM, or the time is over; the exit status. InputError for what cannot
+    be opened, and for an autopilot that is not the own one."""
+    if asked.log is not None:
+        from outrider.fly.shadow_run import rehearsed
+
+        return rehearsed(asked, asked.log)
+    with nullcontext() if asked.dry_run else instance_lock(asked.system, asked.endpoints["autopilot"]):
+        return _live(asked)
+
+
+def _live(asked: Request) -> int:
+    config, began = asked.config, time.monotonic()
+    wiring = wire(asked.endpoints, config.system, config.target, config.settings, WallClock())
+    with closing(wiring), noted(_STOPS) as stops, _never_stopped():
+        directory = new_directory(asked.out, f"fly-{config.system}")
+        document = config.model_dump(mode="json")
+        try:
+            text = yaml.safe_dump(document, sort_keys=False)
+            (directory / CONFIGURATION).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--out {directory}: cannot be written: {error.strerror}") from None
+        with closing(Diary(directory, lambda: time.monotonic() - began)) as diary:
+            flight = _flown(asked, directory, diary, stops, wiring)
+    found = summary(flight, directory)
+    try:
+        (directory / SUMMARY).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        with suppress(OSError):
+            say(f"{directory / SUMMARY}: not written: {error.strerror}")
+    with suppress(OSError):
+        if asked.as_json:
+            sys.stdout.write(json.dumps(found) + "\n")
+            sys.stdout.flush()
+        say(f"{'fault: ' if flight.fault else ''}{flight.ended}; {directory}")
+    return FAULT if flight.fault else 0
+
+
+def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wiring: Wiring) -> Flight:
+    """On a terminal with a picture; elsewhere with a line for each event."""
+    console = Console(stderr=True)
+    with typing(console.is_terminal) as typed:
+        if not console.is_terminal:
+            diary.tell = say
+            flight = Flight(asked, wiring, directory, diary, typed, stops, lambda: None)
+            flight.run()
+            return flight
+        screen = Screen(terminal := Terminal(sys.stderr.fileno()))
+        diary.tell = screen.tell
+
+        def look() -> None:
+            screen.pending = typed.pending
+            # A terminal that is gone must not end a flight.
+            with suppress(OSError):
+                screen.look()
+
+        flight = screen.flight = Flight(asked, wiring, directory, diary, typed, stops, look)
+        screen.live.start()
+        try:
+            flight.run()
+        finally:
+            with suppress(OSError):
+                screen.live.stop()
+            terminal.close()
+        return flight
+
+
+@contextmanager
+def _never_stopped() -> Iterator[None]:
+    """It would leave a vehicle to its last set-point."""
+    before = {which: signal.signal(which, signal.SIG_IGN) for which in _SUSPENDING}
+    try:
+        yield
+    finally:
+        for which, handler in before.items():
+            signal.signal(which, handler)

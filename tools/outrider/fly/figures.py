@@ -1,0 +1,36 @@
+"""What a flight comes to, as numbers for scripts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from companion.flight.autopilots.known import KNOWN
+from outrider.fly.flight import Flight
+
+_NUMBER = 1
+"""Of MAV_AUTOPILOT in a state's heartbeat."""
+
+
+def summary(flight: Flight, directory: Path) -> dict[str, object]:
+    """One JSON object. What only the process that flew knows is missing if that was killed; the last it said
+    of itself stands in ``state``."""
+    asked, state, diary = flight.asked, flight.state, flight.diary
+    profile = None if state.beat is None else KNOWN.get(state.beat[_NUMBER])
+    return {
+        "system": asked.system,
+        "autopilot": None if profile is None else profile.name,
+        "dry_run": asked.dry_run,
+        "signed": asked.key is not None,
+        "ended": flight.ended,
+        "fault": flight.fault,
+        "restarts": [{"wall_s": lost, "why": why} for lost, why in flight.restarts],
+        "last_word": flight.last_word or None,
+        "landed_off_m": None if flight.landing.off is None else round(flight.landing.off, 2),
+        "phases": [{"phase": phase, "wall_s": began} for phase, began in diary.phases],
+        "concerns": dict(diary.concerns),
+        **flight.figures,
+        "clock_steps": state.clock_steps,
+        "state": state._asdict(),
+        "wall_s": round(flight.seconds, 2),
+        "run_dir": str(directory),
+    }

@@ -1,0 +1,143 @@
+"""A dry run that is fed by a log: what the companion would have sent, and what is wrong with it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Final
+
+from companion.flight.autopilots import Profile
+from companion.flight.autopilots.known import KNOWN, profile_of
+from companion.telemetry.sharing import AUTOPILOT_INVALID
+from companion.values.components import AUTOPILOT
+from mavlink_bridge.errors import LogError
+from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
+from outrider.errors import InputError
+from outrider.fly.request import Request
+from outrider.fly.setpoint_check import gauge_for
+from outrider.fly.trajectory_comparison import likeness
+from outrider.replay.findings import document_of, leave
+from outrider.replay.roles import Cast, Survey, survey
+from outrider.replay.shadow_run import Rehearsed, rehearse
+from outrider.runs.directories import new_directory
+from outrider.terminal.lines import say
+from outrider.terminal.share_progress import share_progress
+
+_FAR: Final = 20_000.0
+"""m from the fleet origin: no flight of this fleet's."""
+_HEARTBEAT: Final = 0
+
+
+def rehearsed(asked: Request, log: Path) -> int:
+    """Go through the log as fast as that goes; the exit status: 0 all is well, 1 something is wrong with what
+    would have been sent. InputError for a log without the vehicle, or from elsewhere."""
+    config = asked.config
+    try:
+        profile = _profile(asked, log, _autopilots(log))
+        seen = survey(read_tlog(log), config.system, str(log))
+        _check_origin(asked, log, seen)
+        target = config.target if config.target in seen.placed else None
+        with share_progress() as watch:
+
+            def told(now: int, _read: int) -> None:
+                watch(log.name, (now - seen.begin) / max(seen.end - seen.begin, 1))
+
+            found = rehearse(
+                config.settings,
+                Cast(config.system, None, target),
+                seen,
+                read_tlog(log),
+                told,
+                config.origin.frame,
+                follow=config.clock != "wall",
+            )
+    except LogError as error:
+        raise InputError(f"--autopilot: {error}") from None
+    faults = _faults(asked, found, profile.setpoint_mask)
+    near = likeness(found)
+    document = {
+        "system": config.system,
+        "autopilot": profile.name,
+        "dry_run": True,
+        "target": target,
+        **document_of(found),
+        "beside_m": near.beside,
+        "astray_m": near.astray,
+        "setpoint_faults": faults,
+    }
+    directory = new_directory(asked.out, f"fly-{config.system}-dry")
+    leave(directory, f"{log.name} · vehicle {config.system}", found, document)
+    if asked.as_json:
+        sys.stdout.write(json.dumps({**document, "run_dir": str(directory)}) + "\n")
+    whom = f"target {target}"
+    if target is None:
+        whom = f"a target that stands where it began, as {config.target} says no place there"
+    say(f"{log.name}: vehicle {config.system}, {profile.name}")
+    say(f"{len(found.would)} set-points would have been sent, around {whom}")
+    for words, steps in sorted(found.reasons.items(), key=lambda pair: -pair[1]):
+        say(f"{steps * 0.01:8.2f} s without a set-point for want of {words}")
+    for fault in faults:
+        say(f"wrong: {fault}")
+    say(str(directory))
+    return 1 if faults else 0
+
+
+def _faults(asked: Request, found: Rehearsed, mask: int) -> list[str]:
+    """What is wrong with what would have been sent, to an autopilot that takes ``mask``."""
+    if not found.would:
+        return ["no set-point at all"]
+    settings = asked.config.settings
+    gauge = gauge_for(settings.limits, settings.heading)
+    for now, message in found.would:
+        gauge.take(now, message)
+    return gauge.faults(mask) + likeness(found).faults
+
+
+def _autopilots(log: Path) -> dict[int, int]:
+    """MAV_AUTOPILOT of each vehicle of the log, by system id."""
+    codec = Codec(lambda identifier, _system, component: (identifier, component) == (_HEARTBEAT, AUTOPILOT))
+    found: dict[int, int] = {}
+    for record in read_tlog(log):
+        for message in codec.feed(record.frame):
+            if isinstance(message, Heartbeat) and message.autopilot != AUTOPILOT_INVALID:
+                known = profile_of(message) is not None
+                if known or message.source.system not in found:
+                    found[message.source.system] = message.autopilot
+    return found
+
+
+def _profile(asked: Request, log: Path, autopilots: dict[int, int]) -> Profile:
+    """Of the own vehicle. InputError that says who is there and may be flown."""
+    system = asked.system
+    profile = KNOWN.get(autopilots.get(system, AUTOPILOT_INVALID))
+    if profile is not None:
+        return profile
+    there = ", ".join(
+        f"{one} ({KNOWN[kind].name if kind in KNOWN else f'autopilot {kind}'})"
+        for one, kind in sorted(autopilots.items())
+    )
+    allowed = ", ".join(str(one) for one, kind in sorted(autopilots.items()) if kind in KNOWN)
+    wrong = "is no ArduPilot or PX4" if system in autopilots else "is not in it"
+    raise InputError(
+        f"--autopilot tlog:{log}: vehicle {system} (of {asked.name}) {wrong}; "
+        f"there: {there or 'no vehicle'}; "
+        f"allowed: {f'--system {allowed}' if allowed else 'a log with an ArduPilot or PX4'}"
+    )
+
+
+def _check_origin(asked: Request, log: Path, seen: Survey) -> None:
+    system, (latitude, longitude, _) = asked.system, seen.place
+    if not (latitude or longitude):
+        raise InputError(
+            f"--autopilot tlog:{log}: vehicle {system} never knows where on the globe it is "
+            "(GLOBAL_POSITION_INT); allowed: a log of a flight with a position"
+        )
+    far = float((asked.config.origin.frame.to_enu(*seen.place) ** 2).sum() ** 0.5)
+    if far > _FAR:
+        raise InputError(
+            f"origin in {asked.name}: is {far / 1000.0:.0f} km away from where vehicle {system} is in {log}; "
+            f"allowed: one near {latitude:.5f}, {longitude:.5f}, in a copy of the file"
+        )

@@ -1,0 +1,255 @@
+"""What the process that flies tells of itself: each change when it happens, and how it is, some times a
+second."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from companion.dry_run import DryRun
+from companion.flight.health_monitor import Concern
+from companion.flight.landing import Landing
+from companion.flight.readiness import OPERATORS_GO
+from companion.flight.vehicle import Vehicle
+from companion.values.phase import Phase
+from mavlink_bridge.clocks.followed_clock import FollowedClock
+from mavlink_bridge.frames import ned_to_enu
+from mavlink_bridge.loops.histogram import Histogram
+from mavlink_bridge.messages import SetpointLocal
+from mavlink_bridge.wire.signing import Signing
+from outrider.fly.supervised_node import OURS, TWIN, Cockpit
+from outrider.fly.transmit_statistics import Departures
+from outrider.sitl_server.modes import mode_name
+
+SHOWN = 200_000
+"""µs of the wall between two states."""
+_RARELY = 5
+"""States between two looks at what takes longer to work out."""
+_AGAIN = 10.0
+"""s after which an autopilot's words are told again that it keeps repeating."""
+_REPEATED = ("autopilot", "refused")
+_WAITING = (Phase.CONNECT, Phase.PREPARE)
+_PLAIN = 0.005
+"""A clock that is off by more is no quartz."""
+
+
+class State(NamedTuple):
+    """How it is. ``at``: s of its clock since it began; ages in ms; ``plan_ms``: median and 99th percentile;
+    ``beat``: the autopilot's last heartbeat: type, autopilot, base and custom mode, system status; ``stamp``
+    of the newest signature; ``would``: in a dry run, the last set-point that it would have sent;
+    ``simulated``: whether the autopilot's clock is a simulation's, None before that is known."""
+
+    at: float = 0.0
+    phase: str = Phase.CONNECT.value
+    waiting: str = ""
+    mode: str = ""
+    armed: bool = False
+    guided: bool = False
+    beat: tuple[int, int, int, int, int] | None = None
+    position: tuple[float, float, float] | None = None
+    velocity: tuple[float, float, float] | None = None
+    own_ms: int | None = None
+    target_ms: int | None = None
+    neighbours_ms: dict[str, int] = {}  # noqa: RUF012
+    plans: int = 0
+    held: int = 0
+    failures: int = 0
+    plan_ms: tuple[float, float] = (0.0, 0.0)
+    rate: float = 1.0
+    clock_steps: int = 0
+    setpoints: int = 0
+    would: str = ""
+    concerns: tuple[str, ...] = ()
+    stamp: int = 0
+    simulated: bool | None = None
+
+    @property
+    def ours(self) -> bool:
+        """Whether the companion has the vehicle."""
+        return Phase(self.phase) in OURS
+
+
+class News:
+    """Told after every step, tells by ``tell``."""
+
+    def __init__(
+        self,
+        cockpit: Cockpit,
+        departures: Departures,
+        followed: FollowedClock | None,
+        signing: Signing | None,
+        tell: Callable[..., None],
+    ) -> None:
+        self._cockpit, self._companion, self._departures = cockpit, cockpit.companion, departures
+        self._followed, self._signing = followed, signing
+        self._tell = tell
+        self.plan_times = Histogram()
+        """µs of CPU time."""
+        self._began: int | None = None
+        self._shown: int | None = None
+        self._phase: Phase | None = None
+        self._states = 0
+        self._plan_ms = (0.0, 0.0)
+        self._told = self._refused = self._steps = self._remarked = 0
+        self._judged = self._twin = False
+        self._landing: Landing | None = None
+        self._concerns: dict[str, Concern] = {}
+        self._sentences: dict[str, str] = {}
+        self._lately: dict[tuple[str, str], float] = {}
+
+    def look(self, now: int, wall: int) -> None:
+        """After the step at ``now`` (µs of its clock)."""
+        self._began = now if self._began is None else self._began
+        at = round((now - self._began) * 1e-6, 2)
+        phase = self._companion.pilot.phase
+        # Whoever hears of another phase has to know the rest: it may have the last word a moment later.
+        at_once = phase is not self._phase
+        self._changes(at)
+        if self._shown is None or at_once or wall - self._shown >= SHOWN:
+            self._shown, self._phase = wall, phase
+            self._tell(kind="state", **self.state(now)._asdict())
+
+    def state(self, now: int) -> State:
+        """How it is at ``now``."""
+        node, pilot = self._companion, self._companion.pilot
+        vehicle, view = pilot.vehicle, node.world.at(now)
+        if self._states % _RARELY == 0:
+            for reading in node.shed():
+                self.plan_times.add(reading // 1000)
+            spread = self.plan_times.spread
+            self._plan_ms = (round(spread.p50 * 1e-3, 2), round(spread.p99 * 1e-3, 2))
+        self._states += 1
+        tally, beat, own = node.tally, vehicle.heartbeat, view.own
+        ages = node.world.neighbours.ages(now)
+        east, north, up = (0.0, 0.0, 0.0) if own is None else own.position.tolist()
+        u, v, w = (0.0, 0.0, 0.0) if own is None else own.velocity.tolist()
+        return State(
+            round((now - (self._began or now)) * 1e-6, 2),
+            pilot.phase.value,
+            self._waiting(),
+            mode_of(vehicle),
+            vehicle.armed,
+            vehicle.guided,
+            None if beat is None else _numbers(vehicle),
+            None if own is None else (round(east, 2), round(north, 2), round(up, 2)),
+            None if own is None else (round(u, 2), round(v, 2), round(w, 2)),
+            None if own is None else own.age // 1000,
+            None if view.target is None else view.target.age // 1000,
+            {str(system): age // 1000 for system, age in sorted(ages.items())},
+            tally.plans,
+            tally.held,
+            tally.solver_failures,
+            self._plan_ms,
+            1.0 if self._followed is None else round(self._followed.rate, 3),
+            0 if self._followed is None else self._followed.steps,
+            self._departures.setpoints.count,
+            self._would(),
+            tuple(concern.text for concern in node.watch.concerns.values()),
+            0 if self._signing is None else self._signing.newest,
+            None if self._followed is None else self._followed.verdict,
+        )
+
+    def _changes(self, at: float) -> None:
+        node, pilot = self._companion, self._companion.pilot
+        vehicle = pilot.vehicle
+        if pilot.landing is not self._landing:
+            self._landing = pilot.landing
+            if self._landing is not None:
+                # Before the phase: whoever hears that it is over has to know where.
+                self._tell(kind="landing", **self._landing._asdict())
+        sentences = {
+            "phase": pilot.phase.value,
+            "waiting": self._waiting(),
+            "mode": mode_of(vehicle),
+            "armed": ("armed" if vehicle.armed else "disarmed") if vehicle.heartbeat is not None else "",
+        }
+        if sentences != self._sentences:
+            for what, sentence in sentences.items():
+                if sentence and sentence != self._sentences.get(what):
+                    self._event(at, what, sentence)
+            self._sentences = sentences
+        if vehicle.told != self._told:
+            new = min(vehicle.told - self._told, len(vehicle.texts))
+            for text in list(vehicle.texts)[len(vehicle.texts) - new :]:
+                self._event(at, "autopilot", text.text)
+            self._told = vehicle.told
+        if pilot.limits.said != self._remarked:
+            new = min(pilot.limits.said - self._remarked, len(pilot.limits.remarks))
+            for remark in list(pilot.limits.remarks)[len(pilot.limits.remarks) - new :]:
+                self._event(at, "limits", remark)
+            self._remarked = pilot.limits.said
+        if pilot.refused != self._refused:
+            for refusal in pilot.refusals[-(pilot.refused - self._refused) :]:
+                self._event(at, "refused", refusal)
+            self._refused = pilot.refused
+        concerns = node.watch.concerns
+        if concerns is not self._concerns:
+            for name, concern in concerns.items():
+                if name not in self._concerns:
+                    self._event(at, "concern", concern.text)
+            for name, concern in self._concerns.items():
+                if name not in concerns:
+                    self._event(at, "over", concern.text)
+            self._concerns = concerns
+        if (twin := self._cockpit.barred == TWIN) != self._twin:
+            self._twin = twin
+            self._event(at, "critical" if twin else "over", "another companion with this system id is heard")
+        if self._followed is not None and self._followed.steps != self._steps:
+            self._steps = self._followed.steps
+            self._event(at, "clock", "the autopilot's clock was set, or began anew")
+        if self._followed is not None and self._followed.judged is not None and not self._judged:
+            self._judged = True
+            self._event(at, "clock", judgement(self._followed.judged, simulated=self._followed.simulated))
+
+    def _waiting(self) -> str:
+        pilot = self._companion.pilot
+        if isinstance(self._companion, DryRun):
+            return self._companion.pilot.lacking
+        if pilot.phase is Phase.CONNECT and pilot.waiting_for == OPERATORS_GO and self._cockpit.barred:
+            return self._cockpit.barred
+        return pilot.waiting_for if pilot.phase in _WAITING else ""
+
+    def _would(self) -> str:
+        """In words, what a dry run would have sent last."""
+        newest = self._departures.newest
+        return _words(newest) if isinstance(self._companion, DryRun) and newest is not None else ""
+
+    def _event(self, at: float, what: str, text: str) -> None:
+        if self._lately.get((what, text), -_AGAIN) + _AGAIN > at and what in _REPEATED:
+            return
+        self._lately = {key: time for key, time in self._lately.items() if time + _AGAIN > at}
+        self._lately[what, text] = at
+        self._tell(kind="event", at=at, what=what, text=text)
+
+
+def judgement(rate: float, *, simulated: bool) -> str:
+    """What the autopilot's clock was found to be, in words."""
+    if simulated:
+        return f"a simulation's, {rate:.3f} times as fast as the wall's: it is followed"
+    if abs(rate - 1.0) < _PLAIN:
+        return "a real one: the wall's time counts"
+    return (
+        f"taken for a real one with a delay that changes, though it seems to be {rate:.3f} times as fast; "
+        "for a simulation write clock: autopilot"
+    )
+
+
+def _words(message: SetpointLocal) -> str:
+    place, speed = ned_to_enu(message.position).tolist(), ned_to_enu(message.velocity).tolist()
+    where = ", ".join(f"{part:.1f}" for part in place)
+    how = ", ".join(f"{part:.1f}" for part in speed)
+    return f"east, north, up {where} m of the vehicle's origin, {how} m/s, mask 0x{message.type_mask:03X}"
+
+
+def mode_of(vehicle: Vehicle) -> str:
+    """The name of the autopilot's mode, empty before it is heard."""
+    if vehicle.heartbeat is None or vehicle.profile is None:
+        return ""
+    return mode_name(vehicle.profile.name.lower(), vehicle.heartbeat.custom_mode)
+
+
+def _numbers(vehicle: Vehicle) -> tuple[int, int, int, int, int]:
+    beat = vehicle.heartbeat
+    if beat is None:
+        return (0, 0, 0, 0, 0)
+    return beat.type, beat.autopilot, beat.base_mode, beat.custom_mode, beat.system_status

@@ -1,0 +1,191 @@
+"""The process that flies: the companion under its clock over its links, until it is told to end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from companion.dry_run import DryRun
+from companion.node import Companion
+from mavlink_bridge.clocks.clock import Clock, WallClock
+from mavlink_bridge.clocks.followed_clock import FollowedClock
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.loops.garbage import IdleCollector
+from mavlink_bridge.loops.lockstep import Scheduled
+from mavlink_bridge.loops.priority import ask_for_priority, sharpen_timers
+from mavlink_bridge.loops.realtime import RealTime
+from mavlink_bridge.wire.signing import Signing
+from outrider.fly.duplicate_ids import Twin
+from outrider.fly.log import Log
+from outrider.fly.process_channel import OrderLink
+from outrider.fly.read_only_link import HarmlessLink
+from outrider.fly.request import Request
+from outrider.fly.status import News
+from outrider.fly.supervised_node import Cockpit
+from outrider.fly.transmit_statistics import Departures
+
+_IGNORED: Final = (
+    signal.SIGINT,
+    signal.SIGTERM,
+    signal.SIGHUP,
+    signal.SIGQUIT,
+    signal.SIGTSTP,
+    signal.SIGTTIN,
+    signal.SIGTTOU,
+)
+"""The parent alone is told by signals when to end; a terminal that is closed or stopped ends no flight."""
+
+
+class Worker:
+    """``links`` by the companion's names, on which ``twin`` listens; ``directory`` gets the log.
+    ``simulated``: what a process before this one has found the autopilot's clock to be; None: it has not."""
+
+    def __init__(
+        self,
+        asked: Request,
+        links: Mapping[str, Link],
+        twin: Twin,
+        orders: OrderLink,
+        directory: Path,
+        simulated: bool | None = None,
+    ) -> None:
+        self._asked, self._orders, self._directory = asked, orders, directory
+        self._doors = [HarmlessLink(link) for link in links.values()] if asked.dry_run else []
+        self._links = dict(zip(links, self._doors or links.values(), strict=True))
+        self._parent, self._twin, self._simulated = os.getpid(), twin, simulated
+        self._signing = None if asked.key is None else Signing(asked.key)
+        kind = DryRun if asked.dry_run else Companion
+        config = asked.config
+        self.companion = kind(
+            config.settings,
+            config.system,
+            config.target,
+            config.origin.frame,
+            time.thread_time_ns,
+            self._signing,
+        )
+
+    def resume(self, newest: int) -> None:
+        """Go on after another process, whose signatures went up to that stamp: a simulation's time may run
+        ahead of the wall's."""
+        if self._signing is not None:
+            self._signing.resume(newest)
+
+    def followed(self, wall: Clock) -> FollowedClock | None:
+        """The clock that it lives by; None for ``wall``."""
+        asked = self._asked.config.clock
+        if asked == "wall":
+            return None
+        return FollowedClock(wall, wall.now(), simulated=True if asked == "autopilot" else self._simulated)
+
+    def main(self) -> None:
+        """The process, from fork to exit."""
+        for which in _IGNORED:
+            signal.signal(which, signal.SIG_IGN)
+        if self._asked.realtime:
+            self._orders.tell(kind="event", at=0.0, what="priority", text=ask_for_priority().told)
+        else:
+            sharpen_timers()
+        with Log(self._directory, self._asked.system, self._lament) as log:
+            status = self._flown(log)
+            # The parent has the last word from here on; files take their time.
+            self._orders.tell(kind="left")
+        sys.exit(status)
+
+    def _lament(self, text: str) -> None:
+        self._orders.tell(kind="event", at=None, what="concern", text=text)
+
+    def _flown(self, log: Log) -> int:
+        try:
+            self._fly(log)
+        except Exception as error:
+            if os.environ.get("OUTRIDER_TRACEBACK"):
+                traceback.print_exc()
+            self._orders.tell(kind="fault", text=f"{type(error).__name__}: {error}")
+            return 3
+        return 0
+
+    def _fly(self, log: Log) -> None:
+        asked, node = self._asked, self.companion
+        wall = WallClock()
+        followed = self.followed(wall)
+        cockpit = Cockpit(node, wall, followed, self._signing, self._twin)
+        departures = Departures(node.config.limits, node.config.tracking.largest)
+        news = News(cockpit, departures, followed, self._signing, self._orders.tell)
+        links: dict[str, Link | Sequence[Link]] = {
+            **self._links,
+            "ground": (self._links["ground"], self._orders),
+        }
+
+        def stepped(now: int) -> bool:
+            if os.getppid() != self._parent or self._orders.alone:
+                cockpit.give_up()
+            if isinstance(node, DryRun):
+                for message in node.would:
+                    departures.take(now, message)
+                node.would.clear()
+            news.look(now, wall.now())
+            return cockpit.last is not None and cockpit.last.over
+
+        with IdleCollector() as garbage:
+
+            def idle(free: int) -> None:
+                garbage.idle(free if followed is None else int(free / followed.rate))
+
+            loop = RealTime(
+                Scheduled(cockpit, asked.config.period_us),
+                links,
+                wall if followed is None else followed,
+                taps=(log, departures),
+                on_idle=idle,
+            )
+            try:
+                loop.run(lambda: self._orders.stop, stepped)
+            finally:
+                self._leave(loop, news, departures, 1.0 if followed is None else followed.rate)
+
+    def _leave(self, loop: RealTime, news: News, departures: Departures, rate: float) -> None:
+        """What the summary needs."""
+        node, statistics = self.companion, loop.statistics
+        for reading in node.shed():
+            news.plan_times.add(reading // 1000)
+        profile = node.pilot.profile
+        mask = 0 if profile is None else profile.setpoint_mask
+        self._orders.tell(
+            kind="figures",
+            plans=node.tally.plans,
+            plan_ms={
+                name: round(value * 1e-3, 3) for name, value in news.plan_times.spread._asdict().items()
+            },
+            solver_failures=node.tally.solver_failures,
+            held_epochs=node.tally.held,
+            anchored_anew=node.tally.anchored_anew,
+            not_finite=node.not_finite,
+            limits_lowered=list(node.pilot.limits.lowered.changes),
+            limits_lacking=node.pilot.limits.lowered.lacking,
+            limits_assumed=list(node.pilot.limits.unread),
+            setpoints=departures.setpoints.facts,
+            setpoint_faults=departures.setpoints.faults(mask),
+            commands={str(command): count for command, count in sorted(departures.commands.items())},
+            messages={
+                "sent": dict(departures.messages),
+                "received": {link: counters.good for link, counters in node.counters.items()},
+                "bad": node.bad_frames,
+                "refused": sum(counters.refused for counters in node.counters.values()),
+                "overruns": statistics.overruns,
+                "kept_back": sum(door.kept for door in self._doors),
+            },
+            deadline_steps=statistics.steps + statistics.skipped,
+            deadline_misses=statistics.misses + statistics.skipped,
+            lateness_ms={
+                name: round(value * 1e-3 / rate, 3) for name, value in statistics.lateness._asdict().items()
+            },
+            clock_rate=round(rate, 4),
+            cpu_s=round(time.process_time(), 2),
+        )

@@ -1,0 +1,82 @@
+"""A node behind rough links: what arrives over a perfect loopback is delayed, lost and reordered as the
+scenario says, by the same ether as in lock-step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from mavlink_bridge.loops.lockstep import Direction, Tap
+from mavlink_bridge.network.simulated import Channel, Ether
+from mavlink_bridge.node import Datagram, Node
+from mavlink_bridge.wire.header import sending_system
+from outrider.runs import names
+
+
+class Rough:
+    """``node`` behind ``ether``, in which every channel leads from one sender to it.
+
+    ``senders``: for each link the node at its other end; None where there are many, who are told by the
+    system id in the header. What comes from elsewhere, as on a multicast group that others use too, is
+    dropped.
+    """
+
+    def __init__(
+        self, node: Node, senders: Mapping[str, str | None], channels: Sequence[Channel], seed: int, tick: int
+    ) -> None:
+        self.node = node
+        self._senders = senders
+        self._channels = [channel.name for channel in channels]
+        self._known = {end for channel in channels for end in channel.members.items() if end[0] != node.name}
+        self.ether = Ether(channels, seed, tick)
+        self._last: tuple[int, list[Datagram], list[Datagram]] | None = None
+
+    @property
+    def name(self) -> str:
+        """That of the node."""
+        return self.node.name
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """As the node, with what has come through the ether by ``now``."""
+        for datagram in inbox:
+            sender = self._senders.get(datagram.link) or self._speaker(datagram)
+            if (sender, datagram.link) in self._known:
+                self.ether.send(now, sender, [datagram])
+        delivered = self.ether.receive(now, self.node.name)
+        self._last = now, delivered, []
+        leaving = self.node.step(now, delivered)
+        self._last = now, delivered, leaving
+        return leaving
+
+    def show(self, taps: Sequence[Tap]) -> None:
+        """Let ``taps`` see the last step of the node, with what came through the ether; once."""
+        if self._last is None:
+            return
+        (now, delivered, leaving), self._last = self._last, None
+        boxes: tuple[tuple[Direction, list[Datagram]], ...] = (("in", delivered), ("out", leaving))
+        for tap in taps:
+            tap.begin(now, self.name)
+            for direction, box in boxes:
+                for datagram in box:
+                    tap(now, self.name, direction, datagram)
+
+    def _speaker(self, datagram: Datagram) -> str:
+        """The node that has the system id in the header."""
+        system = sending_system(datagram.data)
+        moving = names.moving(system)
+        return moving if (moving, datagram.link) in self._known else names.companion(system)
+
+    def cut(self, members: Iterable[str]) -> None:
+        """Nothing passes on the swarm's channels between ``members`` and others."""
+        inside = list(members)
+        for channel in self._swarm:
+            self.ether.cut(channel, inside)
+
+    def heal(self, members: Iterable[str]) -> None:
+        """It passes again."""
+        inside = list(members)
+        for channel in self._swarm:
+            self.ether.heal(channel, inside)
+
+    @property
+    def _swarm(self) -> list[str]:
+        return [name for name in self._channels if name.startswith("swarm")]

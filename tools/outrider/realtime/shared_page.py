@@ -1,0 +1,110 @@
+"""What the processes of a real-time run share: a page of memory that each writes its own rows of.
+
+Rows are float64, written by one process each; a reader may see a row half old and half new, which is one step
+of a vehicle and does not matter to who watches.
+"""
+
+from __future__ import annotations
+
+import mmap
+
+import numpy as np
+from numpy.typing import NDArray
+
+from outrider.realtime.view_page import Window
+
+_COLUMNS = 8
+_TEXT = 240
+
+
+class Board:
+    """For ``vehicles`` vehicles; made before the processes fork, which share it from then on.
+
+    Times are µs, 0 for not yet. ``goal``: the goal event; ``end``: the end of the clock; ``stop``: all shall
+    end; ``gone`` (K,): the companions that shall end; ``thaws`` (K,): how often each was let go on after it
+    had been stopped. ``window``: where all show themselves to a view, if there is one.
+    """
+
+    def __init__(self, vehicles: int, window: Window | None = None) -> None:
+        self.window = window
+        numbers = 8 * (3 + vehicles * (_COLUMNS + 4))
+        self._memory = mmap.mmap(-1, numbers + vehicles * _TEXT)
+        flags = np.frombuffer(self._memory, dtype=np.int64, count=3 + 4 * vehicles)
+        self._flags = flags
+        self.gone: NDArray[np.int64] = flags[3 : 3 + vehicles]
+        self._ready: NDArray[np.int64] = flags[3 + vehicles : 3 + 2 * vehicles]
+        self._armed: NDArray[np.int64] = flags[3 + 2 * vehicles : 3 + 3 * vehicles]
+        self.thaws: NDArray[np.int64] = flags[3 + 3 * vehicles :]
+        rows = np.frombuffer(self._memory, dtype=np.float64, offset=flags.nbytes, count=vehicles * _COLUMNS)
+        self._rows: NDArray[np.float64] = rows.reshape(vehicles, _COLUMNS)
+        self._rows[:] = np.nan
+        self._armed[:] = 1
+        self._texts = numbers
+
+    @property
+    def goal(self) -> int:
+        """When the goal event was."""
+        return int(self._flags[0])
+
+    @goal.setter
+    def goal(self, now: int) -> None:
+        self._flags[0] = now
+
+    @property
+    def end(self) -> int:
+        """When the clock ended."""
+        return int(self._flags[1])
+
+    @end.setter
+    def end(self, now: int) -> None:
+        self._flags[1] = now
+
+    @property
+    def stop(self) -> bool:
+        """Whether all shall end."""
+        return bool(self._flags[2])
+
+    @stop.setter
+    def stop(self, value: bool) -> None:
+        self._flags[2] = value
+
+    def show_vehicle(
+        self, k: int, position: NDArray[np.float64], velocity: NDArray[np.float64], armed: bool
+    ) -> None:
+        """Vehicle ``k``: position and velocity (3,) ENU, and whether its motors may turn."""
+        self._rows[k, 0:3], self._rows[k, 3:6] = position, velocity
+        self._armed[k] = armed
+
+    def show_companion(self, k: int, ready: bool, waiting: str) -> None:
+        """Companion ``k``: whether it is under way, and what it waits for."""
+        self._ready[k] = ready
+        data = waiting.encode()[: _TEXT - 1]
+        begin = self._texts + k * _TEXT
+        self._memory[begin : begin + _TEXT] = data + bytes(_TEXT - len(data))
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(K, 3), a copy; NaN until a vehicle shows itself."""
+        return self._rows[:, 0:3].copy()
+
+    @property
+    def velocities(self) -> NDArray[np.float64]:
+        """(K, 3), a copy."""
+        return self._rows[:, 3:6].copy()
+
+    @property
+    def armed(self) -> NDArray[np.bool_]:
+        """(K,)."""
+        armed: NDArray[np.bool_] = self._armed != 0
+        return armed
+
+    @property
+    def ready(self) -> NDArray[np.bool_]:
+        """(K,)."""
+        ready: NDArray[np.bool_] = self._ready != 0
+        return ready
+
+    def waiting(self, k: int) -> str:
+        """What companion ``k`` waits for."""
+        begin = self._texts + k * _TEXT
+        return self._memory[begin : begin + _TEXT].rstrip(b"\0").decode(errors="replace")

@@ -1,0 +1,119 @@
+"""The workers of a fleet: each node with its rough links, its schedule, and the events that concern it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from mavlink_bridge.clocks.clock import Clock
+from mavlink_bridge.clocks.node_clock import QUANTUM, NodeClock
+from mavlink_bridge.loops.lockstep import Scheduled
+from mavlink_bridge.network.channel import Channel
+from mavlink_bridge.node import Node
+from outrider.realtime.impaired_link import Rough
+from outrider.realtime.shared_page import Board
+from outrider.realtime.wiring import Wiring
+from outrider.realtime.workers import AutopilotWorker, CompanionWorker, PlayedWorker, Seat, Worker
+from outrider.runs import names
+from outrider.scenarios.links import PartitionPart
+from outrider.simulation.disturbances import events
+from outrider.simulation.fleet import Fleet
+from outrider.simulation.moving import MovingObstacle
+from outrider.simulation.targets import Target
+
+
+def muster(
+    fleet: Fleet, wiring: Wiring, clock: Clock, board: Board, start: int, logs: Path, scratch: Path
+) -> list[Worker]:
+    """One worker for each node but the operator, due from ``start`` (µs) on. ``logs`` gets the tlogs,
+    ``scratch`` the true traces.
+
+    No two are due at one instant if it can be helped: on few cores the last of them would be late.
+    """
+    start -= start % QUANTUM
+    timing, happening = fleet.scenario.timing, events(fleet.scenario)
+    cuts = [event for event in happening if isinstance(event.what, PartitionPart)]
+    workers: list[Worker] = []
+    for k, system in enumerate(fleet.systems):
+        autopilot, companion = fleet.autopilot(k), fleet.companion(k, time.thread_time_ns)
+        own = [event for event in happening if getattr(event.what, "vehicle", None) == system]
+        behind = rough(fleet, autopilot, {"autopilot": companion.name})
+        first, phase, its_clock = turns(fleet, k, start)
+        every = Scheduled(behind, timing.autopilot_us, first)
+        trace = scratch / f"trace-{system}"
+        workers.append(
+            AutopilotWorker(k, autopilot, trace, Seat(behind, every, wiring.autopilots[k], clock, board), own)
+        )
+        senders = {
+            "autopilot": autopilot.name,
+            "swarm": None,
+            "target": names.TARGET,
+            "ground": names.OPERATOR,
+        }
+        behind = rough(fleet, companion, senders)
+        every = Scheduled(behind, timing.companion_us, phase, its_clock)
+        workers.append(
+            CompanionWorker(
+                k, companion, system, logs, Seat(behind, every, wiring.companions[k], clock, board), cuts
+            )
+        )
+    for index, k in enumerate(fleet.helmed):
+        helm = fleet.helm(k)
+        # Both ends of its link to the autopilot count as the companion's: they are on one computer.
+        behind = rough(fleet, helm, {"autopilot": names.companion(fleet.systems[k]), "swarm": None})
+        turn = start + staggered(2 * len(fleet.systems) + index, _slots(fleet), timing.companion_us)
+        every = Scheduled(behind, timing.companion_us, turn, fleet.clock(k, start))
+        workers.append(Worker(Seat(behind, every, wiring.helms[index], clock, board)))
+    phase = start + staggered(_slots(fleet) - 2, _slots(fleet), timing.companion_us)
+    played: list[Target | MovingObstacle] = [fleet.target(), *fleet.moving()]
+    for node, links in zip(played, [wiring.target, *wiring.moving], strict=True):
+        behind = rough(fleet, node, {})
+        every = Scheduled(behind, timing.companion_us, phase)
+        workers.append(PlayedWorker(node, Seat(behind, every, links, clock, board)))
+    return workers
+
+
+def turns(fleet: Fleet, k: int, start: int) -> tuple[int, int, NodeClock]:
+    """Phases (µs) from ``start`` on of the autopilot ``k`` and of its companion, by the companion's own
+    clock; and that clock. In true time all are evenly spread, whatever the clocks show at the start: later
+    they drift."""
+    timing, slots, clock = fleet.scenario.timing, _slots(fleet), fleet.clock(k, start)
+    turn = start + staggered(2 * k, slots, timing.companion_us)
+    companion = turn + (clock.local(turn) - turn) % timing.companion_us
+    autopilot = start + staggered(2 * k + 1, slots, timing.companion_us) % timing.autopilot_us
+    return autopilot, companion, clock
+
+
+def operators_turn(fleet: Fleet, start: int) -> int:
+    """When from ``start`` (µs) on the operator is due: last, in nobody's slot."""
+    slots = _slots(fleet)
+    return start - start % QUANTUM + staggered(slots - 1, slots, fleet.scenario.timing.companion_us)
+
+
+def _slots(fleet: Fleet) -> int:
+    """One for each autopilot, companion and helm, one for what the harness plays, and the operator's."""
+    return 2 * len(fleet.systems) + len(fleet.helmed) + 2
+
+
+def staggered(k: int, count: int, period: int) -> int:
+    """When in its ``period`` (µs) the node ``k`` of ``count`` is due: evenly spread, a multiple of 4."""
+    return k * period // count // QUANTUM * QUANTUM
+
+
+def rough(fleet: Fleet, node: Node, senders: dict[str, str | None]) -> Rough:
+    """``node`` behind the links that the scenario gives it; ``senders`` as for ``Rough``."""
+    return Rough(node, senders, _channels(fleet, node.name), fleet.seed, fleet.scenario.timing.base_tick_us)
+
+
+def _channels(fleet: Fleet, receiver: str) -> list[Channel]:
+    """From every node that ``receiver`` can hear, a channel to it with the faults of that way."""
+    found = []
+    for channel in fleet.channels():
+        link = channel.members.get(receiver)
+        if link is None:
+            continue
+        for sender, name in channel.members.items():
+            if sender != receiver:
+                faults = channel.overrides.get((sender, receiver), channel.faults)
+                found.append(Channel(f"{channel.name}-{sender}", {sender: name, receiver: link}, faults))
+    return found

@@ -1,0 +1,48 @@
+"""What a rehearsal comes to, as numbers for scripts and as files."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+
+from outrider.replay.picture import draw
+from outrider.replay.setpoints import apart, course, facts
+from outrider.replay.shadow_run import Rehearsed
+
+_COLUMNS = (
+    *("who", "time_us", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s"),
+    *("a_north_m_s2", "a_east_m_s2", "a_down_m_s2", "yaw_rad", "mask", "frame"),
+)
+
+
+def document_of(found: Rehearsed) -> dict[str, object]:
+    """What a script reads: of the set-points that would have been sent, and under ``sent`` of those that
+    were; ``apart_m`` between the two."""
+    would, sent = facts(found.would), facts(found.sent)
+    off = apart(course(found.would), course(found.sent))
+    document: dict[str, object] = dict(would._asdict())
+    document["holds"] = found.holds
+    document["reasons"] = dict(found.reasons)
+    document["records"] = found.records
+    document["sent"] = sent._asdict()
+    document["apart_m"] = {
+        f"p{q}": round(float(np.percentile(off, q)), 3) if len(off) else None for q in (50, 95)
+    }
+    return document
+
+
+def leave(directory: Path, name: str, found: Rehearsed, document: dict[str, object]) -> None:
+    """``setpoints.csv``, ``replay.json`` and ``replay.png`` in ``directory``."""
+    (directory / "replay.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    with (directory / "setpoints.csv").open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(_COLUMNS)
+        for who, told in (("would", found.would), ("sent", found.sent)):
+            rows.writerows(
+                (who, t, *m.position, *m.velocity, *m.acceleration, m.yaw, m.type_mask, m.frame)
+                for t, m in told
+            )
+    draw(name, found, directory / "replay.png")

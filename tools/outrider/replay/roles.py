@@ -1,0 +1,175 @@
+"""Who plays whom in a log: own vehicle, neighbours, target; what each record is to the companion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.values.components import AUTOPILOT, COMPONENT
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, LocalPosition, Source
+from mavlink_bridge.tlog.log import Record
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.header import header
+from outrider.errors import Fault, InputError
+from outrider.replay.timeline import on_one_line
+
+SETPOINT, LOCAL, GLOBAL, ORIGIN = 84, 32, 33, 49
+_FAR = 5000.0
+_SURVEYED = {LOCAL, GLOBAL, ORIGIN}
+
+
+class Part(Enum):
+    """What a record is."""
+
+    AUTOPILOT = "autopilot"
+    SWARM = "swarm"
+    TARGET = "target"
+    SENT = "sent"
+    """A set-point for the own vehicle, from whoever steered it."""
+    NOTHING = ""
+
+
+@dataclass(frozen=True)
+class Cast:
+    """System ids. ``neighbours`` None: everybody else that says where it is."""
+
+    own: int
+    neighbours: frozenset[int] | None = None
+    target: int | None = None
+
+    def part(self, frame: bytes) -> Part:
+        """What the record of ``frame`` is to the companion."""
+        system, component, message_id = header(frame)
+        if message_id == SETPOINT and (system, component) != (self.own, AUTOPILOT):
+            return Part.SENT
+        if system == self.own:
+            return Part.NOTHING if component == COMPONENT else Part.AUTOPILOT
+        if system == self.target:
+            return Part.TARGET
+        if self.neighbours is None or system in self.neighbours:
+            return Part.SWARM
+        return Part.NOTHING
+
+
+class Survey(NamedTuple):
+    """What a first look at the own vehicle's records shows: its first place (°, °, m above mean sea level)
+    and how high above its home that is, its GPS_GLOBAL_ORIGIN, and whether it says LOCAL_POSITION_NED.
+    ``systems`` are all that speak, ``placed`` those that say where they are; ``begin`` and ``end``, µs, of
+    the log; ``reach``: how far (m, horizontally) it ever was from its first place, of what is within 5
+    km."""
+
+    place: tuple[float, float, float]
+    above_home: float
+    origin: tuple[float, float, float] | None
+    local: bool
+    systems: frozenset[int]
+    placed: frozenset[int]
+    begin: int
+    end: int
+    reach: float
+
+    @property
+    def seconds(self) -> float:
+        """How long the log is."""
+        return (self.end - self.begin) * 1e-6
+
+    @property
+    def fleet(self) -> FleetFrame:
+        """A fleet frame at the foot of the own first place."""
+        latitude, longitude, altitude = self.place
+        return FleetFrame(latitude, longitude, altitude - self.above_home)
+
+
+def survey(records: Iterable[Record], own: int, name: str) -> Survey:
+    """A look at all ``records`` of the log ``name``. InputError if the vehicle ``own`` is not in it or does
+    not say where it is."""
+    codec = Codec(lambda identifier, _system, _component: identifier in _SURVEYED)
+    systems: set[int] = set()
+    placed: set[int] = set()
+    place: GlobalPosition | None = None
+    first: LocalPosition | None = None
+    pair: tuple[GlobalPosition, LocalPosition] | None = None
+    origin: tuple[float, float, float] | None = None
+    here: FleetFrame | None = None
+    reach = 0.0
+    begin: int | None = None
+    end = 0
+    for record in on_one_line(records):
+        begin = record.time if begin is None else begin
+        end = record.time
+        systems.add(header(record.frame).system)
+        for message in codec.feed(record.frame):
+            if isinstance(message, GlobalPosition):
+                placed.add(message.source.system)
+            if message.source != Source(own, AUTOPILOT):
+                continue
+            match message:
+                case GlobalPosition():
+                    # Without a fix it is all zeros: that counts only where there is nothing better.
+                    if place is None or not (place.latitude or place.longitude):
+                        place, here = message, _frame(message)
+                    elif here is not None and (message.latitude or message.longitude):
+                        reach = max(reach, _apart(here, message))
+                    if first is not None and pair is None and (message.latitude or message.longitude):
+                        pair = message, first
+                case LocalPosition():
+                    first = message
+                case GpsGlobalOrigin() if origin is None:
+                    origin = message.latitude, message.longitude, message.altitude
+                case _:
+                    pass
+    if own not in systems:
+        said = ", ".join(map(str, sorted(systems))) or "nobody"
+        raise InputError(f"{name}: vehicle {own} is not in it; allowed: {said}")
+    if place is None:
+        said = ", ".join(map(str, sorted(placed))) or "nobody does"
+        raise InputError(
+            f"{name}: vehicle {own} never says where it is (GLOBAL_POSITION_INT); allowed: {said}"
+        )
+    if origin is None and pair is not None:
+        origin = _origin(*pair)
+    return Survey(
+        (place.latitude, place.longitude, place.altitude),
+        place.relative_altitude,
+        origin,
+        first is not None,
+        frozenset(systems),
+        frozenset(placed),
+        begin or 0,
+        end,
+        reach,
+    )
+
+
+def _frame(place: GlobalPosition) -> FleetFrame:
+    return FleetFrame(place.latitude, place.longitude, place.altitude)
+
+
+def _apart(here: FleetFrame, place: GlobalPosition) -> float:
+    """Horizontally, m; 0 for what is too far to be true."""
+    east, north, _ = here.to_enu(place.latitude, place.longitude, place.altitude)
+    far = float(np.hypot(east, north))
+    return far if far < _FAR else 0.0
+
+
+def _origin(place: GlobalPosition, local: LocalPosition) -> tuple[float, float, float]:
+    """Where the own local frame begins, from one place in both."""
+    here = _frame(place)
+    north, east, down = local.position_ned
+    return here.to_geodetic((-east, -north, down))
+
+
+def check(log: Path, cast: Cast, seen: Survey) -> None:
+    """InputError for somebody who says nothing of where it is."""
+    asked = {"--target": () if cast.target is None else (cast.target,), "--neighbours": cast.neighbours or ()}
+    allowed = ", ".join(map(str, sorted(seen.placed - {cast.own}))) or "nobody"
+    for option, systems in asked.items():
+        for system in sorted(set(systems) - seen.placed | set(systems) & {cast.own}):
+            wrong = "is the own vehicle" if system == cast.own else "never says where it is"
+            raise InputError(Fault(str(log), f"{option} {system} {wrong}; allowed: {allowed}"))

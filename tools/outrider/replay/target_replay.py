@@ -1,0 +1,74 @@
+"""``outrider replay LOG --target ID``: a simulated vehicle of ours escorts what the log recorded."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from companion.config import CompanionConfig
+from mavlink_bridge.messages import SetpointLocal
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.header import header
+from outrider import swarm
+from outrider.errors import InputError
+from outrider.replay.roles import SETPOINT, Survey
+from outrider.resources import find
+from outrider.scenarios.scenario import Origin, RecordedTarget, Ring, Scenario
+from outrider.yaml_files.yaml_file import load
+from sitl.vehicle.config import VehicleConfig
+
+_ROOM = 20.0
+"""m around all places of the target that are flown in."""
+_LONGEST_S = 3600.0
+
+
+def prepared(log: Path, seen: Survey, target: int, like: str) -> swarm.Prepared:
+    """One vehicle with the companion's settings of the scenario ``like`` around ``target``, of which ``seen``
+    is the survey, from the first record of the log to the last, an hour at most. InputError for settings that
+    are of no use."""
+    base = load(find("scenarios", like), Scenario)
+    limits, fleet = base.companion.limits, seen.fleet
+    far = seen.reach + _ROOM
+    box = {"box_min": (-far, -far, limits.box_min[2]), "box_max": (far, far, limits.box_max[2])}
+    companion = base.companion.model_dump() | {"task": "escort", "limits": limits.model_dump() | box}
+    origin = Origin(latitude=fleet.latitude, longitude=fleet.longitude, altitude=fleet.altitude)
+    height = min(max(limits.box_min[2] + 1.0, 4.0), limits.box_max[2])
+    try:
+        scenario = Scenario(
+            name=f"chase-{re.sub('[^A-Za-z0-9._-]', '-', log.name.split('.')[0])}"[:64],
+            task="escort",
+            vehicles=1,
+            vehicle=base.vehicle,
+            flavour=base.flavour,
+            origin=origin,
+            starts=Ring(kind="ring", radius=4.0, height=height),
+            target=RecordedTarget(
+                kind="recorded",
+                log=str(log.resolve()),
+                system=target,
+                start_s=0.0,
+                duration_s=min(seen.seconds, _LONGEST_S),
+            ),
+            d_min_target=base.d_min_target,
+            sensors=base.sensors,
+            companion=CompanionConfig.model_validate(companion),
+        )
+    except ValidationError as error:
+        said = "; ".join(one["msg"] for one in error.errors())
+        raise InputError(f"{log}: cannot be flown like {like}: {said}") from None
+    return swarm.Prepared(scenario, load(find("vehicles", scenario.vehicle), VehicleConfig))
+
+
+def setpoints(log: Path) -> list[tuple[int, SetpointLocal]]:
+    """All SET_POSITION_TARGET_LOCAL_NED of a log, with their times (µs)."""
+    codec = Codec(lambda identifier, _system, _component: identifier == SETPOINT)
+    return [
+        (record.time, message)
+        for record in read_tlog(log)
+        if header(record.frame).message_id == SETPOINT
+        for message in codec.feed(record.frame)
+        if isinstance(message, SetpointLocal)
+    ]

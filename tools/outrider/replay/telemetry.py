@@ -1,0 +1,107 @@
+"""A log's telemetry onto a live link: what vehicles said of themselves, and never what was asked of them.
+
+A log also holds the commands, set-points, parameters and missions of ground stations; sent again they would
+fly a real vehicle. So messages are chosen by a list of those that ask nothing, and only from senders that are
+no ground station: the system ids of the log that give a vehicle's heartbeat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from pymavlink.dialects.v20 import all as dialect
+
+from mavlink_bridge.clocks.clock import Clock
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.tlog.log import Record
+from mavlink_bridge.wire.framing import without_signature
+from mavlink_bridge.wire.header import header
+from outrider.replay.timeline import IDLE, on_one_line
+
+_NAMES = [
+    "HEARTBEAT",
+    "SYS_STATUS",
+    "GPS_RAW_INT",
+    "GPS2_RAW",
+    "RAW_IMU",
+    "SCALED_IMU",
+    "SCALED_IMU2",
+    "SCALED_PRESSURE",
+    "ATTITUDE",
+    "ATTITUDE_QUATERNION",
+    "LOCAL_POSITION_NED",
+    "GLOBAL_POSITION_INT",
+    "SERVO_OUTPUT_RAW",
+    "VFR_HUD",
+    "ATTITUDE_TARGET",
+    "POSITION_TARGET_LOCAL_NED",
+    "POSITION_TARGET_GLOBAL_INT",
+    "HIGHRES_IMU",
+    "ALTITUDE",
+    "ESTIMATOR_STATUS",
+    "BATTERY_STATUS",
+    "HOME_POSITION",
+    "GPS_GLOBAL_ORIGIN",
+    "EXTENDED_SYS_STATE",
+    "VIBRATION",
+    "STATUSTEXT",
+    "WIND",
+    "EKF_STATUS_REPORT",
+    "MISSION_CURRENT",
+    "NAV_CONTROLLER_OUTPUT",
+    "TERRAIN_REPORT",
+    "NAMED_VALUE_FLOAT",
+]
+# Not among them is what an autopilot takes in as a sensor's word: ODOMETRY, DISTANCE_SENSOR, ADSB_VEHICLE,
+# SYSTEM_TIME and their like. A vehicle that follows another by its GLOBAL_POSITION_INT would follow a log.
+TELEMETRY: Final = frozenset(getattr(dialect, f"MAVLINK_MSG_ID_{name}") for name in _NAMES)
+"""Ids of messages that tell and ask nothing."""
+_HEARTBEAT, _GROUND_STATION = 0, 6
+_TYPE_AT = 4
+"""Where the MAV_TYPE is in a HEARTBEAT's payload."""
+_PAYLOAD = {0xFE: 6, 0xFD: 10}
+
+
+class Forwarder:
+    """Sends the telemetry among the records that pass to ``link``."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._vehicles: set[tuple[int, int]] = set()
+        self.sent = self.kept = 0
+        """Frames that were sent, and that were not."""
+
+    def take(self, frame: bytes) -> None:
+        """Send ``frame`` if it is a vehicle's telemetry."""
+        # A listener learns from what it receives whom to send to; what that says is nobody's business here.
+        self._link.receive()
+        system, component, message_id = header(frame)
+        if message_id == _HEARTBEAT:
+            kind = frame[_PAYLOAD[frame[0]] + _TYPE_AT] if len(frame) > _PAYLOAD[frame[0]] + _TYPE_AT else 0
+            if kind == _GROUND_STATION:
+                self._vehicles.discard((system, component))
+            else:
+                self._vehicles.add((system, component))
+        if message_id in TELEMETRY and (system, component) in self._vehicles:
+            self._link.send(without_signature(frame))
+            self.sent += 1
+        else:
+            self.kept += 1
+
+
+def paced(
+    records: Iterable[Record], clock: Clock, speed: float | None, forwarder: Forwarder | None = None
+) -> Iterator[Record]:
+    """The records on one time line (see ``timeline``), each no earlier than its time says at ``speed`` times
+    the log's (None: at once); long silence is cut short."""
+    before: int | None = None
+    due = clock.now()
+    for record in on_one_line(records):
+        if speed is not None and before is not None:
+            due += round(min(record.time - before, IDLE) / speed)
+            clock.wait_until(due)
+        before = record.time
+        if forwarder is not None:
+            forwarder.take(record.frame)
+        yield record

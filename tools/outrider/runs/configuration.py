@@ -1,0 +1,56 @@
+"""``configuration.yaml`` of a run directory: the scenario as it was flown, and its seed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict
+
+from outrider.errors import Fault, InputError
+from outrider.fly.fly_config import FlyConfig
+from outrider.scenarios.scenario import Scenario
+from outrider.yaml_files.yaml_file import load
+
+CONFIGURATION = "configuration.yaml"
+
+
+class Resolved(BaseModel):
+    """The configuration that a run leaves beside its logs."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    seed: int
+    scenario: Scenario
+
+
+def resolved(directory: Path, allowed: str, of_log: str | None = None) -> Resolved:
+    """What was flown in ``directory``. InputError, which says what is ``allowed``, if it is none of a run;
+    ``of_log`` as for ``configured``."""
+    if not directory.is_dir():
+        wrong = "not a directory" if directory.exists() else "no such directory"
+        raise InputError(Fault(str(directory), f"{wrong}; {allowed}"))
+    return configured(directory, allowed, of_log)
+
+
+def configured(directory: Path, allowed: str, of_log: str | None) -> Resolved:
+    """The same where ``directory`` is known to be there. What ``outrider fly`` left knows of no scenario:
+    then InputError says what may be done with its log instead, ``of_log`` with the log in place of ``{}``;
+    None: nothing."""
+    path = directory / CONFIGURATION
+    try:
+        return load(path, Resolved)
+    except InputError:
+        if not _is_of_one_companion(path):
+            raise
+    log = next(iter(sorted(directory.glob("vehicle-*.tlog"))), None)
+    if of_log is not None and log is not None:
+        allowed = f"allowed: {of_log.format(log)}"
+    raise InputError(Fault(str(directory), f"what outrider fly left is no flight of a scenario; {allowed}"))
+
+
+def _is_of_one_companion(path: Path) -> bool:
+    try:
+        load(path, FlyConfig)
+    except InputError:
+        return False
+    return True

@@ -1,0 +1,47 @@
+"""``flight.npz`` and ``plan_times.npz`` of a run directory: the true motions, and what each plan cost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from outrider.runs.outcome import Outcome
+
+
+def write_flight(flight: Outcome, path: Path) -> None:
+    """Arrays over T samples (50 Hz) of K vehicles and M moving obstacles, fleet-local ENU, SI, radians; NaN
+    where there is nothing.
+
+    ``system`` (K,); ``time_s`` (T,) after the goal event, which was at ``start_us`` on the clock of the run
+    (Unix µs, as in the logs) or, if there was none, is the first sample; ``position``, ``velocity``,
+    ``reference`` (what the autopilot flies to) (T, K, 3); ``yaw``, ``tilt`` (T, K); ``target`` (T, 3);
+    ``separation`` (T,): least since the sample before; ``moving`` (T, M, 3). Lock-step writes the same bytes
+    each time."""
+    samples = flight.truth.samples()
+    start = flight.clock_start or (int(samples.time[0]) if len(samples.time) else 0)
+    values = {name: getattr(samples, name).astype(np.float32) for name in _KEPT}
+    np.savez_compressed(
+        path,
+        system=np.array(flight.systems),
+        start_us=np.int64(start),
+        time_s=((samples.time - start) * 1e-6).astype(np.float64),
+        **values,
+    )
+
+
+def write_plan_times(flight: Outcome, path: Path) -> None:
+    """CPU time ``plan_ms`` (n,) of each plan while the clock ran, when it was due, ``time_s`` (n,) after the
+    goal event on the companion's clock, and whose it was, ``system`` (n,)."""
+    spent = [after.plan_ns[len(before.plan_ns) :] for before, after in flight.tallies]
+    due = [after.plan_at[len(before.plan_at) :] for before, after in flight.tallies]
+    start = flight.clock_start or 0
+    np.savez_compressed(
+        path,
+        system=np.repeat(np.array(flight.systems[: len(spent)]), [len(part) for part in spent]),
+        time_s=(np.array([at for part in due for at in part], dtype=np.int64) - start) * 1e-6,
+        plan_ms=np.array([ns for part in spent for ns in part], dtype=np.float64) * 1e-6,
+    )
+
+
+_KEPT = ("position", "velocity", "reference", "yaw", "tilt", "target", "separation", "moving")

@@ -1,0 +1,61 @@
+"""What is left of a finished flight: all that its summary and its picture are made from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from companion.avoidance.field.plan_log import PlanLog
+from companion.planning import Tally
+from outrider.scenarios.scenario import Scenario
+from outrider.scenarios.starts import Starts
+from outrider.simulation.ground_truth import Truth
+
+
+class Messages(NamedTuple):
+    """Datagrams between nodes, counted per receiver, and frames that made no sense."""
+
+    sent: int
+    dropped: int
+    bad: int
+
+
+class Punctuality(NamedTuple):
+    """How well the companions of a real-time run kept their deadlines: ``misses`` of ``deadlines`` had no
+    step that began within 1 ms; lateness (ms) of the steps. From boot to landing, but for imposed freezes."""
+
+    misses: int
+    deadlines: int
+    p50_ms: float
+    p99_ms: float
+    max_ms: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished flight. Times in µs on the clock of the run; None where it did not come to that.
+
+    ``tallies``: per companion at the start of the clock and at its end. ``punctuality`` is that of a
+    real-time run; lock-step has none. ``plan_logs``: per companion, on its own clock.
+    """
+
+    scenario: Scenario
+    seed: int
+    span: float
+    starts: Starts
+    target_system: int
+    truth: Truth
+    clock_start: int | None
+    clock_end: int | None
+    converged_at: int | None
+    failure: str | None
+    tallies: list[tuple[Tally, Tally]]
+    messages: Messages
+    punctuality: Punctuality | None = None
+    plan_logs: Sequence[PlanLog] = ()
+
+    @property
+    def systems(self) -> list[int]:
+        """System ids of the vehicles."""
+        return list(self.scenario.systems)

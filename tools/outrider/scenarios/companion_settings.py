@@ -1,0 +1,22 @@
+"""What the companions of a scenario are told beside what its file says of them."""
+
+from __future__ import annotations
+
+from companion.config import CompanionConfig
+from outrider.scenarios.scenario import Scenario
+from sitl.estimation.profiles import PROFILES
+
+
+def settings_of(scenario: Scenario) -> CompanionConfig:
+    """The companions' settings with the obstacles of the scenario in them, in the field how wrong the sensor
+    profile is, unless the settings say more, and whose plans are waited for."""
+    companion, profile = scenario.companion, PROFILES[scenario.sensors]
+    known = (*companion.obstacles, *scenario.obstacles)
+    moving = (*companion.moving, *scenario.moving_known)
+    sigma = max(companion.field.position_sigma, profile.worst_axis)
+    field = companion.field.model_copy(update={"position_sigma": sigma})
+    changes: dict[str, object] = {"obstacles": known, "moving": moving, "field": field}
+    if companion.avoidance == "certified" and not companion.certified.fleet:
+        fleet = tuple(scenario.systems[: scenario.vehicles])
+        changes["certified"] = companion.certified.model_copy(update={"fleet": fleet})
+    return companion.model_copy(update=changes)

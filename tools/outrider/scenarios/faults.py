@@ -1,0 +1,77 @@
+"""What goes wrong in a scenario, and when: ``at_s`` counts from the goal event."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from outrider.scenarios.part import Duration, Part, Position, Seconds, Share, System
+
+
+class _OfVehicle(Part):
+    vehicle: System = Field(description="system id")
+
+
+class _Fault(_OfVehicle):
+    at_s: Seconds
+
+
+class Freeze(_Fault):
+    """The companion computes nothing for a while; what arrives waits as in a socket's buffer."""
+
+    kind: Literal["freeze"]
+    for_s: Duration
+
+
+class Vanish(_Fault):
+    """The companion is gone for good: no set-points, no messages. Its autopilot goes by its time-outs."""
+
+    kind: Literal["vanish"]
+
+
+class GpsLoss(_Fault):
+    """The autopilot loses its position fix for a while."""
+
+    kind: Literal["gps_loss"]
+    for_s: Duration
+
+
+class GpsJump(_Fault):
+    """The autopilot's position fix is ``offset`` (m, ENU) off for a while."""
+
+    kind: Literal["gps_jump"]
+    for_s: Duration
+    offset: Position
+
+
+class MotorFailure(_Fault):
+    """A rotor gives only ``left`` of its thrust from then on."""
+
+    kind: Literal["motor"]
+    rotor: int = Field(ge=0, le=15, description="index in the vehicle's file")
+    left: Share = 0.0
+
+
+class ClockFault(_OfVehicle):
+    """The companion's clock is ``late_ms`` late (negative: early) from the start, and runs ``drift_ppm``
+    fast.
+
+    It does not step in flight: a companion reads the time once and then goes by its monotonic clock.
+    """
+
+    kind: Literal["clock"]
+    late_ms: float = Field(0.0, ge=-60_000.0, le=60_000.0)
+    drift_ppm: float = Field(0.0, ge=-10_000.0, le=10_000.0)
+
+
+Sudden = Freeze | Vanish | GpsLoss | GpsJump | MotorFailure
+"""What happens at a time."""
+FaultPart = Annotated[Sudden | ClockFault, Field(discriminator="kind")]
+
+
+class Clocks(Part):
+    """How far the companions' clocks are apart from the start: drawn per seed, evenly in ± these bounds."""
+
+    offset_ms: float = Field(1.0, ge=0.0, le=1_000.0)
+    drift_ppm: float = Field(20.0, ge=0.0, le=1_000.0)

@@ -1,0 +1,105 @@
+"""What the links of a scenario do to messages: per kind of link, per direction, and partitions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import product
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from mavlink_bridge.network.simulated import Faults
+from outrider.scenarios.part import Duration, Milliseconds, Part, Seconds, Share, System
+
+_WORDS = ("delay_ms", "jitter_ms", "loss", "duplication", "reordering", "burst")
+Burst = Annotated[float, Field(ge=0.0, le=10_000.0)]
+ROLES = ("companion", "autopilot", "target", "operator", "moving")
+_WITH_ID = ("companion", "autopilot", "moving")
+
+
+class Direction(Part):
+    """Faults of one direction in place of the link's own; what is null stays the link's.
+
+    ``sender`` and ``receiver`` are a role (companion, autopilot, target, operator, moving: an obstacle), the
+    system id of a companion or a moving obstacle, or null for all.
+    """
+
+    sender: str | System | None = None
+    receiver: str | System | None = None
+    delay_ms: Milliseconds | None = None
+    jitter_ms: Milliseconds | None = None
+    loss: Share | None = None
+    duplication: Share | None = None
+    reordering: Share | None = None
+    burst: Burst | None = None
+
+
+def _faults(said: dict[str, float]) -> Faults:
+    delay, jitter, loss, duplication, reordering, burst = (said[word] for word in _WORDS)
+    return Faults(round(1000 * delay), round(1000 * jitter), loss, duplication, reordering, burst)
+
+
+class Links(Part):
+    """Faults of one kind of link."""
+
+    delay_ms: Milliseconds = 20.0
+    jitter_ms: Milliseconds = 0.0
+    loss: Share = 0.0
+    duplication: Share = 0.0
+    reordering: Share = 0.0
+    burst: Burst = Field(0.0, description="mean number of messages lost in a row; 0: each on its own")
+    directions: tuple[Direction, ...] = Field(
+        (), max_length=64, description="where it differs; the last that fits counts"
+    )
+
+    @model_validator(mode="after")
+    def _bursts(self) -> Self:
+        """Whoever speaks to whom: as long a burst as so much loss needs."""
+        said = {end for one in self.directions for end in (one.sender, one.receiver)}
+        ends: list[set[str | int]] = [{role} for role in ROLES]
+        ends += [{role, end} for role in _WITH_ID for end in said if isinstance(end, int)]
+        for sender, receiver in product(ends if self.directions else ends[:1], repeat=2):
+            faults = self.between(sender, receiver)
+            if 0 < faults.burst < faults.least_burst:
+                raise ValueError(
+                    f"burst = {faults.burst:g} with loss = {faults.loss:g}; "
+                    f"allowed: 0, or {faults.least_burst:.3g} and more"
+                )
+        return self
+
+    @property
+    def faults(self) -> Faults:
+        """As the ether takes them."""
+        return _faults({word: getattr(self, word) for word in _WORDS})
+
+    def between(self, sender: Iterable[str | int], receiver: Iterable[str | int]) -> Faults:
+        """Faults from one node to another, each given by all the names that it goes by."""
+        result: dict[str, float] = {word: getattr(self, word) for word in _WORDS}
+        senders, receivers = set(sender), set(receiver)
+        for direction in self.directions:
+            if direction.sender is not None and direction.sender not in senders:
+                continue
+            if direction.receiver is not None and direction.receiver not in receivers:
+                continue
+            for word in _WORDS:
+                value = getattr(direction, word)
+                if value is not None:
+                    result[word] = value
+        return _faults(result)
+
+
+class AllLinks(Part):
+    """The four links of a companion."""
+
+    autopilot: Links = Links(delay_ms=5.0)
+    swarm: Links = Links()
+    target: Links = Links()
+    ground: Links = Links()
+
+
+class PartitionPart(Part):
+    """For a while nothing passes on the swarm link between ``members`` and all others."""
+
+    at_s: Seconds = Field(description="after the goal event")
+    for_s: Duration
+    members: tuple[System, ...] = Field(min_length=1, description="system ids")

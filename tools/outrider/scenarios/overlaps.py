@@ -1,0 +1,48 @@
+"""What may not happen to one vehicle at the same time: the end of the one would end the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+from outrider.scenarios.faults import ClockFault, FaultPart
+from outrider.scenarios.links import PartitionPart
+
+
+class _What(NamedTuple):
+    kind: str
+    systems: tuple[int, ...]
+
+
+class _Spell(NamedTuple):
+    """``name`` in the file; ``what`` happens, from ``begin`` until before ``end``, s."""
+
+    name: str
+    what: _What
+    begin: float
+    end: float
+
+
+def overlaps(faults: Sequence[FaultPart], partitions: Sequence[PartitionPart]) -> Iterator[str]:
+    """A sentence for each two faults of one kind on one vehicle, and each two partitions of the same members,
+    that overlap in time. A clock's fault lasts the whole flight; what has no end cannot be ended by
+    another."""
+    spells = []
+    for index, fault in enumerate(faults):
+        name, what = f"faults[{index}]", _What(fault.kind, (fault.vehicle,))
+        if isinstance(fault, ClockFault):
+            spells.append(_Spell(name, what, 0.0, float("inf")))
+        elif (lasts := getattr(fault, "for_s", None)) is not None:
+            spells.append(_Spell(name, what, fault.at_s, fault.at_s + lasts))
+    for index, cut in enumerate(partitions):
+        what = _What("partition", tuple(sorted(set(cut.members))))
+        spells.append(_Spell(f"partitions[{index}]", what, cut.at_s, cut.at_s + cut.for_s))
+    for one, other in combinations(spells, 2):
+        if one.what == other.what and max(one.begin, other.begin) < min(one.end, other.end):
+            systems = ", ".join(map(str, one.what.systems))
+            allowed = "one for each vehicle" if one.what.kind == "clock" else "one after the other"
+            yield (
+                f"{one.name} and {other.name}: {one.what.kind} of {systems} twice at one time; "
+                f"allowed: {allowed}"
+            )

@@ -1,0 +1,197 @@
+"""Leads a flight from take-off to landing by what is seen of it: take off, give the goal, wait for
+convergence or the cap, land."""
+
+from __future__ import annotations
+
+from collections import deque
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from outrider.runs.formation_error import standoff
+from outrider.scenarios.scenario import FixedTarget, Scenario
+from outrider.scenarios.starts import Starts
+from outrider.simulation.ground_truth import Array
+from outrider.simulation.operator import Operator
+from sitl.estimation.profiles import PROFILES
+
+NEAR, SLOW, HOLD = 0.3, 0.3, 1_000_000
+"""Converged: nearer than this (m), slower than this against the target (m/s), for so long (µs)."""
+_SIGMAS = 2.0
+"""Nobody can be asked to be nearer than so many σ of the sensors' error; with ``truth`` and ``rtk`` that is
+less than ``NEAR``."""
+HOVERING = 0.1
+"""m/s; the clock starts when every vehicle is slower. With noisy sensors a hover is not that still."""
+_RESTLESS = {"truth": HOVERING, "rtk": 0.2, "gnss": 0.4, "sih": 0.4}
+_TOSSED = 0.8
+"""The same in turbulent air."""
+PREPARE_CAP = 90_000_000
+"""µs within which all vehicles must hover, or nothing comes of the flight."""
+_SETTLE, _AFTER = 500_000, 5_000_000
+_LAND_CAPS = {"land": 60_000_000, "return": 120_000_000}
+
+
+class Stage(Enum):
+    """Where the run is."""
+
+    PREPARE = "take-off"
+    CLOCK = "flight"
+    LAND = "landing"
+    DONE = "done"
+
+
+class Sight(NamedTuple):
+    """What is seen at ``now`` (µs): true positions, velocities (K, 3), the target's place or None, ENU;
+    whether all companions that can are under way (``ready``), what the others wait for, whether any motor may
+    turn."""
+
+    now: int
+    positions: Array
+    velocities: Array
+    target: Array | None
+    ready: bool
+    waiting: tuple[str, ...]
+    armed: bool
+
+
+class _Intruder(NamedTuple):
+    """A bystander that sets out ``after`` µs for its goal (3,)."""
+
+    after: int
+    system: int
+    goal: Array
+
+
+def _intruders(scenario: Scenario) -> list[_Intruder]:
+    """In the order of time."""
+    found = [
+        _Intruder(round(1e6 * other.after_s), system, np.array(other.goal))
+        for system, other in zip(scenario.systems[scenario.vehicles :], scenario.bystanders, strict=True)
+        if other.goal is not None
+    ]
+    return sorted(found, key=lambda intruder: intruder.after)
+
+
+def _turning_speed(scenario: Scenario) -> float:
+    """How fast (m/s) the outermost vehicle of a ring that turns goes round."""
+    companion = scenario.companion
+    if not companion.turn_rate:
+        return 0.0
+    outlines = [companion.surface_of(system).outline() for system in scenario.systems]
+    reach = max(float(np.hypot(outline[:, 0], outline[:, 1]).max()) for outline in outlines)
+    return abs(companion.turn_rate) * reach
+
+
+class Conductor:
+    """The stages of one flight. ``failure`` says why if it never got to its clock or did not land."""
+
+    def __init__(self, scenario: Scenario, starts: Starts, operator: Operator, epoch: int) -> None:
+        """Orders the take-off. ``epoch``: when the run begins, µs."""
+        self._scenario, self._starts, self._operator = scenario, starts, operator
+        self._epoch = epoch
+        self.stage = Stage.PREPARE
+        self.clock_start: int | None = None
+        self.clock_end: int | None = None
+        self.converged_at: int | None = None
+        self.failure: str | None = None
+        self._calm_since: int | None = None
+        self._near_since: int | None = None
+        self._land_at = 0
+        target = scenario.target
+        jumps = target.jumps if isinstance(target, FixedTarget) else ()
+        self._last_jump = round(1e6 * jumps[-1].after_s) if jumps else 0
+        self._intruders = deque(_intruders(scenario))
+        self._turning = _turning_speed(scenario)
+        for k, system in enumerate(scenario.systems):
+            operator.take_off(system, float(starts.positions[k, 2]))
+
+    @property
+    def near(self) -> float:
+        """m from where it should be, within which a vehicle has arrived."""
+        return max(NEAR, _SIGMAS * PROFILES[self._scenario.sensors].deviation)
+
+    def see(self, sight: Sight) -> bool:
+        """Go on to the next stage if it is time; True when the flight is over."""
+        if self.stage is Stage.PREPARE:
+            self._prepare(sight)
+        elif self.stage is Stage.CLOCK:
+            self._count(sight)
+        elif self.stage is Stage.LAND:
+            if not sight.armed:
+                self.stage = Stage.DONE
+            elif sight.now - self._land_at > (cap := _LAND_CAPS[self._scenario.ending]):
+                order = self._scenario.ending
+                self.failure = f"not all vehicles were down {cap // 1_000_000} s after the order to {order}"
+                self.stage = Stage.DONE
+        return self.stage is Stage.DONE
+
+    def abort(self, now: int, why: str) -> None:
+        """Land now, whatever the stage."""
+        if self.stage in (Stage.PREPARE, Stage.CLOCK):
+            self.failure = why
+            if self.clock_start is not None:
+                self.clock_end = now
+            self._land(now)
+
+    def errors(self, sight: Sight) -> Array:
+        """Distance (vehicles,) of each that flies the task from where it should be: its goal, or its surface
+        around the target."""
+        positions = sight.positions[: self._scenario.vehicles]
+        if self._starts.goals is not None:
+            return np.asarray(np.linalg.norm(positions - self._starts.goals, axis=1))
+        if sight.target is None:
+            return np.full(len(positions), np.nan)
+        return standoff(self._scenario, positions, sight.target)
+
+    def _prepare(self, sight: Sight) -> None:
+        now, still = sight.now, _RESTLESS[self._scenario.sensors]
+        if self._scenario.weather.w20 > 0.0:
+            still = _TOSSED
+        # A ring that turns never stands still.
+        still += self._turning
+        calm = sight.ready and float(np.linalg.norm(sight.velocities, axis=1).max()) < still
+        if not calm:
+            self._calm_since = None
+            if now - self._epoch > PREPARE_CAP:
+                self.failure = "; ".join(sight.waiting) or "the vehicles do not come to a hover"
+                self._land(now)
+            return
+        self._calm_since = now if self._calm_since is None else self._calm_since
+        if now - self._calm_since < _SETTLE:
+            return
+        self.stage, self.clock_start = Stage.CLOCK, now
+        if self._starts.goals is not None:
+            for system, goal in zip(self._scenario.systems, self._starts.goals, strict=False):
+                self._operator.goal(system, goal)
+
+    def _count(self, sight: Sight) -> None:
+        now = sight.now
+        since = now - (self.clock_start or 0)
+        while self._intruders and self._intruders[0].after <= since:
+            _, system, goal = self._intruders.popleft()
+            self._operator.goal(system, goal)
+        if self._scenario.has_goal and self.converged_at is None and since >= self._last_jump:
+            near = bool((self.errors(sight) < self.near).all())
+            speeds = np.linalg.norm(sight.velocities[: self._scenario.vehicles], axis=1)
+            if near and bool((speeds < SLOW).all()):
+                self._near_since = now if self._near_since is None else self._near_since
+                if now - self._near_since >= HOLD:
+                    self.converged_at = self._near_since
+            else:
+                self._near_since = None
+        over = since >= self._scenario.duration_s * 1e6
+        if self.converged_at is not None:
+            over = now >= self.converged_at + HOLD + _AFTER
+        if over:
+            self.clock_end = now
+            if self._scenario.airborne:
+                self.stage = Stage.DONE
+            else:
+                self._land(now)
+
+    def _land(self, now: int) -> None:
+        self.stage, self._land_at = Stage.LAND, now
+        order = self._operator.come_back if self._scenario.ending == "return" else self._operator.land
+        for system in self._scenario.systems:
+            order(system)

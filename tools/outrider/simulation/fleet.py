@@ -1,0 +1,193 @@
+"""The nodes of a scenario for one seed, and how they are linked. The only place where companion and sitl
+stand side by side; they still meet only in MAVLink bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.backup_node import BackupNode
+from companion.config import CompanionConfig
+from companion.node import Companion
+from companion.values.bearings import bearing
+from mavlink_bridge.clocks.node_clock import NodeClock
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.network.simulated import Channel, Faults
+from outrider.runs import names
+from outrider.scenarios.companion_settings import settings_of
+from outrider.scenarios.faults import ClockFault
+from outrider.scenarios.links import Links
+from outrider.scenarios.scenario import FixedTarget, PathTarget, Scenario
+from outrider.scenarios.starts import starts
+from outrider.simulation.bystander import Bystander
+from outrider.simulation.moving import MovingObstacle
+from outrider.simulation.operator import Operator
+from outrider.simulation.streams import Stream, stream
+from outrider.simulation.targets import Recorded, Standing, Target, Walking
+from sitl.config.autopilot import AutopilotConfig
+from sitl.node import Autopilot
+from sitl.vehicle.config import VehicleConfig
+
+
+class End(NamedTuple):
+    """A node on a link: its name, the link's name there, and the words that a scenario calls it by."""
+
+    node: str
+    link: str
+    words: tuple[str | int, ...]
+
+
+class Fleet:
+    """Makes each node of ``scenario``; the same seed makes the same ones, in whatever process.
+
+    ``logs`` is where recorded targets lie.
+    """
+
+    def __init__(self, scenario: Scenario, vehicle: VehicleConfig, seed: int, logs: Path) -> None:
+        self.scenario, self.vehicle, self.seed = scenario, vehicle, seed
+        origin = scenario.origin
+        self.frame = FleetFrame(origin.latitude, origin.longitude, origin.altitude)
+        self.starts = starts(scenario, seed, scenario.companion.planar)
+        self.systems = list(scenario.systems)
+        self._logs = logs
+        target = self.target()
+        self.target_system = target.system
+        self._facing = target.position(0)
+
+    @property
+    def companion_config(self) -> CompanionConfig:
+        """The companions' settings with what the scenario tells them."""
+        return settings_of(self.scenario)
+
+    def companion_config_of(self, k: int) -> CompanionConfig:
+        """Those of vehicle ``k``: a bystander flies to goals, shares no plan and knows of no obstacle."""
+        config = self.companion_config
+        if k < self.scenario.vehicles:
+            return config
+        changes: dict[str, object] = {
+            "task": "goto",
+            "methods": ("baseline",),
+            "avoidance": "field",
+            "shares_plan": False,
+            "target_d_min": None,
+            "target_d_safe": None,
+            "obstacles": (),
+            "moving": (),
+        }
+        speed = self.scenario.bystanders[k - self.scenario.vehicles].speed
+        if speed is not None:
+            changes["limits"] = config.limits.model_copy(update={"v_max": (speed,) * 3})
+        return config.model_copy(update=changes)
+
+    def target(self) -> Target:
+        """The target's node."""
+        config = self.scenario.target
+        if isinstance(config, FixedTarget):
+            return Standing(config, self.frame)
+        if isinstance(config, PathTarget):
+            return Walking(config, self.frame)
+        return Recorded(config, self._logs / config.log, self.frame)
+
+    def moving(self) -> list[MovingObstacle]:
+        """The nodes of the moving obstacles."""
+        scenario = self.scenario
+        pairs = zip(scenario.moving, scenario.moving_systems, strict=True)
+        return [MovingObstacle(config, system, self.frame) for config, system in pairs]
+
+    def operator(self) -> Operator:
+        """The operator's node."""
+        return Operator(self.frame)
+
+    def companion(self, k: int, stopwatch: Callable[[], int]) -> Companion:
+        """The companion of vehicle ``k``; ``stopwatch`` (ns) measures its planning."""
+        kind = Companion if k < self.scenario.vehicles else Bystander
+        config = self.companion_config_of(k)
+        return kind(config, self.systems[k], self.target_system, self.frame, stopwatch)
+
+    @property
+    def helmed(self) -> list[int]:
+        """The vehicles, by their index, that have a helm: those whose plans others count on."""
+        certified = self.scenario.companion.avoidance == "certified"
+        return list(range(self.scenario.vehicles)) if certified else []
+
+    def helm(self, k: int) -> BackupNode:
+        """The helm of vehicle ``k``."""
+        return BackupNode(self.companion_config_of(k), self.systems[k], self.frame)
+
+    def autopilot(self, k: int) -> Autopilot:
+        """The autopilot and vehicle ``k``: on the ground below its start, or hovering there."""
+        start = self.starts.positions[k]
+        place = start * (1.0, 1.0, 0.0)
+        latitude, longitude, altitude = self.frame.to_geodetic(place)
+        facing = 0.0 if self._facing is None else bearing(place, self._facing)
+        config = AutopilotConfig(
+            system_id=self.systems[k],
+            flavour=self.scenario.flavour_of(k),
+            latitude=latitude,
+            longitude=longitude,
+            altitude=altitude,
+            yaw=float(np.pi / 2 - facing),
+            sensors=self.scenario.sensors,
+            physics=self.scenario.physics,
+            **self.scenario.autopilot.model_dump(),
+            start_height=float(start[2]) if self.scenario.airborne else 0.0,
+        )
+        return Autopilot(config, self.vehicle, self.frame, self.seed, weather=self.scenario.weather)
+
+    def clock(self, k: int, since: int) -> NodeClock:
+        """How the clock of companion ``k`` differs from true time from ``since`` (µs) on."""
+        for fault in self.scenario.faults:
+            if isinstance(fault, ClockFault) and fault.vehicle == self.systems[k]:
+                return NodeClock(-round(1000.0 * fault.late_ms), fault.drift_ppm, since)
+        bounds = self.scenario.clocks
+        offset, drift = stream(self.seed, Stream.CLOCKS, k).uniform(-1.0, 1.0, 2)
+        return NodeClock(round(1000.0 * bounds.offset_ms * offset), float(bounds.drift_ppm * drift), since)
+
+    def phases(self) -> list[int]:
+        """When in its period (µs) each companion is due: seeded, so that they never replan all on one
+        tick."""
+        timing = self.scenario.timing
+        random = stream(self.seed, Stream.PHASES)
+        ticks = random.integers(timing.companion_us // timing.base_tick_us, size=len(self.systems))
+        return [int(tick) * timing.base_tick_us for tick in ticks]
+
+    def channels(self) -> list[Channel]:
+        """All links of the fleet with their faults, for the ether."""
+        links = self.scenario.links
+        companions = [(names.companion(system), ("companion", system)) for system in self.systems]
+        channels = []
+        for k, (system, (name, words)) in enumerate(zip(self.systems, companions, strict=True)):
+            ends = {
+                "autopilot": End(names.autopilot(system), "autopilot", ("autopilot", system)),
+                "target": End(names.TARGET, "target", ("target",)),
+                "ground": End(names.OPERATOR, "ground", ("operator",)),
+            }
+            for link, other in ends.items():
+                ends_here = [End(name, link, words), other]
+                if link == "autopilot" and k in self.helmed:
+                    ends_here.append(End(names.helm(system), link, words))
+                channels.append(_channel(f"{link}-{name}", ends_here, getattr(links, link)))
+            if k in self.helmed:
+                # On the same computer nothing is lost.
+                channels.append(
+                    Channel(f"helm-{name}", {name: "swarm", names.helm(system): "swarm"}, Faults())
+                )
+        swarm = [End(name, "swarm", words) for name, words in companions]
+        swarm += [End(names.moving(s), "swarm", ("moving", s)) for s in self.scenario.moving_systems]
+        channels.append(_channel("swarm", swarm, links.swarm))
+        return channels
+
+
+def _channel(name: str, ends: Sequence[End], links: Links) -> Channel:
+    """A channel between ``ends`` whose paths have the faults that ``links`` says for them."""
+    overrides: dict[tuple[str | None, str | None], Faults] = {}
+    if links.directions:
+        for sender in ends:
+            for receiver in ends:
+                faults = links.between(sender.words, receiver.words)
+                if sender is not receiver and faults != links.faults:
+                    overrides[sender.node, receiver.node] = faults
+    return Channel(name, {end.node: end.link for end in ends}, links.faults, overrides=overrides)

@@ -1,0 +1,66 @@
+"""An obstacle that moves, as a node: on the swarm link it says where it is and, if its way is known, where it
+will be; it hears nothing and gives way to nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from companion.telemetry.sharing import plan_message
+from companion.values.horizon import Horizon, roll_out
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.plan import KNOTS
+from outrider.runs import names
+from outrider.scenarios.moving import MovingPart
+from outrider.simulation.beacon import Beacon
+from outrider.simulation.paths import Array, ClosedPath, Motion, Walk
+
+LINK = "swarm"
+STEP = 100_000
+"""µs between the knots of a plan: with all that the wire holds it reaches 1.6 s."""
+
+
+class MovingObstacle:
+    """Goes along its closed path from the goal event on; until then it stands at its beginning."""
+
+    def __init__(self, config: MovingPart, system: int, fleet: FleetFrame) -> None:
+        self.name = names.moving(system)
+        self.system = system
+        self.walk = Walk(ClosedPath(config.places), config.speed, config.setting_out)
+        self._shares_plan = config.shares_plan
+        self._fleet = fleet
+        self._beacon = Beacon(system, LINK, config.rate_hz, fleet)
+
+    def begin(self, now: int) -> None:
+        """The goal event: set out."""
+        self.walk.begin(now)
+
+    def motion(self, now: int) -> Motion:
+        """True position and velocity at ``now`` (µs)."""
+        return self.walk.motion(now)
+
+    def horizon(self, now: int) -> Horizon:
+        """Where it will be from ``now`` (µs) on: with the velocities of its way at the knots, and within
+        millimetres of it."""
+        motions = [self.walk.motion(now + n * STEP) for n in range(KNOTS + 1)]
+        accelerations = np.diff([motion.velocity for motion in motions], axis=0) / (1e-6 * STEP)
+        return roll_out(now, STEP, motions[0].position, motions[0].velocity, accelerations)
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Its position and velocity, and its plan if it shares one, at its rate."""
+        if not self._beacon.due(now):
+            return []
+        plan = None
+        if self._shares_plan:
+            plan = plan_message(self.horizon(now), self._beacon.source, self._fleet)
+        return self._beacon.say(now, self.walk.motion(now), plan)
+
+
+def places(moving: Sequence[MovingObstacle], times: Iterable[int]) -> Array:
+    """Where they truly are (n, M, 3) at ``times`` (µs), ENU."""
+    when = np.fromiter(times, dtype=np.int64)
+    if not moving:
+        return np.empty((len(when), 0, 3))
+    return np.stack([one.walk.places(when) for one in moving], axis=1)

@@ -1,0 +1,36 @@
+"""Writes the tlogs of a run, and when the companions were stepped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import ExitStack, closing
+from pathlib import Path
+
+from mavlink_bridge.loops.lockstep import Direction
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.tlog.log import TlogWriter
+from outrider.runs import names
+from outrider.runs.steps_file import StepsFile
+
+
+class Recorder:
+    """A tap: one tlog in ``directory`` for each vehicle of ``systems``, with all that its companion received
+    and sent, at the times at which it handled it, and beside it these times. ``files`` closes them."""
+
+    def __init__(self, directory: Path, systems: Iterable[int], files: ExitStack) -> None:
+        self._writers: dict[str, TlogWriter] = {}
+        self._steps: dict[str, StepsFile] = {}
+        for system in systems:
+            name = names.companion(system)
+            self._writers[name] = files.enter_context(TlogWriter(directory / names.log(system)))
+            self._steps[name] = files.enter_context(closing(StepsFile(directory / names.steps(system))))
+
+    def begin(self, now: int, node: str, /) -> None:
+        steps = self._steps.get(node)
+        if steps is not None:
+            steps.add(now)
+
+    def __call__(self, now: int, node: str, _direction: Direction, datagram: Datagram, /) -> None:
+        writer = self._writers.get(node)
+        if writer is not None:
+            writer.write(now, names.LINK_NUMBERS[datagram.link], datagram.data)

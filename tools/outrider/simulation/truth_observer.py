@@ -1,0 +1,84 @@
+"""Sees the true state of emulated autopilots and hands it to the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mavlink_bridge.frames import ned_to_enu, yaw_to_enu
+from outrider.simulation.ground_truth import NOWHERE, ROW, SAMPLE, Array, Truth
+from outrider.simulation.moving import MovingObstacle
+from outrider.simulation.moving import places as moving_places
+from outrider.simulation.targets import Placed, Target
+from sitl.node import Autopilot
+
+
+class Witness:
+    """Watches the autopilots of a lock-step run; ``see`` is called after every tick."""
+
+    def __init__(
+        self,
+        autopilots: list[Autopilot],
+        target: Target,
+        truth: Truth,
+        moving: Sequence[MovingObstacle] = (),
+    ) -> None:
+        self._autopilots = autopilots
+        self._target = target
+        self._moving = moving
+        self._truth = truth
+        self._last = -1
+        self._next = 0
+        self._pending: list[list[Array]] = [[] for _ in autopilots]
+        self._times: list[int] = []
+
+    def see(self, now: int) -> bool:
+        """Take in the physics steps since the last call; whether a sample was taken at ``now``."""
+        moved_to = self._autopilots[0].moved_to
+        if moved_to == self._last:
+            return False
+        times = self._autopilots[0].trace_times
+        if not len(times):
+            return False
+        self._last = moved_to
+        for autopilot, pending in zip(self._autopilots, self._pending, strict=True):
+            trace = autopilot.trace
+            pending.append(trace if autopilot.airborne else np.full_like(trace, np.nan))
+        self._times += times.tolist()
+        if now < self._next:
+            return False
+        self._next = now + SAMPLE
+        track = ned_to_enu(np.stack([np.concatenate(pending) for pending in self._pending], axis=1))
+        moving = moving_places(self._moving, self._times)
+        self._truth.take(now, track, rows(self._autopilots), places(self._target, self._times), moving)
+        for pending in self._pending:
+            pending.clear()
+        self._times.clear()
+        return True
+
+
+def places(target: Placed, times: Iterable[int]) -> Array:
+    """Where the target is (n, 3) at ``times`` (µs, not decreasing), ENU; NaN where it is not there."""
+    found = [target.position(time) for time in times]
+    return np.array([NOWHERE if place is None else place for place in found])
+
+
+def rows(autopilots: Sequence[Autopilot]) -> Array:
+    """The samples (K, ROW) of vehicles, ENU: see ``truth.ROW``."""
+    ned = np.empty((len(autopilots), 5, 3))
+    attitude = np.empty((len(autopilots), 4))
+    for k, autopilot in enumerate(autopilots):
+        state, reference = autopilot.state, autopilot.reference
+        ned[k, 0], ned[k, 1], ned[k, 2] = state.position, state.velocity, state.acceleration
+        ned[k, 3] = NOWHERE if reference is None else reference.position
+        ned[k, 4] = autopilot.estimate_error
+        attitude[k] = state.attitude
+    result = np.empty((len(autopilots), ROW))
+    result[:, :15] = ned_to_enu(ned).reshape(-1, 15)
+    w, x, y, z = attitude.T
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    result[:, 15] = [yaw_to_enu(angle) for angle in yaw.tolist()]
+    # The angle between the body's and the world's vertical.
+    result[:, 16] = 2.0 * np.arcsin(np.minimum(1.0, np.hypot(x, y)))
+    return result

@@ -1,0 +1,93 @@
+"""``outrider sitl``: opens what vehicles are reached by, starts them, shows them, and ends them."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from mavlink_bridge.clocks.clock import WallClock
+from mavlink_bridge.errors import EndpointError
+from outrider.address_scope import exposed
+from outrider.errors import InputError
+from outrider.interruption import noted
+from outrider.sitl_server.addresses import Address, addresses, extra
+from outrider.sitl_server.display import announce, watching
+from outrider.sitl_server.figures import Value, ready, summary
+from outrider.sitl_server.persistence import prepare
+from outrider.sitl_server.processes import Crew
+from outrider.sitl_server.request import Request
+from outrider.sitl_server.wiring import wire
+
+_LOOK: Final = 0.1
+"""s between two looks at the board."""
+
+
+class Terms(NamedTuple):
+    """How it runs. ``seconds`` of wall time until it ends by itself."""
+
+    port_base: int | None
+    to: tuple[str, ...]
+    host: str
+    state: Path | None
+    seconds: float | None
+    as_json: bool
+
+
+def run(asked: Request, terms: Terms) -> int:
+    """Until Ctrl-C, SIGTERM, or the time is over; the exit status. InputError for what cannot be opened,
+    OutriderError if a process ends by itself."""
+    began = time.monotonic()
+    prepare(terms.state, asked.flavour, asked.systems)
+    places = _addresses(asked, terms)
+    crew = Crew(asked, wire(places, WallClock()), terms.state)
+    with noted((signal.SIGINT, signal.SIGTERM)) as stopped:
+        try:
+            announce(asked)
+            crew.start()
+            _wait(crew, stopped, asked.count)
+            until = math.inf if terms.seconds is None else time.monotonic() + terms.seconds
+            if terms.as_json and not stopped:
+                _say(ready(asked, places))
+            with watching(asked, places, crew.board) as look:
+                while not stopped and time.monotonic() < until:
+                    time.sleep(_LOOK)
+                    crew.check()
+                    look()
+        finally:
+            crew.stop()
+    if terms.as_json:
+        _say(summary(asked, crew.board, time.monotonic() - began))
+    return 0
+
+
+def _addresses(asked: Request, terms: Terms) -> list[Address]:
+    try:
+        more = tuple(extra(text, asked.count) for text in terms.to)
+        places = addresses(asked.flavour, asked.count, terms.port_base, terms.host, more)
+    except EndpointError as error:
+        raise InputError(f"--to {error}") from None
+    open_to_all = [str(one) for one in places[0].endpoints if exposed(one)]
+    if open_to_all and asked.key is None:
+        sys.stderr.write(
+            f"outrider sitl: {', '.join(open_to_all)}: beyond this machine; unsigned MAVLink obeys everyone "
+            "who can send there: --signing-key FILE is against that\n"
+        )
+    return places
+
+
+def _wait(crew: Crew, stopped: Sequence[object], count: int) -> None:
+    """Until all vehicles are up."""
+    while not stopped and not all(crew.board.gauges(index).up for index in range(count)):
+        time.sleep(0.02)
+        crew.check()
+
+
+def _say(value: dict[str, Value]) -> None:
+    sys.stdout.write(json.dumps(value) + "\n")
+    sys.stdout.flush()

@@ -1,0 +1,39 @@
+"""What has happened to vehicles between two looks, in words: modes, motors, clients, and what they said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from outrider.sitl_server.modes import mode_name
+from outrider.sitl_server.request import Request
+from outrider.sitl_server.shared_page import SAYINGS, Board, Gauges
+
+
+class Chronicle:
+    """``look`` tells each event once. How many clients there are by UDP is known some seconds late."""
+
+    def __init__(self, asked: Request, board: Board) -> None:
+        self._asked, self._board = asked, board
+        self._before = [Gauges() for _ in range(asked.count)]
+
+    def look(self) -> list[str]:
+        """One line for each event since the last look: when (s since boot), who, what."""
+        lines = []
+        for index, system in enumerate(self._asked.systems):
+            now = self._board.gauges(index)
+            if now.up:
+                what = self._changes(index, self._before[index], now)
+                lines += [f"{now.time:8.1f} s  vehicle {system}: {one}" for one in what]
+                self._before[index] = now
+        return lines
+
+    def _changes(self, index: int, before: Gauges, now: Gauges) -> Iterator[str]:
+        first = max(before.said, now.said - SAYINGS)
+        for number in range(first, now.said):
+            yield f"says {self._board.saying(index, number)!r}"
+        if before.up and now.custom_mode != before.custom_mode:
+            yield f"mode {mode_name(self._asked.flavour, now.custom_mode)}"
+        if now.armed != before.armed:
+            yield "armed" if now.armed else "disarmed"
+        if now.clients != before.clients:
+            yield f"{now.clients} client{'' if now.clients == 1 else 's'}"

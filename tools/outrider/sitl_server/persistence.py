@@ -1,0 +1,92 @@
+"""What vehicles keep from one start to the next, a JSON file for each: parameters and plans."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Final
+
+from pydantic import ValidationError
+
+from outrider.errors import InputError
+from outrider.sitl_server.vehicle_group import Squad
+from sitl.autopilot.saved import Saved
+
+_IDS: Final = ("SYSID_THISMAV", "MAV_SYS_ID")
+
+
+class Cabinet:
+    """The files in ``directory``, FLAVOUR-ID.json, by the id that a vehicle was started with; nothing is kept
+    without a directory."""
+
+    def __init__(self, directory: Path | None, flavour: str) -> None:
+        self._directory, self._flavour = directory, flavour
+        self._kept: dict[int, Saved] = {}
+        self._complained = False
+
+    def saved(self, system: int) -> Saved:
+        """What vehicle ``system`` kept; InputError if its file is damaged."""
+        kept = Saved()
+        path = self._path(system)
+        if path is not None and path.exists():
+            try:
+                kept = Saved.model_validate_json(path.read_bytes())
+                # Ids are given by --first-id: two vehicles must never have one.
+                others = {name: v for name, v in kept.parameters.items() if name not in _IDS}
+                kept = kept.model_copy(update={"parameters": others})
+            except (OSError, ValidationError) as error:
+                why = error.strerror if isinstance(error, OSError) else "it is damaged"
+                raise InputError(
+                    f"{path}: cannot be used: {why}; allowed: what a vehicle left there, or no such file"
+                ) from None
+        self._kept[system] = kept
+        return kept
+
+    def keep(self, squad: Squad, *, ending: bool = False) -> None:
+        """Write what has changed since the last time, so that a file is always whole. The newest stamp of a
+        signature, which changes all the time, alone is no reason but when ``ending``."""
+        if self._directory is None:
+            return
+        for seat in squad.seats:
+            found, before = seat.node.saved, self._kept[seat.system]
+            compared = found
+            if not ending:
+                compared = found.model_copy(update={"signed_until": before.signed_until})
+            if compared != before and not (_empty(compared) and _empty(before)):
+                self._kept[seat.system] = found
+                path = self._path(seat.system)
+                if path is not None:
+                    self._write(path, found)
+
+    def _write(self, path: Path, kept: Saved) -> None:
+        """A directory that is gone or full ends no flight; it is said once."""
+        beside = path.with_suffix(".new")
+        try:
+            beside.write_text(kept.model_dump_json(indent=1), encoding="utf-8")
+            beside.replace(path)
+        except OSError as error:
+            if not self._complained:
+                self._complained = True
+                sys.stderr.write(
+                    f"outrider sitl: {path}: cannot be written, nothing is kept: {error.strerror}\n"
+                )
+
+    def _path(self, system: int) -> Path | None:
+        return None if self._directory is None else self._directory / f"{self._flavour}-{system}.json"
+
+
+def _empty(saved: Saved) -> bool:
+    return not saved.parameters and not any(saved.plans) and not saved.signed_until
+
+
+def prepare(directory: Path | None, flavour: str, systems: range) -> None:
+    """Make the directory, and look whether all that is in it can be used. InputError."""
+    if directory is None:
+        return
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--state {directory}: cannot be made: {error.strerror}") from None
+    cabinet = Cabinet(directory, flavour)
+    for system in systems:
+        cabinet.saved(system)

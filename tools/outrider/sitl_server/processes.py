@@ -1,0 +1,90 @@
+"""The processes of a run: each has a squad of vehicles, forked from one that has compiled what they need."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from math import ceil
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Final
+
+from mavlink_bridge.clocks.clock import PacedClock, WallClock
+from mavlink_bridge.links.link import Link
+from outrider.errors import OutriderError
+from outrider.sitl_server.request import Request
+from outrider.sitl_server.shared_page import Board
+from outrider.sitl_server.worker import PERIOD, STRIDE, Worker
+from outrider.sweep.execution import cores
+from sitl.autopilot.saved import Saved
+
+FULL: Final = 10
+"""So many vehicles at real-time speed are one process's work before there is another."""
+_FAREWELL: Final = 5.0
+"""s that a process has to end by itself."""
+
+
+def squads(count: int, speed: float, most: int) -> list[list[int]]:
+    """The indices of ``count`` vehicles, for each of up to ``most`` processes those that it has."""
+    busy = ceil(count * max(speed, 1.0) / FULL)
+    number = min(count, most, busy)
+    return [list(range(squad, count, number)) for squad in range(number)]
+
+
+class Crew:
+    """Forks a process for each squad; ``links`` by vehicle. This process then has no link open any more."""
+
+    def __init__(self, asked: Request, links: list[list[Link]], state: Path | None) -> None:
+        self._asked, self._links = asked, links
+        self.squads = squads(asked.count, asked.speed, cores())
+        self.board = Board(asked.count, len(self.squads))
+        self._workers = [
+            Worker(number, indices, asked, {str(index): links[index] for index in indices}, self.board, state)
+            for number, indices in enumerate(self.squads)
+        ]
+        self._processes: list[BaseProcess] = []
+
+    def start(self) -> None:
+        """Compile, and fork."""
+        first = self._asked.autopilot(0, 0, Saved())
+        for now in (0, PERIOD):
+            first.step(now, [])
+        fork = multiprocessing.get_context("fork")
+        # One time for all: vehicles of two processes meet in the same air.
+        clock = PacedClock(WallClock(), self._asked.speed, STRIDE, self.board)
+        for number, worker in enumerate(self._workers):
+            process = fork.Process(target=self._child, args=(worker, clock), name=f"squad-{number}")
+            process.start()
+            self._processes.append(process)
+        self._close(None)
+
+    def check(self) -> None:
+        """OutriderError if a process has ended, which none does by itself."""
+        for number, process in enumerate(self._processes):
+            if process.exitcode is not None:
+                fault = self.board.fault(number) or f"its process ended with status {process.exitcode}"
+                systems = ", ".join(str(self._asked.systems[index]) for index in self.squads[number])
+                raise OutriderError(f"vehicles {systems}: {fault}")
+
+    def stop(self) -> None:
+        """Tell all to end, wait for them, and end by force who does not come."""
+        self.board.stop = True
+        until = time.monotonic() + _FAREWELL
+        for process in self._processes:
+            process.join(max(until - time.monotonic(), 0.1))
+            if process.is_alive():
+                process.kill()
+                process.join()
+        self._close(None)
+
+    def _child(self, worker: Worker, clock: PacedClock) -> None:
+        self._close(worker)
+        worker.main(clock)
+
+    def _close(self, spared: Worker | None) -> None:
+        """All links but those of one worker."""
+        for worker in self._workers:
+            if worker is not spared:
+                for links in worker.links.values():
+                    for link in links:
+                        link.close()

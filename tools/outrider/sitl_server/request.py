@@ -1,0 +1,196 @@
+"""What is asked for: how many vehicles, which, where, and how fast time goes. All of it checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from math import ceil, isfinite, sqrt
+from pathlib import Path
+from typing import Final, Literal, cast, get_args
+
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
+from mavlink_bridge.messages import Vector
+from mavlink_bridge.wire.signing import Signing
+from outrider.errors import InputError
+from outrider.key_files import key_of
+from outrider.resources import find
+from outrider.scenarios.options import wind_of
+from outrider.scenarios.places import Origin
+from outrider.yaml_files.yaml_file import load
+from sitl.autopilot.saved import Saved
+from sitl.backends.physics import PhysicsName
+from sitl.config.autopilot import AutopilotConfig
+from sitl.config.gains import ResponseName
+from sitl.environment.weather import WeatherConfig
+from sitl.estimation.profiles import ProfileName
+from sitl.node import Autopilot
+from sitl.vehicle.battery import BatteryConfig
+from sitl.vehicle.config import VehicleConfig
+
+FlavourName = Literal["ardupilot", "px4"]
+StartupName = Literal["quick", "realistic"]
+
+MOST_ID: Final = 254
+"""255 is what ground stations take."""
+_READY_AFTER: Final = {"ardupilot": 30.0, "px4": 20.0}
+# s from boot; ArduCopter's GPS and EKF take about 40, PX4's less.
+
+
+_PLACE: Final = "LATITUDE,LONGITUDE[,ALTITUDE], ±89 and ±180 degrees, −500 to 9000 m above the sea"
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line says, as it says it."""
+
+    count: int = 1
+    first_id: int = 1
+    flavour: str = "ardupilot"
+    vehicle: str = "firefly"
+    sensors: str = "truth"
+    physics: str = "own"
+    startup: str = "quick"
+    response: str = "firmware"
+    origin: str | None = None
+    wind: str | None = None
+    spacing: float = 3.0
+    columns: int | None = None
+    speedup: float = 1.0
+    seed: int = 1
+    signing_key: Path | None = None
+
+
+@dataclass(frozen=True)
+class Request:
+    """``speed``: simulated seconds per second of wall time. ``spacing`` (m) between vehicles, on a grid of
+    so many ``columns`` whose first corner is the ``origin``. ``key``: only what is signed with it counts."""
+
+    count: int
+    first_id: int
+    flavour: FlavourName
+    vehicle: VehicleConfig
+    sensors: ProfileName
+    physics: PhysicsName
+    startup: StartupName
+    response: ResponseName
+    origin: Origin
+    weather: WeatherConfig
+    spacing: float
+    columns: int
+    speed: float
+    seed: int
+    key: Key | None = None
+
+    @property
+    def systems(self) -> range:
+        """System ids."""
+        return range(self.first_id, self.first_id + self.count)
+
+    @property
+    def frame(self) -> FleetFrame:
+        """ENU at the origin."""
+        return FleetFrame(self.origin.latitude, self.origin.longitude, self.origin.altitude)
+
+    def place(self, index: int) -> Vector:
+        """Where a vehicle stands (m, ENU): rows towards the east, one north of the other."""
+        return self.spacing * (index % self.columns), self.spacing * (index // self.columns), 0.0
+
+    def autopilot(self, index: int, epoch: int, saved: Saved) -> Autopilot:
+        """A vehicle that boots at ``epoch`` (Unix µs) with what it ``saved`` before."""
+        return Autopilot(
+            self._config(index, epoch),
+            self.vehicle,
+            self.frame,
+            self.seed,
+            weather=self.weather,
+            saved=saved,
+            signing=None if self.key is None else Signing(self.key),
+        )
+
+    def _config(self, index: int, epoch: int) -> AutopilotConfig:
+        latitude, longitude, altitude = self.frame.to_geodetic(self.place(index))
+        changes: dict[str, object] = {}
+        if self.startup == "realistic":
+            changes = {"startup": "in stages", "ready_after": _READY_AFTER[self.flavour]}
+        return AutopilotConfig(
+            system_id=self.first_id + index,
+            flavour=self.flavour,
+            latitude=latitude,
+            longitude=longitude,
+            altitude=altitude,
+            streams="normal",
+            sensors=self.sensors,
+            physics=self.physics,
+            response=self.response,
+            # Three cells are low at the 10.5 V of BATT_LOW_VOLT; PX4 counts shares.
+            battery=BatteryConfig(cells=3 if self.flavour == "ardupilot" else 4),
+            epoch=epoch,
+            **changes,
+        )
+
+
+def checked(options: Options) -> Request:
+    """The options as a request. InputError with a line for each that is wrong."""
+    words: dict[str, tuple[str, ...]] = {
+        "flavour": get_args(FlavourName),
+        "sensors": get_args(ProfileName),
+        "physics": get_args(PhysicsName),
+        "startup": get_args(StartupName),
+        "response": get_args(ResponseName),
+    }
+    wrong = [
+        f"--{name} {given}: allowed are {', '.join(allowed)}"
+        for name, allowed in words.items()
+        if (given := getattr(options, name)) not in allowed
+    ]
+    wrong += [
+        f"--{name} {given}: allowed is a finite number"
+        for name in ("spacing", "speedup")
+        if not isfinite(given := getattr(options, name))
+    ]
+    last = options.first_id + options.count - 1
+    if last > MOST_ID:
+        wrong.append(
+            f"--count {options.count} from --first-id {options.first_id}: system ids would go up to {last}; "
+            f"allowed is {MOST_ID}, as 255 is a ground station's"
+        )
+    origin = Origin() if options.origin is None else _origin(options.origin)
+    if origin is None:
+        wrong.append(f"--origin {options.origin}: allowed is {_PLACE}")
+    if wrong or origin is None:
+        raise InputError(*wrong)
+    weather = WeatherConfig()
+    if options.wind is not None:
+        weather = WeatherConfig.model_validate({"wind": wind_of(options.wind)})
+    if options.physics == "jsbsim":
+        # A package that is missing is named before anything is opened.
+        import_module("jsbsim")
+    return Request(
+        options.count,
+        options.first_id,
+        cast("FlavourName", options.flavour),
+        load(find("vehicles", options.vehicle), VehicleConfig),
+        cast("ProfileName", options.sensors),
+        cast("PhysicsName", options.physics),
+        cast("StartupName", options.startup),
+        cast("ResponseName", options.response),
+        origin,
+        weather,
+        options.spacing,
+        ceil(sqrt(options.count)) if options.columns is None else options.columns,
+        options.speedup,
+        options.seed,
+        None if options.signing_key is None else key_of(options.signing_key),
+    )
+
+
+def _origin(text: str) -> Origin | None:
+    """What ``_PLACE`` says; None if it is not that."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+        if len(numbers) not in (2, 3):
+            return None
+        return Origin.model_validate(dict(zip(("latitude", "longitude", "altitude"), numbers, strict=False)))
+    except ValueError:
+        return None

@@ -1,0 +1,120 @@
+"""The vehicles as a table that is always there, and what happened last; on a terminal."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Sequence
+from typing import Final, Literal
+
+from rich import box
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from outrider.sitl_server.addresses import Address
+from outrider.sitl_server.event_feed import Chronicle
+from outrider.sitl_server.figures import factor
+from outrider.sitl_server.modes import mode_name
+from outrider.sitl_server.request import Request
+from outrider.sitl_server.shared_page import Board, Gauges, Pace
+
+_REFRESH: Final = 0.5
+"""s between two pictures."""
+_WINDOW: Final = 4
+"""Pictures over which messages per second are counted."""
+_LATELY: Final = 11
+"""Pictures over which the real-time factor is taken: it is news once a second."""
+_EVENTS: Final = 6
+_FRAME: Final = 6
+# Lines of the terminal that are neither vehicles nor events.
+_WIDE: Final = 96
+# Columns from which on there is room for hosts.
+_COLUMNS: Final[dict[str, Literal["left", "right"]]] = {
+    "id": "right",
+    "port": "left",
+    "mode": "left",
+    "arm": "left",
+    "east": "right",
+    "north": "right",
+    "up": "right",
+    "m/s": "right",
+    "bat.": "right",
+    "in/s": "right",
+    "out/s": "right",
+    "peers": "right",
+}
+
+
+class Screen:
+    """``look`` as often as one likes; it draws itself twice a second."""
+
+    def __init__(self, asked: Request, places: Sequence[Address], board: Board, console: Console) -> None:
+        self._asked, self._places, self._board = asked, places, board
+        self._console = console
+        self._chronicle = Chronicle(asked, board)
+        self._events: deque[str] = deque(maxlen=_EVENTS)
+        self._counts: deque[tuple[float, list[tuple[int, int]]]] = deque(maxlen=_WINDOW)
+        self._paces: deque[list[Pace]] = deque(maxlen=_LATELY)
+        self._drawn = 0.0
+        # Without a thread of its own, which would take turns from the vehicles' processes.
+        self.live = Live(console=console, auto_refresh=False)
+
+    def look(self) -> None:
+        """What there is to see now."""
+        self._events.extend(self._chronicle.look())
+        now = time.monotonic()
+        if now - self._drawn >= _REFRESH:
+            self._drawn = now
+            self.live.update(self._picture(now), refresh=True)
+
+    def _picture(self, now: float) -> Group:
+        every = [self._board.gauges(index) for index in range(self._asked.count)]
+        self._counts.append((now, [(gauges.received, gauges.sent) for gauges in every]))
+        shown = max(1, min(self._asked.count, self._console.size.height - _FRAME - _EVENTS))
+        table = Table(
+            title=self._title(), title_justify="left", box=box.SIMPLE, padding=(0, 1, 0, 0), show_edge=False
+        )
+        for name, justify in _COLUMNS.items():
+            table.add_column(name, justify=justify, no_wrap=True)
+        for index in range(shown):
+            table.add_row(*self._row(index, every[index]))
+        more = f"and {self._asked.count - shown} more · " if shown < self._asked.count else ""
+        table.caption = f"{more}Ctrl-C ends"
+        return Group(table, *(Text(line) for line in self._events))
+
+    def _title(self) -> str:
+        asked = self._asked
+        self._paces.append(self._board.paces())
+        first, last = self._paces[0], self._paces[-1]
+        late = max(pace.late_p99 for pace in last) / asked.speed
+        return (
+            f"{asked.count} × {asked.vehicle.name}, {asked.flavour} · {last[0].simulated:.0f} s"
+            f" · {factor(last, first):.2f} × real time · {late:.1f} ms late (p99)"
+        )
+
+    def _row(self, index: int, gauges: Gauges) -> tuple[str, ...]:
+        (then, before), (now, counts) = self._counts[0], self._counts[-1]
+        elapsed = max(now - then, 1e-3)
+        received, sent = (
+            (new - old) / elapsed for new, old in zip(counts[index], before[index], strict=True)
+        )
+        place = self._places[index].pymavlink
+        if self._console.size.width < _WIDE:
+            kind, _, rest = place.partition(":")
+            place = f"{kind[:3]}:{rest.rpartition(':')[2]}"
+        return (
+            str(self._asked.systems[index]),
+            place,
+            mode_name(self._asked.flavour, gauges.custom_mode),
+            "yes" if gauges.armed else "",
+            # A vehicle on the ground is not at −0.0.
+            *(f"{round(part, 1) + 0.0:.1f}" for part in gauges.position),
+            f"{math.hypot(*gauges.velocity):.1f}",
+            f"{100.0 * gauges.battery:.0f}%",
+            f"{received:.0f}",
+            f"{sent:.0f}",
+            str(gauges.clients),
+        )

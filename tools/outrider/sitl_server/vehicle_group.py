@@ -1,0 +1,113 @@
+"""Several vehicles as one node, so that one loop and one process do for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+from mavlink_bridge.frames import ned_to_enu
+from mavlink_bridge.node import Datagram
+from outrider.errors import OutriderError
+from outrider.sitl_server.shared_page import Board, Gauges
+from outrider.sitl_server.traffic import Traffic
+from sitl.node import LINK, Autopilot
+
+SPREAD: Final = 240_000
+"""µs (simulated) over which vehicles boot, so that not all are due to tell something at the same time."""
+SHOWN: Final = 0.2
+"""s of wall time between two looks at a vehicle."""
+
+
+class Seat:
+    """One vehicle of a squad: ``index`` among all, its ``node``, the ``system`` id that it was started with,
+    its link's name, and when (µs) it boots."""
+
+    def __init__(self, index: int, node: Autopilot, system: int, boot: int) -> None:
+        self.index, self.node, self.system = index, node, system
+        self.link = str(index)
+        self.boot = boot
+        self.shown = boot
+        self.said = 0
+        self.booted = False
+        self.traffic = Traffic()
+
+
+def boot_times(indices: Sequence[int], speed: float, period: int) -> dict[int, int]:
+    """When (µs) each of the vehicles of one squad boots, by index: at steps of that ``period`` (µs)."""
+    spread = round(SPREAD * min(speed, 1.0))
+    return {index: spread * number // len(indices) // period * period for number, index in enumerate(indices)}
+
+
+class Squad:
+    """A node whose links are those of its vehicles, by their index."""
+
+    name = "squad"
+
+    def __init__(
+        self,
+        vehicles: Mapping[int, Autopilot],
+        boots: Mapping[int, int],
+        first_id: int,
+        board: Board,
+        speed: float,
+    ) -> None:
+        """``vehicles`` by their index among all, which is their row on the ``board``, and when they boot
+        (µs); ``first_id``: the system id of index 0; ``speed`` of time."""
+        self.seats = [Seat(index, node, first_id + index, boots[index]) for index, node in vehicles.items()]
+        self._board = board
+        self._shown = round(SHOWN * 1e6 * speed)
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """All vehicles that have booted, each with its own of the ``inbox``."""
+        mail: dict[str, list[Datagram]] = {}
+        for link, data in inbox:
+            mail.setdefault(link, []).append(Datagram(LINK, data))
+        leaving = []
+        for seat in self.seats:
+            if now < seat.boot:
+                continue
+            arrived = mail.get(seat.link, [])
+            for datagram in arrived:
+                seat.traffic.receive(datagram.data)
+            try:
+                # A process that comes late must not make its vehicles younger than their clocks say.
+                late = not seat.booted and now > seat.boot
+                said = seat.node.step(seat.boot, []) if late else []
+                seat.booted = True
+                said += seat.node.step(now, arrived)
+            except Exception as error:
+                raise OutriderError(f"vehicle {seat.system}: {type(error).__name__}: {error}") from error
+            for datagram in said:
+                seat.traffic.send(datagram.data)
+                leaving.append(Datagram(seat.link, datagram.data))
+        return leaving
+
+    def show(self, now: int, clients: Callable[[str], int]) -> None:
+        """On the board, all whose turn it is at ``now`` (µs); ``clients`` says how many are on a link."""
+        for seat in self.seats:
+            if now < seat.shown:
+                continue
+            seat.shown = now + self._shown
+            node, traffic, state = seat.node, seat.traffic, seat.node.state
+            for text in traffic.sayings:
+                self._board.say(seat.index, seat.said, text)
+                seat.said += 1
+            traffic.sayings.clear()
+            east, north, up = ned_to_enu(state.position).tolist()
+            u, v, w = ned_to_enu(state.velocity).tolist()
+            self._board.show(
+                seat.index,
+                Gauges(
+                    True,
+                    node.armed,
+                    node.custom_mode,
+                    (east, north, up),
+                    (u, v, w),
+                    node.charge,
+                    traffic.received,
+                    traffic.sent,
+                    clients(seat.link),
+                    seat.said,
+                    (now - seat.boot) * 1e-6,
+                ),
+            )

@@ -1,0 +1,128 @@
+"""The process of a squad: its vehicles under the wall clock over their links, until all shall end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from mavlink_bridge.clocks.clock import PacedClock, WallClock
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.loops.garbage import IdleCollector
+from mavlink_bridge.loops.lockstep import Scheduled
+from mavlink_bridge.loops.priority import sharpen_timers
+from mavlink_bridge.loops.realtime import RealTime
+from outrider.sitl_server.clients import Clients
+from outrider.sitl_server.persistence import Cabinet
+from outrider.sitl_server.request import Request
+from outrider.sitl_server.shared_page import Board, Pace
+from outrider.sitl_server.vehicle_group import Squad, boot_times
+
+PERIOD: Final = 10_000
+"""µs (simulated) between two steps from real time to 10 times that."""
+_FASTEST, _LONGEST = 10.0, 5.0
+_GRID: Final = 2500
+# µs; usual steps of physics.
+STRIDE: Final = 250_000
+"""µs (simulated) that are made up for at once when the machine was busy; what is more is lost."""
+_SHOWN: Final = 1.0
+# s between two looks at how the loop keeps up.
+
+
+class Worker:
+    """``indices``: its vehicles; ``links`` of each by its index; ``squad``: its row on the ``board``."""
+
+    def __init__(
+        self,
+        squad: int,
+        indices: Sequence[int],
+        asked: Request,
+        links: dict[str, list[Link]],
+        board: Board,
+        state: Path | None,
+    ) -> None:
+        self.links = links
+        self._number, self._indices, self._asked, self._board = squad, indices, asked, board
+        self._state = state
+        self._parent = os.getpid()
+
+    def main(self, clock: PacedClock) -> None:
+        """The process, from fork to exit, under ``clock``. The parent alone is told by signals when to end,
+        and tells it."""
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        sharpen_timers()
+        try:
+            self._run(clock)
+        except Exception as error:
+            if os.environ.get("OUTRIDER_TRACEBACK"):
+                traceback.print_exc()
+            self._board.fail(self._number, f"{type(error).__name__}: {error}")
+            sys.exit(3)
+        sys.exit(0)
+
+    def _over(self) -> bool:
+        return self._board.stop or os.getppid() != self._parent
+
+    def _run(self, clock: PacedClock) -> None:
+        asked, wall = self._asked, WallClock()
+        cabinet = Cabinet(self._state, asked.flavour)
+        boots = boot_times(self._indices, asked.speed, period(asked.speed))
+        vehicles = {
+            index: asked.autopilot(index, clock.start + boot, cabinet.saved(asked.systems[index]))
+            for index, boot in boots.items()
+        }
+        clients = Clients(self.links, wall)
+        squad = Squad(vehicles, boots, asked.first_id, self._board, asked.speed)
+        with IdleCollector() as garbage:
+            loop = RealTime(
+                Scheduled(squad, period(asked.speed)),
+                self.links,
+                clock,
+                tolerance=round(PERIOD * max(asked.speed, 1.0)),
+                on_idle=lambda left: garbage.idle(int(left / asked.speed)),
+            )
+            began, looked = time.monotonic(), 0.0
+
+            def look(now: int) -> None:
+                nonlocal looked
+                squad.show(now, clients)
+                elapsed = time.monotonic() - began
+                if elapsed - looked >= _SHOWN:
+                    looked = elapsed
+                    self._board.show_pace(self._number, _pace(loop, now, elapsed))
+                    cabinet.keep(squad)
+
+            try:
+                loop.run(self._over, look)
+            finally:
+                cabinet.keep(squad, ending=True)
+                self._board.show_pace(self._number, _pace(loop, clock.now(), time.monotonic() - began))
+
+
+def period(speed: float) -> int:
+    """µs (simulated) between two steps when time is ``speed`` times as fast: 10 ms of the wall or less, and
+    1 ms or more as long as that leaves telemetry at 20 Hz in peace."""
+    of_usual = speed if speed < 1.0 else min(max(speed / _FASTEST, 1.0), _LONGEST)
+    return max(int(PERIOD * of_usual) // _GRID, 1) * _GRID
+
+
+def _pace(loop: RealTime, now: int, wall: float) -> Pace:
+    """How ``loop`` keeps up, ``now`` (µs) being ``wall`` seconds after it began."""
+    due, statistics = loop.deadlines, loop.statistics
+    lateness = statistics.lateness
+    return Pace(
+        now * 1e-6,
+        wall,
+        statistics.steps,
+        due.misses,
+        due.skipped,
+        lateness.p99 * 1e-3,
+        lateness.max * 1e-3,
+        statistics.overruns,
+    )

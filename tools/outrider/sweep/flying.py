@@ -1,0 +1,40 @@
+"""What a worker does with a task: the flight, and of its summary what does not depend on the machine."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from outrider.runs.summary import Value
+from outrider.scenarios.scenario import Scenario
+from outrider.swarm import Prepared, measure
+from outrider.sweep.cells import scenario_of
+from outrider.sweep.tasks import Task
+from sitl.vehicle.config import VehicleConfig
+
+RUN = f"{__name__}:fly"
+"""How a worker finds `fly`."""
+
+
+def fly(task: Task) -> dict[str, Value]:
+    """Fly it without files. The same task gives the same summary."""
+    return measure(prepared(task), task.seed)
+
+
+def prepared(task: Task) -> Prepared:
+    """What the task flies."""
+    return Prepared(_scenario(task), _vehicle(task.vehicle))
+
+
+def _scenario(task: Task) -> Scenario:
+    # A scenario is the same for all seeds of its cell; a scene draws another for each.
+    return scenario_of(task) if task.is_scene else _fixed(task._replace(seed=0))
+
+
+@lru_cache(maxsize=64)
+def _fixed(task: Task) -> Scenario:
+    return scenario_of(task)
+
+
+@lru_cache(maxsize=64)
+def _vehicle(document: str) -> VehicleConfig:
+    return VehicleConfig.model_validate_json(document, strict=True)

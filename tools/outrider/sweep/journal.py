@@ -1,0 +1,168 @@
+"""The journal of a sweep: one JSON line for each finished run, appended and never changed.
+
+A line counts once its newline is there; what a kill tore off behind the last newline is cut away on resume.
+Each line is one write on a file opened to append, and reaches the disk at the latest `SYNC_S` later (as long
+as the sweep lives) or when the journal closes. The file is locked while a sweep uses it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple, cast, get_args
+
+from outrider.errors import InputError, OutriderError
+from outrider.sweep.sources import differences
+from outrider.sweep.tasks import Entry, Status
+
+FORMAT = 1
+SYNC_S = 1.0
+
+
+class Header(NamedTuple):
+    """The journal's first line: which sweep it is of (the hash of all its cells), and by which versions it
+    was flown."""
+
+    name: str
+    sweep: str
+    versions: dict[str, str]
+
+
+class Journal:
+    """An open, locked journal. ``entries`` holds the latest of each run, in no particular order."""
+
+    def __init__(self, descriptor: int, path: Path, entries: dict[tuple[str, int], Entry]) -> None:
+        self._descriptor = descriptor
+        self._path = path
+        self._synced = time.monotonic()
+        self._dirty = False
+        self.entries = entries
+
+    def append(self, entry: Entry) -> None:
+        """Write the line of a run that has ended. OutriderError if the disk does not take it."""
+        _write(self._descriptor, self._path, {"run": entry._asdict()})
+        self.entries[entry.run] = entry
+        self._dirty = True
+        self.settle()
+
+    def settle(self, at_once: bool = False) -> None:
+        """Bring to the disk what was written, if it is time."""
+        now = time.monotonic()
+        if self._dirty and (at_once or now - self._synced >= SYNC_S):
+            os.fsync(self._descriptor)
+            self._synced, self._dirty = now, False
+
+
+@contextmanager
+def opened(path: Path, header: Header) -> Iterator[Journal]:
+    """The journal at ``path``, made if it is not there. InputError if it is in use, is of another sweep or
+    other versions, or is damaged before its end; then it is left as it was."""
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be opened: {error.strerror}") from None
+    try:
+        _lock(descriptor, path)
+        data = path.read_bytes()
+        whole = data.rfind(b"\n") + 1
+        entries = _read(data[:whole], path, header)
+        if whole < len(data):
+            os.ftruncate(descriptor, whole)
+        if whole == 0:
+            _write(descriptor, path, {"journal": FORMAT, **header._asdict()})
+        os.fsync(descriptor)
+        journal = Journal(descriptor, path, entries)
+        try:
+            yield journal
+        finally:
+            journal.settle(at_once=True)
+    finally:
+        os.close(descriptor)
+
+
+def _lock(descriptor: int, path: Path) -> None:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        raise InputError(
+            f"{path.parent}: another sweep is running in this directory; allowed: one at a time"
+        ) from None
+
+
+def _write(descriptor: int, path: Path, line: Mapping[str, object]) -> None:
+    data = json.dumps(line, allow_nan=False, separators=(",", ":")).encode() + b"\n"
+    written = os.write(descriptor, data)
+    if written != len(data):
+        # The torn line is cut away on resume; nothing may be written behind it.
+        raise OutriderError(f"{path}: took only {written} of {len(data)} bytes; is the disk full?")
+
+
+def _read(data: bytes, path: Path, header: Header) -> dict[tuple[str, int], Entry]:
+    lines = data.split(b"\n")[:-1]
+    if not lines:
+        return {}
+    _check(_parse(lines[0], path, 1), path, header)
+    entries: dict[tuple[str, int], Entry] = {}
+    for number, line in enumerate(lines[1:], 2):
+        entry = _entry(_parse(line, path, number).get("run"))
+        if entry is None:
+            raise _damaged(path, number)
+        entries[entry.run] = entry
+    return entries
+
+
+def _check(first: dict[str, Any], path: Path, header: Header) -> None:
+    if first.get("journal") != FORMAT:
+        raise InputError(
+            f"{path}:1: is no journal of format {FORMAT}; allowed: one that this version wrote, or another "
+            "--out"
+        )
+    if first.get("sweep") != header.sweep:
+        raise InputError(
+            f"{path}:1: is of another sweep ({first.get('name')}): its cells are not those of {header.name}; "
+            "allowed: the sweep that began it, or another --out"
+        )
+    before = first.get("versions")
+    if before != header.versions:
+        changed = differences(before if isinstance(before, dict) else {}, header.versions, "now")
+        raise InputError(
+            f"{path}:1: was flown with {', '.join(changed)}; its runs and new ones cannot be mixed; allowed: "
+            "the same versions, or another --out"
+        )
+
+
+def _parse(line: bytes, path: Path, number: int) -> dict[str, Any]:
+    try:
+        value = json.loads(line)
+    except (ValueError, RecursionError):
+        raise _damaged(path, number) from None
+    if not isinstance(value, dict):
+        raise _damaged(path, number)
+    return value
+
+
+def _entry(value: object) -> Entry | None:
+    """The entry of a line, None if it is none."""
+    match value:
+        case {
+            "key": str(key),
+            "seed": int(seed),
+            "status": str(status),
+            "what": None | str() as what,
+            "summary": None | dict() as summary,
+            "wall_s": int() | float() as wall_s,
+        } if status in get_args(Status) and (status == "done") == (summary is not None):
+            return Entry(key, seed, cast("Status", status), what, summary, float(wall_s))
+    return None
+
+
+def _damaged(path: Path, number: int) -> InputError:
+    return InputError(
+        f"{path}:{number}: is damaged, and not at the end, where a kill may tear a line; allowed: a whole "
+        "journal, or another --out"
+    )

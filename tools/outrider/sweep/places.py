@@ -1,0 +1,136 @@
+"""Random places that keep clear of each other: of vehicles, of a target that jumps, of obstacles.
+
+Each is drawn clear of those before it (random sequential addition); what finds no place is refused with a
+sentence. All in whole millimetres, so that what a file holds is what was checked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import JsonValue
+
+from outrider.errors import InputError
+from outrider.sweep.scenes import Scene
+
+Array = NDArray[np.float64]
+
+_BATCH, _ROUNDS = 32, 160
+"""Candidates that are tried at once, and how often, before a place is given up."""
+
+
+class Circles(NamedTuple):
+    """Places (n, 2) and radii (n,), m: points that obstacles keep clear of have radius 0. With ``hollow``,
+    inside is as good as outside."""
+
+    centres: Array
+    radii: Array
+    hollow: bool = False
+
+
+def scatter(random: np.random.Generator, scene: Scene, count: int, half: float, what: str) -> Array:
+    """Places (count, 3), m, in a square, no two nearer than ``apart`` seen from above."""
+    placed = np.empty((count, 3))
+    heights = _mm(random.uniform(*scene.height, size=count))
+    for k in range(count):
+        for _ in range(_ROUNDS):
+            found = _mm(random.uniform(-half, half, size=(_BATCH, 2)))
+            off = found[:, None] - placed[None, :k, :2]
+            free = np.flatnonzero((np.hypot(off[..., 0], off[..., 1]) >= scene.apart).all(axis=1))
+            if free.size:
+                placed[k] = *found[free[0]], heights[k]
+                break
+        else:
+            raise InputError(
+                f"{what} {k + 1} of {count} finds no place {scene.apart:g} m from the others in a square of "
+                f"{2 * half:.1f} m; allowed: less density, or less apart"
+            )
+    return placed
+
+
+def walk(random: np.random.Generator, jumps: int, length: float, extent: float) -> Array:
+    """Places (jumps + 1, 2) of the target, m: each ``length`` from the one before, all within ±``extent`` ≥
+    ``length``, so that a quarter of all directions leads to an allowed place at least."""
+    places = [np.zeros(2)]
+    while len(places) <= jumps:
+        angle = random.uniform(0.0, 2.0 * math.pi)
+        place = _mm(places[-1] + length * np.array([math.cos(angle), math.sin(angle)]))
+        if np.abs(place).max() <= extent:
+            places.append(place)
+    return np.array(places)
+
+
+def obstacles(
+    random: np.random.Generator,
+    scene: Scene,
+    counts: tuple[int, int],
+    extent: float,
+    kept: Sequence[Circles],
+    where: str,
+) -> list[JsonValue]:
+    """``counts`` of spheres, then posts, as they stand in a scenario; each ``clear`` of what is kept, and
+    with a ``gap`` to the others, in a square of ± ``extent`` m."""
+    placed = np.empty((0, 3))
+    found: list[JsonValue] = []
+    kinds = ((scene.spheres, counts[0], "sphere"), (scene.posts, counts[1], "post"))
+    for kind, count, word in kinds:
+        if kind is None:
+            continue
+        for k in range(count):
+            radius = float(_mm(random.uniform(*kind.radius)))
+            height = float(_mm(random.uniform(*kind.height)))
+            place = _free(random, radius, extent, scene, kept, placed)
+            if place is None:
+                raise InputError(
+                    f"{where}: {word} {k + 1} of {count} finds no place {scene.clear:g} m clear of starts, "
+                    f"goals and circles and {scene.gap:g} m from other obstacles in a square of "
+                    f"{2 * extent:.1f} m; allowed: fewer obstacles, less density, clear or gap"
+                )
+            placed = np.vstack([placed, [*place, radius]])
+            x, y = place.tolist()
+            found.append(
+                {"kind": "sphere", "at": [x, y, height], "radius": radius}
+                if word == "sphere"
+                else {"kind": "post", "at": [x, y], "radius": radius, "height": height}
+            )
+    return found
+
+
+def _free(
+    random: np.random.Generator,
+    radius: float,
+    extent: float,
+    scene: Scene,
+    kept: Sequence[Circles],
+    placed: Array,
+) -> Array | None:
+    """A place (2,) for an obstacle, m; None if none was found."""
+    for _ in range(_ROUNDS):
+        found = _mm(random.uniform(-extent, extent, size=(_BATCH, 2)))
+        ok = _apart(found, placed[:, :2]) - placed[:, 2] - radius >= scene.gap
+        free = ok.all(axis=1)
+        for circles in kept:
+            space = _apart(found, circles.centres) - circles.radii
+            if circles.hollow:
+                space = np.abs(space)
+            free &= (space - radius >= scene.clear).all(axis=1)
+        index = np.flatnonzero(free)
+        if index.size:
+            place: Array = found[index[0]]
+            return place
+    return None
+
+
+def _apart(points: Array, others: Array) -> Array:
+    """Distances (n, m) of points (n, 2) and others (m, 2), m."""
+    off = points[:, None] - others[None]
+    return np.asarray(np.hypot(off[..., 0], off[..., 1]))
+
+
+def _mm(values: Array | float) -> Array:
+    """Whole millimetres, and no negative zero."""
+    return np.asarray(np.round(values, 3) + 0.0)

@@ -1,0 +1,170 @@
+"""A scene file: how to draw random scenarios. One seed is one scenario; ``difficulty`` turns every dial at
+once, from its easy end to its hard end."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, JsonValue, model_validator
+
+from outrider.scenarios.part import Part, Share
+from outrider.sweep.grid import leaves
+from outrider.sweep.trouble import Trouble
+
+Metres = Annotated[float, Field(gt=0.0, le=200.0)]
+Span = tuple[Metres, Metres]
+"""Drawn evenly between the two."""
+Number = Annotated[int, Field(ge=0, le=500)]
+Amount = Annotated[float, Field(ge=0.0, le=50.0)]
+
+DECIDED = (
+    "name",
+    "task",
+    "vehicles",
+    "starts",
+    "target",
+    "obstacles",
+    "companion.task",
+    "companion.limits.v_max",
+    "companion.surface.radius",
+)
+"""Keys of a scenario that a scene decides, dotted."""
+
+
+class Density(Part):
+    """Vehicles for each 100 m² of the square in which they start."""
+
+    easy: float = Field(gt=0.0, le=4.0)
+    hard: float = Field(gt=0.0, le=4.0)
+
+
+class Speed(Part):
+    """Largest horizontal speed, m/s."""
+
+    easy: float = Field(ge=0.5, le=9.0)
+    hard: float = Field(ge=0.5, le=9.0)
+
+
+class PerVehicle(Part):
+    """How many, for each vehicle; the sum is rounded."""
+
+    easy: Amount
+    hard: Amount
+
+
+class Count(Part):
+    """How many; rounded."""
+
+    easy: Amount
+    hard: Amount
+
+
+class Distance(Part):
+    """m."""
+
+    easy: Metres
+    hard: Metres
+
+
+class Interval(Part):
+    """s; the hard end is the shorter."""
+
+    easy: float = Field(gt=0.0, le=600.0)
+    hard: float = Field(gt=0.0, le=600.0)
+
+
+class Things(Part):
+    """Obstacles of a kind: so many for each vehicle, or so many in all."""
+
+    per_vehicle: PerVehicle | None = None
+    count: tuple[Number, Number] | None = Field(
+        None, description="least and most, whatever the vehicles; drawn evenly"
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.per_vehicle is None) == (self.count is None):
+            raise ValueError("per_vehicle or count: one of them")
+        return self
+
+
+class Balls(Things):
+    """Spheres in the air."""
+
+    radius: Span = (0.5, 1.5)
+    height: Span = Field((3.0, 8.0), description="m above ground, of the centres")
+
+
+class Poles(Things):
+    """Posts on the ground."""
+
+    radius: Span = (0.2, 0.6)
+    height: Span = Field((8.0, 20.0), description="m above ground, of the tops")
+
+
+class Jumps(Part):
+    """A target that is suddenly elsewhere, several times; the first time at the goal event."""
+
+    count: Count
+    length: Distance = Field(description="m, of each jump")
+    every_s: Interval
+
+
+class Scene(Part):
+    """How a scenario is drawn. All distances between places are horizontal, so that taking off and landing is
+    as clear as flying."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,50}$")
+    description: str = ""
+    task: Literal["goto", "escort"] = Field(
+        description="goto: everyone to an own place; escort: a target that jumps"
+    )
+    vehicles: tuple[Annotated[int, Field(ge=2, le=200)], Annotated[int, Field(ge=2, le=200)]] = Field(
+        description="least and most; drawn evenly"
+    )
+    difficulty: Share = Field(0.5, description="0 turns every dial to its easy end, 1 to its hard end")
+    density: Density
+    speed: Speed
+    height: Span = Field((4.0, 6.0), description="m above ground, of starts and goals")
+    apart: float = Field(4.0, ge=0.5, le=50.0, description="m between any two starts, and any two goals")
+    clear: float = Field(
+        3.5, ge=0.0, le=50.0, description="m from starts, goals and circles to the surface of obstacles"
+    )
+    gap: float = Field(3.0, ge=0.0, le=50.0, description="m between the surfaces of obstacles")
+    spheres: Balls | None = None
+    posts: Poles | None = None
+    jumps: Jumps | None = Field(None, description="of the target, in an escort")
+    trouble: Trouble | None = Field(None, description="what goes wrong, drawn too")
+    scenario: dict[str, JsonValue] = Field({}, description="anything else of the scenarios that are drawn")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Scene:
+        dials: list[tuple[str, Density | Speed | PerVehicle | Count | Distance]] = [
+            ("density", self.density),
+            ("speed", self.speed),
+        ]
+        spans: list[tuple[str, tuple[float, float]]] = [("vehicles", self.vehicles), ("height", self.height)]
+        for name, kind in (("spheres", self.spheres), ("posts", self.posts)):
+            if kind is not None:
+                if kind.per_vehicle is not None:
+                    dials.append((f"{name}.per_vehicle", kind.per_vehicle))
+                if kind.count is not None:
+                    spans.append((f"{name}.count", kind.count))
+                spans += [(f"{name}.radius", kind.radius), (f"{name}.height", kind.height)]
+        if self.jumps is not None:
+            dials += [("jumps.count", self.jumps.count), ("jumps.length", self.jumps.length)]
+            if self.jumps.every_s.hard > self.jumps.every_s.easy:
+                raise ValueError("jumps.every_s: hard must not be longer than easy")
+        for name, dial in dials:
+            if dial.hard < dial.easy:
+                raise ValueError(f"{name}: hard must not be less than easy")
+        for name, span in spans:
+            if span[1] < span[0]:
+                raise ValueError(f"{name}: the second must not be less than the first")
+        if (self.jumps is not None) != (self.task == "escort"):
+            raise ValueError("jumps belong to task 'escort', and task 'escort' needs them")
+        for key in leaves(self.scenario):
+            for decided in DECIDED:
+                if f"{key}.".startswith(f"{decided}."):
+                    raise ValueError(f"scenario: {decided} is for the scene to decide; it cannot be given")
+        return self

@@ -1,0 +1,100 @@
+"""A Dask scheduler's address, and the client that speaks with it."""
+
+from __future__ import annotations
+
+import logging
+import re
+import warnings
+from threading import Thread
+from typing import Any
+
+from outrider.errors import InputError
+from outrider.sweep.sources import version_of
+
+CONNECT_S = 5.0
+_ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})")
+
+
+def connected(address: str) -> Any:
+    """A `distributed.Client` of the scheduler at ``address``. InputError if there is none."""
+    found = _ADDRESS.fullmatch(address)
+    if found is None or not 0 < int(found["port"]) < 65536:
+        raise InputError(
+            f"--scheduler {address}: is no address; allowed: tcp://HOST:PORT, or tls://HOST:PORT"
+        )
+    if address.startswith("tls:") and not _has_tls():
+        raise InputError(
+            f"--scheduler {address}: there are no certificates for TLS here; allowed: Dask's own settings "
+            "distributed.comm.tls.ca-file, .client.cert and .client.key, all three "
+            "(DASK_DISTRIBUTED__COMM__TLS__CA_FILE and so on)"
+        )
+    ended: list[Any] = []
+    # In a thread, as Dask waits for ever for a first word that is none of its protocol.
+    thread = Thread(target=_connect, args=(address, ended), daemon=True)
+    thread.start()
+    thread.join(2 * CONNECT_S)
+    if ended and not isinstance(ended[0], Exception):
+        return ended[0]
+    if ended and isinstance(ended[0], InputError):
+        raise ended[0]
+    if ended and isinstance(ended[0], OSError):
+        why = "nobody answers there"
+    elif ended:
+        why = (
+            f"no Dask scheduler answers there ({type(ended[0]).__name__}: {' '.join(str(ended[0]).split())})"
+        )
+    else:
+        why = "whoever answers there is no Dask scheduler"
+    raise InputError(
+        f"--scheduler {address}: {why}; allowed: the address that `dask scheduler` says when it starts"
+    )
+
+
+def _check_alike(client: Any, address: str) -> None:
+    """InputError if the scheduler has not the Dask that is here."""
+    there = client.sync(client.scheduler.versions, callback_timeout=CONNECT_S)
+    theirs, ours = there["packages"]["distributed"], version_of("distributed")
+    if theirs != ours:
+        raise InputError(
+            f"--scheduler {address}: has distributed {theirs} (here {ours}); allowed: the same there and here"
+        )
+
+
+def _has_tls() -> bool:
+    from distributed.security import Security
+
+    try:
+        settings = Security().get_connection_args("client")  # type: ignore[no-untyped-call]
+    except OSError as error:
+        # A file that is not there, or that is no certificate.
+        raise InputError(
+            f"--scheduler: the files of Dask's settings distributed.comm.tls cannot be used: {error}"
+        ) from None
+    return settings["ssl_context"] is not None
+
+
+def _connect(address: str, ended: list[Any]) -> None:
+    """Put into ``ended`` the client, or what it raised."""
+    from distributed import Client
+    from distributed.versions import VersionMismatchWarning
+
+    # What Dask would say of connections that come and go the sweep says itself.
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    # Which versions a worker has is looked at when it comes.
+    warnings.simplefilter("ignore", VersionMismatchWarning)
+    try:
+        client = Client(  # type: ignore[no-untyped-call]
+            address, timeout=CONNECT_S, set_as_default=False, name="outrider-sweep"
+        )
+    except Exception as error:
+        # Whatever it is that speaks there.
+        ended.append(error)
+        return
+    try:
+        _check_alike(client, address)
+    except Exception as error:
+        client.close()  # type: ignore[no-untyped-call]
+        ended.append(error)
+    else:
+        ended.append(client)

@@ -1,0 +1,106 @@
+"""What goes wrong in a drawn scenario: sensors, links, wind, clocks, companions that hang or vanish, a swarm
+that is cut in two.
+
+Numbers and times are drawn evenly within their bounds; loss, delay and jitter as least + (most − least)·x³
+with x even, for where nearly everything is lost nobody moves, and little is tried.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, JsonValue, model_validator
+
+from companion.config.certified import CertifiedConfig
+from outrider.scenarios.part import FIRST_SYSTEM, Part, Share
+
+Milliseconds = Annotated[float, Field(ge=0.0, le=5_000.0)]
+Seconds = Annotated[float, Field(gt=0.0, le=120.0)]
+_KNOT_US = CertifiedConfig().dt_us
+Few = Annotated[int, Field(ge=0, le=20)]
+
+
+class Trouble(Part):
+    """Bounds: least and most of what the swarm's links, the air, the clocks and the companions may suffer."""
+
+    sensors: tuple[Literal["truth", "rtk", "gnss", "sih"], ...] = Field(
+        ("rtk",), min_length=1, description="one of"
+    )
+    loss: tuple[Share, Share] = (0.0, 0.0)
+    delay_ms: tuple[Milliseconds, Milliseconds] = (20.0, 20.0)
+    jitter_ms: tuple[Milliseconds, Milliseconds] = (0.0, 0.0)
+    duplication: tuple[Share, Share] = (0.0, 0.0)
+    reordering: tuple[Share, Share] = (0.0, 0.0)
+    wind: Annotated[float, Field(ge=0.0, le=20.0)] = Field(0.0, description="m/s at most, from anywhere")
+    clock_ms: Milliseconds = Field(1.0, description="each clock differs by so much at most")
+    fitting_epochs: Share = Field(
+        0.75, description="how often a certified fleet's epoch is long enough for its links"
+    )
+    partitions: tuple[Few, Few] = Field((0, 0), description="how often the swarm is cut in two")
+    freezes: tuple[Few, Few] = Field((0, 0), description="how many companions hang for a while")
+    vanishes: tuple[Few, Few] = Field((0, 0), description="how many companions vanish for good")
+    within_s: Seconds = Field(8.0, description="all of it begins so long after the goal event at most")
+    for_s: tuple[Seconds, Seconds] = (0.5, 4.0)
+
+    @model_validator(mode="after")
+    def _order(self) -> Self:
+        for name in Trouble.model_fields:
+            span = getattr(self, name)
+            if name != "sensors" and isinstance(span, tuple) and span[1] < span[0]:
+                raise ValueError(f"{name}: the second must not be less than the first")
+        return self
+
+
+def strike(trouble: Trouble, count: int, random: np.random.Generator) -> dict[str, JsonValue]:
+    """What happens to a fleet of ``count``, as part of a scenario file."""
+
+    def drawn(span: tuple[float, float]) -> float:
+        return round(float(random.uniform(*span)), 4)
+
+    def bad(span: tuple[float, float]) -> float:
+        return round(float(span[0] + (span[1] - span[0]) * random.uniform() ** 3), 4)
+
+    def many(span: tuple[int, int], most: int) -> int:
+        return min(int(random.integers(span[0], span[1] + 1)), most)
+
+    document: dict[str, JsonValue] = {"sensors": str(random.choice(trouble.sensors))}
+    loss, delay_ms, jitter_ms = (bad(span) for span in (trouble.loss, trouble.delay_ms, trouble.jitter_ms))
+    if trouble.fitting_epochs > random.uniform():
+        # As whoever sets the fleet up would: no shorter than a plan takes to arrive.
+        epochs = max(int(np.ceil((delay_ms + jitter_ms) / (1e-3 * _KNOT_US))), 1)
+        document["companion"] = {"certified": {"epoch_us": _KNOT_US * epochs}}
+    document["links"] = {
+        "swarm": {
+            "loss": loss,
+            "delay_ms": delay_ms,
+            "jitter_ms": jitter_ms,
+            "duplication": drawn(trouble.duplication),
+            "reordering": drawn(trouble.reordering),
+        }
+    }
+    speed, course = drawn((0.0, trouble.wind)), float(random.uniform(-np.pi, np.pi))
+    document["weather"] = {
+        "wind": [round(float(speed * np.cos(course)), 4), round(float(speed * np.sin(course)), 4), 0.0]
+    }
+    document["clocks"] = {"offset_ms": trouble.clock_ms}
+    order = [FIRST_SYSTEM + int(k) for k in random.permutation(count)]
+    freezes, vanishes = many(trouble.freezes, count // 2), many(trouble.vanishes, count // 2)
+    faults: list[JsonValue] = []
+    for system in order[:freezes]:
+        at_s, for_s = drawn((0.1, trouble.within_s)), drawn(trouble.for_s)
+        faults.append({"kind": "freeze", "vehicle": system, "at_s": at_s, "for_s": for_s})
+    faults += [
+        {"kind": "vanish", "vehicle": system, "at_s": drawn((0.1, trouble.within_s))}
+        for system in order[freezes : freezes + vanishes]
+    ]
+    document["faults"] = faults
+    partitions: list[JsonValue] = []
+    begins = 0.1
+    for _ in range(many(trouble.partitions, 20)):
+        begins, lasts = begins + drawn((0.0, trouble.within_s)), drawn(trouble.for_s)
+        members = sorted(order[: int(random.integers(1, count))])
+        partitions.append({"at_s": round(begins, 4), "for_s": lasts, "members": [*members]})
+        begins += lasts
+    document["partitions"] = partitions
+    return document

@@ -1,0 +1,30 @@
+"""A bar on standard error for what is no flight; without a terminal a line now and then."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from outrider.terminal.progress_lines import ProgressLines
+
+
+@contextmanager
+def share_progress() -> Iterator[Callable[[str, float], None]]:
+    """A bar for what is no flight; the callable takes what is done now and the share that is done."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=1.0)
+        lines = ProgressLines()
+
+        def watch(what: str, share: float) -> None:
+            if console.is_terminal:
+                bar.update(task, description=escape(what), completed=share)
+            else:
+                lines.say(lambda: f"{what}: {100.0 * share:.0f} %")
+
+        yield watch

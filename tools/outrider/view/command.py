@@ -1,0 +1,115 @@
+"""``outrider view``: a run that is played, or vehicles that are listened to."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from mavlink_bridge.clocks.clock import WallClock
+from mavlink_bridge.errors import EndpointError, LinkError, LogError
+from mavlink_bridge.links.endpoints import Endpoint, Multicast, UdpIn, UdpOut, parse_endpoint
+from mavlink_bridge.links.opening import open_link
+from outrider.errors import InputError
+from outrider.interruption import noted
+from outrider.scenarios.scenario import TARGET_SYSTEM
+from outrider.terminal.console import share_progress
+from outrider.view.listener import Listener
+from outrider.view.page_server import Theatre
+from outrider.view.player import Player, load
+from outrider.view.recording import html
+from outrider.view.source import Source
+
+_ALLOWED: Final = (
+    "allowed: a run directory, or endpoints that are listened to: udpin:HOST:PORT, mcast:, tcp:HOST:PORT, "
+    "/dev/DEVICE,BAUD, tlog:PATH"
+)
+
+
+class Terms(NamedTuple):
+    """How it is shown. ``seconds`` of wall time until it ends by itself."""
+
+    host: str = "127.0.0.1"
+    port: int = 8080
+    target: int = TARGET_SYSTEM
+    html: Path | None = None
+    seconds: float | None = None
+
+
+def view(sources: Sequence[str], terms: Terms) -> int:
+    """Until Ctrl-C, SIGTERM, or the time is over; the exit status. InputError for what cannot be shown."""
+    if len(sources) == 1 and ":" not in sources[0] and not sources[0].startswith("/dev/"):
+        with share_progress() as watch:
+            player = load(Path(sources[0]), watch)
+        if terms.html is not None:
+            return _write(player, terms.html)
+        return _serve(player, terms, "plays")
+    if terms.html is not None:
+        raise InputError(
+            f"--html {terms.html}: of what is still going on there is no whole; allowed: a run directory"
+        )
+    with ExitStack() as opened:
+        return _serve(_listening(sources, terms, opened), terms, "listens, and sends nothing:")
+
+
+def _listening(sources: Sequence[str], terms: Terms, opened: ExitStack) -> Listener:
+    clock = WallClock()
+    places, links = [], []
+    for text in sources:
+        try:
+            place = parse_endpoint(text)
+            if isinstance(place, UdpOut) or (isinstance(place, UdpIn) and place.peer is not None):
+                raise InputError(f"view {text}: a view sends nothing; {_ALLOWED}")
+            link = open_link(place, clock)
+        except EndpointError as error:
+            raise InputError(f"view {error}" if ":" in text else f"view {text}: {_ALLOWED}") from None
+        except (LinkError, LogError) as error:
+            raise InputError(f"view {error}") from None
+        opened.callback(link.close)
+        places.append(place)
+        links.append(link)
+    hint = f"Listening at {', '.join(map(str, places))}; nothing is sent."
+    return Listener(links, [_whole(place) for place in places], terms.target, hint)
+
+
+def _whole(place: Endpoint) -> bool:
+    return isinstance(place, UdpIn | Multicast)
+
+
+def _serve(source: Source, terms: Terms, does: str) -> int:
+    with _quiet(), noted((signal.SIGINT, signal.SIGTERM)) as stopped:
+        try:
+            theatre = Theatre(terms.host, terms.port)
+        except OSError as error:
+            raise InputError(f"--host {terms.host}, --port {terms.port}: {error.strerror or error}") from None
+        sys.stderr.write(f"outrider view {does} {theatre.url} shows it; Ctrl-C ends it\n")
+        until = None if terms.seconds is None else time.monotonic() + terms.seconds
+        theatre.run(source, lambda: bool(stopped) or (until is not None and time.monotonic() > until))
+        theatre.stop()
+    return 0
+
+
+def _write(player: Player, path: Path) -> int:
+    """The run as one file; the exit status. InputError if there is a file already, or none can be there."""
+    if path.exists():
+        raise InputError(f"--html {path}: is there already; allowed: a new file")
+    if not path.parent.is_dir():
+        raise InputError(f"--html {path}: there is no directory {path.parent}")
+    with _quiet(), share_progress() as watch:
+        text = html(player, watch)
+    path.write_text(text, encoding="utf-8")
+    sys.stdout.write(f"{path}\n")
+    return 0
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Standard output is for scripts, and the server would say there that it stopped."""
+    with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
+        yield

@@ -1,0 +1,37 @@
+"""What is to be seen of a companion, without touching it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.flight.guard import Holding
+from companion.node import Companion
+from companion.values.phase import Phase
+from outrider.view.snapshot import NO_PLAN, Single, State, padded
+
+_HELD = {Holding.HELD: ", old plan", Holding.BRAKING: ", braking"}
+MODES = tuple(phase.value + held for phase in Phase for held in ("", *_HELD.values()))
+"""All that a companion may be doing, in words."""
+
+
+class Glimpse(NamedTuple):
+    """Its ``state``, and the plan (KNOTS, 6) that it flies."""
+
+    state: State
+    plan: Single
+
+
+def glimpse(companion: Companion, now: int) -> Glimpse:
+    """Of ``companion`` at ``now`` (µs)."""
+    horizon, phase = companion.flown, companion.pilot.phase
+    ages = companion.world.neighbours.ages(now)
+    mode = phase.value + (_HELD.get(companion.guard.state, "") if phase is Phase.ESCORT else "")
+    state = State(
+        mode,
+        1e-6 * max(max(ages.values()), 0) if ages else np.nan,
+        np.nan if companion.last_spent is None else 1e-6 * companion.last_spent,
+        companion.held,
+    )
+    return Glimpse(state, NO_PLAN if horizon is None else padded(horizon.knots[:, :6]))

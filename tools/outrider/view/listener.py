@@ -1,0 +1,202 @@
+"""Vehicles somewhere, as their MAVLink tells of them. Nothing is ever sent."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.avoidance.certified.committed import horizon_of
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.frames import FleetFrame, ned_to_enu, yaw_to_enu
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, NamedValue, Tunnel
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
+from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
+from outrider.sitl_server.modes import is_armed, told_mode
+from outrider.view.scene import LEAST_REACH, Scene
+from outrider.view.snapshot import NO_PLAN, Array, Moment, Single, State, euler_attitude, padded
+from outrider.view.view_commands import Wishes
+
+LOST, CARRIED, FRESH = 10.0, 0.5, 1.0
+"""s after which a vehicle unheard of is no longer shown; for which it is carried on at its velocity; for
+which attitudes and plans count."""
+PICTURE, NEW_SCENE = 0.04, 1.0
+"""s between two moments, and between two scenes."""
+MOST = 250
+_ACCEPTED = {0, 30, 33, 251, 385}
+"""HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, NAMED_VALUE_FLOAT, TUNNEL."""
+_AUTOPILOT, _SAMPLES = 1, 101
+
+
+class _Fix(NamedTuple):
+    at: float
+    place: Array
+    velocity: Array
+    yaw: float | None
+
+
+class _Heard:
+    """All that one system has said. Times are s on the wall."""
+
+    def __init__(self, fix: _Fix) -> None:
+        self.fix = fix
+        self.leant = -np.inf
+        self.attitude: Array | None = None
+        self.planned = -np.inf
+        self.plan: Single = NO_PLAN
+        self.beat: Heartbeat | None = None
+        self.plan_ms = float("nan")
+        self.held: int | None = None
+
+    def flown(self, wall: float) -> Single:
+        """The plan (KNOTS, 6), if it is fresh and its vehicle has not said that it is disarmed."""
+        idle = self.beat is not None and not is_armed(self.beat)
+        return NO_PLAN if idle or wall - self.planned >= FRESH else self.plan
+
+    @property
+    def mode(self) -> str:
+        """As its autopilot told it; empty before."""
+        return "" if self.beat is None else told_mode(self.beat)
+
+
+class Listener:
+    """The ``Source`` that hears ``links``. ``whole``: for each, whether what arrives are datagrams.
+    ``target``: the system id of what is escorted."""
+
+    span: tuple[float, float] | None = None
+    begin = Wishes()
+
+    def __init__(self, links: Sequence[Link], whole: Sequence[bool], target: int, hint: str) -> None:
+        self._links = [
+            (link, datagrams, Codec(lambda identifier, _system, _component: identifier in _ACCEPTED))
+            for link, datagrams in zip(links, whole, strict=True)
+        ]
+        self._target = target
+        self.hint = hint
+        self._frame: FleetFrame | None = None
+        self._heard: dict[int, _Heard] = {}
+        self._offsets: deque[Array] = deque(maxlen=_SAMPLES)
+        self._step: float | None = None
+        self._certified = False
+        self._shown: tuple[tuple[int, ...], bool] = (), False
+        self._scene_at = self._begun = self._next = -np.inf
+
+    def poll(self, wall: float) -> Sequence[Scene | Moment]:
+        """A scene when there is somebody new, and a moment as often as one can be seen."""
+        for link, datagrams, codec in self._links:
+            for data in link.receive():
+                for message in codec.feed(data, whole=datagrams):
+                    self._hear(wall, message)
+        systems = tuple(sorted(system for system in self._heard if system != self._target))
+        if not systems or wall < self._next:
+            return ()
+        self._next = wall + PICTURE
+        found: list[Scene | Moment] = []
+        new = systems, self._certified
+        if new != self._shown and wall - self._scene_at > NEW_SCENE:
+            self._shown, self._scene_at = new, wall
+            self._begun = wall if not np.isfinite(self._begun) else self._begun
+            found.append(self._scene(systems))
+        if self._shown[0]:
+            found.append(self._moment(wall))
+        return found
+
+    def wish(self, wishes: Wishes, sought: float | None) -> None:
+        """Nobody is told."""
+
+    def _hear(self, wall: float, message: Message) -> None:
+        system, component = message.source
+        if isinstance(message, GlobalPosition):
+            self._place(wall, system, component, message)
+            return
+        heard = self._heard.get(system)
+        if heard is None:
+            return
+        if isinstance(message, Attitude):
+            heard.leant = wall
+            heard.attitude = euler_attitude(message.roll, message.pitch, message.yaw)
+        elif isinstance(message, Heartbeat):
+            if component == _AUTOPILOT:
+                heard.beat = message
+        elif isinstance(message, NamedValue):
+            if message.name == "plan_ms":
+                heard.plan_ms = message.value
+            elif message.name == "held":
+                heard.held = int(message.value)
+        elif isinstance(message, Tunnel):
+            self._tunnel(wall, heard, message)
+
+    def _place(self, wall: float, system: int, component: int, said: GlobalPosition) -> None:
+        if self._frame is None:
+            self._frame = FleetFrame(said.latitude, said.longitude, said.altitude - said.relative_altitude)
+        velocity = ned_to_enu(said.velocity_ned)
+        place = self._frame.to_enu(said.latitude, said.longitude, said.altitude)
+        fix = _Fix(wall, place, velocity, None if said.yaw is None else yaw_to_enu(said.yaw))
+        heard = self._heard.get(system)
+        if heard is not None:
+            heard.fix = fix
+        elif len(self._heard) < MOST:
+            self._heard[system] = _Heard(fix)
+
+    def _tunnel(self, wall: float, heard: _Heard, said: Tunnel) -> None:
+        """A plan, in a frame whose origin nobody told: on average it begins where its vehicle is."""
+        self._certified |= said.payload_type == ROSTER
+        if said.payload_type != PAYLOAD_TYPE:
+            return
+        try:
+            plan = unpack(said.payload)
+        except PlanWireError:
+            return
+        knots = horizon_of(plan).knots[:, :6].copy()
+        self._step = 1e-6 * plan.dt
+        self._offsets.append(heard.fix.place - knots[0, :3])
+        knots[:, :3] += np.median(np.array(self._offsets), axis=0)
+        heard.planned, heard.plan = wall, padded(knots)
+
+    def _scene(self, systems: tuple[int, ...]) -> Scene:
+        places = np.array([self._heard[system].fix.place for system in systems])
+        low, high = places.min(axis=0), places.max(axis=0)
+        x, y, z = (0.5 * (low + high)).tolist()
+        return Scene(
+            "listening",
+            systems,
+            len(systems),
+            centre=(x, y, z),
+            reach=max(0.75 * float(np.linalg.norm(high - low)), 2.0 * LEAST_REACH),
+            follows=True,
+            step_s=self._step if self._certified else None,
+        )
+
+    def _moment(self, wall: float) -> Moment:
+        shown = [self._heard[system] for system in self._shown[0]]
+        target = self._heard.get(self._target)
+        return Moment(
+            wall - self._begun,
+            "live",
+            np.array([_carried(one.fix, wall) for one in shown], np.float32),
+            np.array([_turned(one, wall) for one in shown], np.float32),
+            np.array([one.flown(wall) for one in shown]),
+            np.array(np.full(3, np.nan) if target is None else _carried(target.fix, wall), np.float32),
+            np.empty((0, 3), np.float32),
+            tuple(State(one.mode, wall - one.fix.at, one.plan_ms, one.held) for one in shown),
+        )
+
+
+def _carried(fix: _Fix, wall: float) -> Array:
+    """Where it is by now; nowhere if nothing has been heard of it for long."""
+    age = wall - fix.at
+    if age > LOST:
+        return np.full(3, np.nan)
+    place: Array = fix.place + min(age, CARRIED) * fix.velocity
+    return place
+
+
+def _turned(heard: _Heard, wall: float) -> Array:
+    if heard.attitude is not None and wall - heard.leant < FRESH:
+        return heard.attitude
+    half = 0.5 * (heard.fix.yaw or 0.0)
+    return np.array([np.cos(half), 0.0, 0.0, np.sin(half)])

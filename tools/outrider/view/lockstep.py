@@ -1,0 +1,79 @@
+"""A lock-step flight for the view: its moments as they come, and what is wished of it."""
+
+from __future__ import annotations
+
+import pickle
+import time
+
+import numpy as np
+
+from mavlink_bridge.frames import ned_to_enu
+from outrider.simulation.flight import EPOCH, Flight
+from outrider.view.companion_snapshot import glimpse
+from outrider.view.datagram_channel import Line
+from outrider.view.orders import Change, Orders
+from outrider.view.pace import Pace
+from outrider.view.snapshot import Moment, enu_attitude
+from outrider.view.view_commands import LOSSY, Wishes, decoded
+
+PICTURE = 0.04
+"""s of wall time between two moments that are told."""
+
+
+class LockStepView:
+    """The ``Onlooker`` of one flight, at one end of ``line``; what is changed by hand goes into
+    ``orders``."""
+
+    def __init__(self, line: Line, pace: Pace | None = None) -> None:
+        self._line = line
+        self._pace = Pace() if pace is None else pace
+        self._next = 0.0
+        self.orders = Orders()
+
+    def __call__(self, flight: Flight, now: int) -> None:
+        wall = time.monotonic()
+        if wall >= self._next:
+            self._next = wall + PICTURE
+            self._line.send(pickle.dumps(moment(flight, now), pickle.HIGHEST_PROTOCOL))
+            self._listen(flight, now)
+        self._pace.wait(now, lambda: self._listen(flight, now))
+
+    def _listen(self, flight: Flight, now: int) -> None:
+        for data in self._line.receive():
+            wishes = decoded(data)
+            if wishes is None:
+                continue
+            self._pace.receive(wishes, now)
+            start = flight.conductor.clock_start
+            change = self.orders.new(wishes, None if start is None else 1e-6 * (now - start))
+            if change is not None:
+                obey(flight, now, change)
+
+
+def moment(flight: Flight, now: int) -> Moment:
+    """What is to be seen of ``flight`` at ``now`` (µs). Nothing in it is touched."""
+    start, autopilots = flight.conductor.clock_start, flight.autopilots
+    seen = [glimpse(companion, now) for companion in flight.companions]
+    _, _, target = flight.truth.latest()
+    moving = [one.motion(now).position for one in flight.moving]
+    return Moment(
+        1e-6 * (now - (EPOCH if start is None else start)),
+        flight.conductor.stage.value,
+        ned_to_enu(np.array([a.state.position for a in autopilots])).astype(np.float32),
+        enu_attitude(np.array([a.state.attitude for a in autopilots])).astype(np.float32),
+        np.array([one.plan for one in seen]),
+        np.full(3, np.nan, np.float32) if target is None else target.astype(np.float32),
+        np.array(moving, dtype=np.float32).reshape(-1, 3),
+        tuple(one.state for one in seen),
+    )
+
+
+def obey(flight: Flight, now: int, change: Change) -> None:
+    """Let ``change`` happen at ``now`` (µs)."""
+    if change.methods is not None:
+        for companion in flight.companions[: flight.scenario.vehicles]:
+            companion.use(Wishes(methods=change.methods).method_names)
+    if change.loss is not None:
+        flight.ether.lose(LOSSY, change.loss)
+    if change.target is not None:
+        flight.target.move(now, np.array(change.target))

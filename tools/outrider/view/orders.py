@@ -1,0 +1,51 @@
+"""What was changed by hand while a simulation flew: each change once, and a record of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from outrider.view.view_commands import Wishes
+
+FILE = "orders.json"
+"""In the run directory, if there were any."""
+
+
+class Change(NamedTuple):
+    """Those of ``Wishes`` that are new, None for the others."""
+
+    methods: str | None = None
+    loss: float | None = None
+    target: tuple[float, float, float] | None = None
+
+
+class Orders:
+    """Of one flight; ``given``: (s after the goal event or None before it, the change)."""
+
+    def __init__(self) -> None:
+        self.given: list[tuple[float | None, Change]] = []
+        self._last = Wishes()
+
+    def new(self, wishes: Wishes, seconds: float | None) -> Change | None:
+        """What of ``wishes`` is new; None if nothing is."""
+        last, self._last = self._last, wishes
+        change = Change(
+            wishes.methods if wishes.methods != last.methods else None,
+            wishes.loss if wishes.loss != last.loss else None,
+            wishes.target if wishes.moves > last.moves else None,
+        )
+        if change == Change():
+            return None
+        self.given.append((seconds, change))
+        return change
+
+    def write(self, directory: Path) -> None:
+        """Leave them in ``directory``, if there are any."""
+        if self.given:
+            rows = [
+                {"time_s": None if seconds is None else round(seconds, 3)}
+                | {name: value for name, value in change._asdict().items() if value is not None}
+                for seconds, change in self.given
+            ]
+            (directory / FILE).write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

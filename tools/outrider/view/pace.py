@@ -1,0 +1,66 @@
+"""How fast a simulation goes: as fast as it can, but for what a view that is still there wishes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from outrider.view.view_commands import Wishes
+
+LEASE = 2.0
+"""s for which a wish counts after it was said."""
+STEP = 100_000
+"""µs of a single step."""
+_NAP = 0.02
+
+
+class Pace:
+    """``clock`` (s) and ``nap`` are the wall's."""
+
+    def __init__(
+        self, clock: Callable[[], float] = time.monotonic, nap: Callable[[float], None] = time.sleep
+    ) -> None:
+        self._clock, self._nap = clock, nap
+        self._wishes = Wishes()
+        self._said = -LEASE
+        self._steps: int | None = None
+        self._until = 0
+        self._anchor: tuple[float, int, float | None] | None = None
+
+    def receive(self, wishes: Wishes, now: int) -> None:
+        """A wish, while the simulation is at ``now`` (µs)."""
+        if self._steps is None:
+            self._steps = wishes.steps
+        if wishes.steps > self._steps:
+            self._until = max(self._until, now) + STEP * (wishes.steps - self._steps)
+            self._steps = wishes.steps
+        self._wishes, self._said = wishes, self._clock()
+
+    def wait(self, now: int, listen: Callable[[], None]) -> None:
+        """Before the simulation goes on from ``now`` (µs): as long as is wished. ``listen`` takes in what is
+        wished meanwhile."""
+        while (rest := self._rest(now)) > 0.0:
+            self._nap(min(rest, _NAP))
+            listen()
+
+    def _rest(self, now: int) -> float:
+        """s to wait, by what is wished at present."""
+        clock, wishes = self._clock(), self._wishes
+        if clock - self._said > LEASE:
+            self._anchor = None
+            return 0.0
+        if wishes.paused:
+            self._anchor = None
+            return 0.0 if now < self._until else _NAP
+        self._until = 0
+        if wishes.speed is None:
+            self._anchor = None
+            return 0.0
+        if self._anchor is None or self._anchor[2] != wishes.speed:
+            self._anchor = clock, now, wishes.speed
+        since, begin, speed = self._anchor
+        due = since + 1e-6 * (now - begin) / wishes.speed
+        if due < clock - 0.5:
+            # A simulation that cannot keep up is not hurried afterwards.
+            self._anchor = clock, now, speed
+        return due - clock

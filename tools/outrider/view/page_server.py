@@ -1,0 +1,92 @@
+"""The page: a server on this machine, with what a source gives."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable
+
+import viser
+
+from outrider.view.origin_check import guarded
+from outrider.view.panel import Panel
+from outrider.view.renderer import Stage
+from outrider.view.scene import Scene
+from outrider.view.snapshot import Moment
+from outrider.view.source import Source
+
+PICTURE = 1.0 / 30.0
+"""s between two pictures at least."""
+_SAY = 0.3
+"""s after which wishes are said again."""
+
+
+class Server(viser.ViserServer):
+    """Viser's, which calls nobody outside."""
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """There is none."""
+        return None
+
+
+class Theatre:
+    """Serves at ``host`` and ``port``, or at the next port that is free. ``url`` leads there."""
+
+    def __init__(self, host: str, port: int) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            with guarded(host):
+                self.server = Server(host=host, port=port, verbose=False)
+        here = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::", "::1") else host
+        self.url = f"http://{here}:{self.server.get_port()}"
+        self.server.gui.add_markdown("Nothing has come yet.")
+        self._stage: Stage | None = None
+        self._panel: Panel | None = None
+
+    def run(self, source: Source, over: Callable[[], bool]) -> None:
+        """Until it is over."""
+        said, last_wishes = 0.0, None
+        while not over():
+            wall = time.monotonic()
+            self.show(source, wall)
+            panel = self._panel
+            if panel is not None:
+                if source.span is None:
+                    panel.watch(bool(self.server.get_clients()))
+                sought, panel.sought = panel.sought, None
+                if panel.wishes != last_wishes:
+                    panel.head()
+                if sought is not None or panel.wishes != last_wishes or wall - said > _SAY:
+                    said, last_wishes = wall, panel.wishes
+                    source.wish(panel.wishes, sought)
+            time.sleep(max(PICTURE - (time.monotonic() - wall), 0.005))
+
+    def show(self, source: Source, wall: float) -> None:
+        """What is new at ``wall`` (s)."""
+        moments: list[Moment] = []
+        for one in source.poll(wall):
+            if isinstance(one, Scene):
+                self._set(one, source)
+                moments.clear()
+            else:
+                moments.append(one)
+        stage, panel = self._stage, self._panel
+        if stage is None or panel is None or not moments:
+            return
+        *past, last = moments
+        with self.server.atomic():
+            stage.show(last, tuple(past))
+            for moment in moments:
+                panel.see(moment)
+            panel.notice(last)
+            panel.show(last, wall, last.time if source.span is not None else None)
+
+    def _set(self, scene: Scene, source: Source) -> None:
+        self.server.scene.reset()
+        self.server.gui.reset()
+        self._stage = Stage(self.server, scene)
+        self._panel = Panel(self.server, self._stage, source.begin, source.span, source.hint)
+
+    def stop(self) -> None:
+        """Nobody is served any more."""
+        self.server.stop()

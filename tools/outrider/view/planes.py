@@ -1,0 +1,60 @@
+"""The planes that keep committed plans apart, worked out from the plans as the companions do."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.avoidance.certified.separating_planes import nearest
+from outrider.view.snapshot import Array, Single
+
+NEAR = 8.0
+"""m: vehicles further from each other than that have no need of a plane in the picture."""
+MOST = 16
+"""Planes in a picture: of more of them nobody sees anything."""
+
+
+class Plane(NamedTuple):
+    """Middles (n, 3), unit normals (n, 3), and how far (n,) apart the hulls are; n ≤ MOST, tightest first."""
+
+    middle: Array
+    normal: Array
+    gap: Array
+
+
+def between(plan: Single, step_s: float) -> Plane:
+    """For each pair of ``plan`` (K, KNOTS, 6), where its segments come nearest to each other."""
+    knots = plan.astype(np.float64)
+    place, velocity = knots[..., :3], knots[..., 3:]
+    # The control points of a segment with constant acceleration, (K, n, 3, 3).
+    controls = np.stack(
+        [place[:, :-1], place[:, :-1] + 0.5 * step_s * velocity[:, :-1], place[:, 1:]], axis=2
+    )
+    # The last knot is repeated: there the curve stays.
+    still = np.isclose(place[:, :-1], place[:, 1:]).all(axis=2)
+    controls[still] = place[:, :-1][still][:, None]
+    one, other = np.triu_indices(len(plan), 1)
+    close = np.linalg.norm(place[one, 0] - place[other, 0], axis=1) < NEAR
+    one, other = one[close], other[close]
+    if not len(one):
+        return Plane(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
+    relative = controls[one] - controls[other]
+    normals = nearest(relative.reshape(-1, 3, 3)).reshape(*relative.shape[:2], 3)
+    gaps = np.einsum("pnk,pnik->pni", normals, relative).min(axis=2)
+    worst = gaps.argmin(axis=1)
+    row = np.arange(len(one))
+    middle = 0.5 * (controls[one, worst] + controls[other, worst]).mean(axis=1)
+    gap = gaps[row, worst]
+    order = np.argsort(gap)[:MOST]
+    return Plane(middle[order], normals[row, worst][order], gap[order])
+
+
+def facing(normal: Array) -> Array:
+    """Quaternions (n, 4), w x y z, that turn z to ``normal`` (n, 3)."""
+    # Half-way between both: 1 + n·z and z × n.
+    result = np.stack([1.0 + normal[:, 2], -normal[:, 1], normal[:, 0], 0.0 * normal[:, 0]], axis=1)
+    length = np.linalg.norm(result, axis=1)
+    result[length < 1e-9] = (0.0, 1.0, 0.0, 0.0)
+    turned: Array = result / np.where(length < 1e-9, 1.0, length)[:, None]
+    return turned

@@ -1,0 +1,146 @@
+"""A run directory, played: to and fro, at any speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import nan
+from pathlib import Path
+
+import numpy as np
+
+from outrider.errors import Fault, InputError
+from outrider.export.arrays import Motion, Plans
+from outrider.export.run import read
+from outrider.resources import find
+from outrider.runs import names
+from outrider.scenarios.scenario import Scenario
+from outrider.view.recorded import Record, record
+from outrider.view.scene import SPAN, Scene, staged
+from outrider.view.snapshot import Moment, State
+from outrider.view.view_commands import Wishes
+from outrider.yaml_files.yaml_file import load as load_yaml
+from sitl.vehicle.config import VehicleConfig
+
+PAST, PAST_EVERY = 20.0, 0.2
+"""s before a time that was chosen, of which the trails are drawn anew, and how often."""
+FAST = 16.0
+"""Times real time, where somebody wishes as fast as it can."""
+_STEP = 0.1
+"""s"""
+
+Watch = Callable[[str, float], None]
+
+
+class Player:
+    """The ``Source`` that plays a run; it begins by itself. ``span`` (s after the goal event): from its first
+    sample to its last."""
+
+    def __init__(
+        self, scene: Scene, motion: Motion, records: Sequence[Record], plan_times: Plans | None
+    ) -> None:
+        self.scene, self._motion, self._records = scene, motion, records
+        self.span: tuple[float, float] = float(motion.time_s[0]), float(motion.time_s[-1])
+        self.begin = Wishes(speed=1.0)
+        self.hint = ""
+        self._spent = [_of(plan_times, system) for system in scene.systems]
+        self._wishes = self.begin
+        # Before that they only take off.
+        self._at = min(max(self.span[0], -1.0), self.span[1])
+        self._wall: float | None = None
+        self._told: float | None = None
+        self._sought = True
+
+    def poll(self, wall: float) -> Sequence[Scene | Moment]:
+        """The scene at first; then a moment whenever time has gone on."""
+        found: list[Scene | Moment] = []
+        if self._wall is None:
+            found.append(self.scene)
+            self._wall = wall
+        speed = FAST if self._wishes.speed is None else self._wishes.speed
+        if not self._wishes.paused:
+            self._at = min(self._at + speed * (wall - self._wall), self.span[1])
+        self._wall = wall
+        if self._sought:
+            self._sought = False
+            times = np.arange(max(self._at - PAST, self.span[0]), self._at, PAST_EVERY)
+            found += [self.moment(time) for time in times.tolist()]
+            self._told = None
+        if self._told != self._at:
+            self._told = self._at
+            found.append(self.moment(self._at))
+        return found
+
+    def wish(self, wishes: Wishes, sought: float | None) -> None:
+        """Pause, steps and speed."""
+        if wishes.paused and wishes.steps > self._wishes.steps:
+            self._at = min(self._at + _STEP * (wishes.steps - self._wishes.steps), self.span[1])
+        self._wishes = wishes
+        if sought is not None:
+            self._at = min(max(sought, self.span[0]), self.span[1])
+            self._sought = True
+
+    def moment(self, time: float) -> Moment:
+        """At ``time`` (s after the goal event): the sample before it, and what the logs say."""
+        motion = self._motion
+        row = max(int(np.searchsorted(motion.time_s, time, side="right")) - 1, 0)
+        now = int(motion.time[row])
+        return Moment(
+            time,
+            "before the goal" if time < 0.0 else "run",
+            motion.position[row],
+            np.array([self._attitude(row, k, now) for k in range(len(self.scene.systems))], np.float32),
+            np.array([one.plan(now) for one in self._records]),
+            motion.target[row],
+            motion.moving[row],
+            tuple(self._state(k, time, now) for k in range(len(self.scene.systems))),
+        )
+
+    def _attitude(self, row: int, k: int, now: int) -> np.ndarray:
+        """As the autopilot told; without, upright and turned as it truly was."""
+        told = self._records[k].attitude(now)
+        if told is not None:
+            return told
+        half = 0.5 * float(self._motion.yaw[row, k])
+        return np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
+
+    def _state(self, k: int, time: float, now: int) -> State:
+        record, (times, spent) = self._records[k], self._spent[k]
+        index = int(np.searchsorted(times, time, side="right")) - 1
+        return State(record.mode(now), record.age(now), spent[index] if index >= 0 else nan)
+
+
+def load(directory: Path, watch: Watch = lambda _what, _share: None) -> Player:
+    """The run in ``directory``. InputError if it is none, or was stopped before its motion was written."""
+    run = read(directory, "tlog:{}")
+    if run.scenario is None or run.motion is None or not len(run.motion.time_s):
+        wrong = "holds no flight.npz: it was stopped; allowed: a run that came to its end, or tlog:PATH"
+        raise InputError(Fault(str(directory), wrong))
+    scenario = run.scenario
+    scene = staged(scenario, run.seed, _span(scenario), frozenset({"pace"}))
+    paths = [directory / names.log(system) for system in scenario.systems]
+    whole = max(sum(path.stat().st_size for path in paths if path.exists()), 1)
+    records, done = [], 0
+    for system, path in zip(scenario.systems, paths, strict=True):
+
+        def at(read_bytes: int, name: str = path.name, before: int = done) -> None:
+            watch(name, (before + read_bytes) / whole)
+
+        records.append(record(path, system, at))
+        done += path.stat().st_size if path.exists() else 0
+    return Player(scene, run.motion, records, run.plan_times)
+
+
+def _span(scenario: Scenario) -> float:
+    try:
+        return float(load_yaml(find("vehicles", scenario.vehicle), VehicleConfig).span)
+    except InputError:
+        return SPAN
+
+
+def _of(plans: Plans | None, system: int) -> tuple[np.ndarray, np.ndarray]:
+    """When (s), and how long (ms), ``system`` planned."""
+    if plans is None:
+        return np.empty(0), np.empty(0)
+    own = plans.system == system
+    order = np.argsort(plans.time_s[own], kind="stable")
+    return plans.time_s[own][order], plans.value[own][order]

@@ -1,0 +1,41 @@
+"""The view as a process of its own: ``python -m outrider.view.process DESCRIPTOR HOST PORT``."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import signal
+import socket
+import sys
+
+from outrider.view.datagram_channel import Line
+from outrider.view.live import Live, Ready
+
+_GENTLE = 10
+"""Nice: whoever flies goes first."""
+
+
+def main(descriptor: int, host: str, port: int) -> None:
+    """Serve until the process that started this one is gone."""
+    parent = os.getppid()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with contextlib.suppress(OSError):
+        os.nice(_GENTLE)
+    line = Line(socket.socket(fileno=descriptor))
+    try:
+        from outrider.view.page_server import Theatre
+        from outrider.view.player import load
+
+        theatre = Theatre(host, port)
+    except Exception as error:
+        line.send(pickle.dumps(Ready(error=f"{type(error).__name__}: {error}")))
+        return
+    line.send(pickle.dumps(Ready(theatre.url)))
+    theatre.run(Live(line, load), lambda: os.getppid() != parent)
+    # Threads of the server may still talk to browsers: nobody waits for them.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), sys.argv[2], int(sys.argv[3]))

@@ -1,0 +1,119 @@
+"""What the logs of a run say beside where its vehicles were: plans, attitudes, modes, and who was heard
+when."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.avoidance.certified.committed import horizon_of
+from companion.flight.vehicle import HEARTBEAT_LOST
+from companion.values.components import AUTOPILOT
+from mavlink_bridge.errors import LogError, PlanWireError
+from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, Source, Tunnel
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
+from outrider.runs import names
+from outrider.sitl_server.modes import is_armed, told_mode
+from outrider.view.snapshot import NO_PLAN, Array, Single, euler_attitude, padded
+
+FRESH = 1_000_000
+"""µs for which a plan is shown after its epoch."""
+_DECODED = {0, 30, 33, 385}
+"""HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, TUNNEL."""
+_SWARM, _AUTOPILOT = names.LINK_NUMBERS["swarm"], names.LINK_NUMBERS["autopilot"]
+_OFTEN = 4096
+
+
+class Record(NamedTuple):
+    """Of one vehicle, by its own clock (Unix µs, rising): ``epochs`` and ``plans`` (KNOTS, 6); ``leant``
+    and the attitudes (4,), FLU in ENU, and ``beaten`` and its heartbeats, that its autopilot told; when each
+    other was ``heard``."""
+
+    epochs: list[int]
+    plans: list[Single]
+    leant: list[int]
+    attitudes: list[Array]
+    beaten: list[int]
+    beats: list[Heartbeat]
+    heard: dict[int, list[int]]
+
+    def plan(self, now: int) -> Single:
+        """Flown at ``now`` (µs); NaN if there is none that is fresh, and where the autopilot said that it is
+        disarmed."""
+        index = bisect_right(self.epochs, now) - 1
+        beat = self._beat(now)
+        idle = beat is not None and not is_armed(beat)
+        return NO_PLAN if idle or index < 0 or now - self.epochs[index] > FRESH else self.plans[index]
+
+    def mode(self, now: int) -> str:
+        """The autopilot's at ``now`` (µs), as it told it; empty where that is not known."""
+        beat = self._beat(now)
+        return "" if beat is None else told_mode(beat)
+
+    def attitude(self, now: int) -> Array | None:
+        """Told at ``now`` (µs), or shortly before."""
+        index = bisect_right(self.leant, now) - 1
+        return None if index < 0 or now - self.leant[index] > FRESH else self.attitudes[index]
+
+    def _beat(self, now: int) -> Heartbeat | None:
+        index = bisect_right(self.beaten, now) - 1
+        return None if index < 0 or now - self.beaten[index] > HEARTBEAT_LOST else self.beats[index]
+
+    def age(self, now: int) -> float:
+        """s, of what was heard of the other unheard of for longest; NaN if nobody was yet."""
+        last = [times[index - 1] for times in self.heard.values() if (index := bisect_right(times, now))]
+        return 1e-6 * (now - min(last)) if last else float("nan")
+
+
+def record(path: Path, owner: int, at: Callable[[int], None] = lambda _bytes: None) -> Record:
+    """Of the vehicle ``owner`` in the log at ``path``; ``at`` hears how many bytes have been read. What is
+    not there, or damaged, is left out."""
+    codec = Codec(lambda identifier, _system, _component: identifier in _DECODED)
+    found = Record([], [], [], [], [], [], {})
+    size = 0
+    try:
+        for number, one in enumerate(read_tlog(path)):
+            size += 8 + len(one.frame)
+            if number % _OFTEN == 0:
+                at(size)
+            if one.link in (_SWARM, _AUTOPILOT):
+                for message in codec.feed(one.frame, whole=True):
+                    _take(found, owner, one.time, one.link, message)
+    except LogError:
+        return found
+    order = np.argsort(found.epochs, kind="stable").tolist()
+    return found._replace(
+        epochs=[found.epochs[i] for i in order],
+        plans=[found.plans[i] for i in order],
+        heard={system: sorted(times) for system, times in found.heard.items()},
+    )
+
+
+def _take(found: Record, owner: int, time: int, link: int, message: Message) -> None:
+    system = message.source.system
+    if isinstance(message, Attitude):
+        if system == owner and link == _AUTOPILOT and (not found.leant or time >= found.leant[-1]):
+            found.leant.append(time)
+            found.attitudes.append(euler_attitude(message.roll, message.pitch, message.yaw))
+    elif isinstance(message, Heartbeat):
+        own = message.source == Source(owner, AUTOPILOT) and link == _AUTOPILOT
+        if own and (not found.beaten or time >= found.beaten[-1]):
+            found.beaten.append(time)
+            found.beats.append(message)
+    elif isinstance(message, GlobalPosition):
+        if system != owner and link == _SWARM:
+            found.heard.setdefault(system, []).append(time)
+    elif isinstance(message, Tunnel) and system == owner and message.payload_type == PAYLOAD_TYPE:
+        try:
+            plan = unpack(message.payload)
+        except PlanWireError:
+            return
+        if not found.epochs or plan.epoch != found.epochs[-1]:
+            found.epochs.append(plan.epoch)
+            found.plans.append(padded(horizon_of(plan).knots[:, :6]))

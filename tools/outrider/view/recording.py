@@ -1,0 +1,31 @@
+"""A run as one HTML file that plays in any browser, without a network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from outrider.view.page_server import Theatre
+from outrider.view.player import Player
+from outrider.view.renderer import Stage
+
+EVERY = 0.1
+"""s between two pictures."""
+
+
+def html(player: Player, watch: Callable[[str, float], None]) -> str:
+    """The whole of what ``player`` has, at its own speed. The table and the plot are not in it."""
+    theatre = Theatre("127.0.0.1", 0)
+    try:
+        stage = Stage(theatre.server, player.scene)
+        begin, end = player.span
+        stage.show(player.moment(begin))
+        recording = theatre.server.get_scene_serializer()
+        for time in np.arange(begin, end, EVERY).tolist():
+            stage.show(player.moment(time))
+            recording.insert_sleep(EVERY)
+            watch("drawing", (time - begin) / max(end - begin, EVERY))
+        return recording.as_html()
+    finally:
+        theatre.stop()

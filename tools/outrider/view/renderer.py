@@ -1,0 +1,282 @@
+"""The scene in the browser: made once, then told what has moved."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from outrider.view import shapes
+from outrider.view.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, linear, rgb
+from outrider.view.planes import MOST, Plane, between, facing
+from outrider.view.scene import Scene, Solid
+from outrider.view.snapshot import Array, Moment, Single
+from outrider.view.trails import Trails
+
+WORLD = "/world"
+AZIMUTH, ELEVATION, FIELD = -1.15, 0.5, np.radians(40.0)
+"""From where one looks at first, as in the report, and how wide."""
+_AWAY = (0.0, 0.0, -1e4)
+_LARGER, _SHARE = 3.0, 0.09
+"""Vehicles are drawn no more than so much larger than they are, and as large as this share of what is
+seen."""
+_TARGET = rgb("#17202a")
+_UNTURNED = (1.0, 0.0, 0.0, 0.0)
+_NO_LINE = np.zeros((1, 2, 3))
+
+
+class Layers(NamedTuple):
+    """What can be shown or not."""
+
+    trails: bool = True
+    plans: bool = True
+    shells: bool = True
+    reach: bool = False
+    planes: bool = True
+    labels: bool = True
+
+
+class Stage:
+    """``scene`` on ``server``. All is under one frame, which follows the vehicles if the scene says so."""
+
+    def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
+        self._stage, self.scene = server.scene, scene
+        stage, count = server.scene, len(scene.systems)
+        self._painted = colours(count)
+        self._painted[scene.tasked :] = SOFT
+        self._colours = linear(self._painted)
+        self._focus = np.array(scene.centre)
+        self._layers = Layers()
+        stage.set_up_direction("+z")
+        stage.configure_default_lights(cast_shadow=False)
+        stage.world_axes.visible = False
+        self._world = stage.add_frame(WORLD, show_axes=False, position=-self._focus)
+        self.size = _drawn(scene)
+        self._ground()
+        self._stand()
+        self._target = self._around_the_target()
+        self._movers = [self._solid(f"mover-{j}", mover) for j, mover in enumerate(scene.movers)]
+        self._rotors = self._many("rotors", shapes.rotors(), self._colours, self.size)
+        self._frames = self._many("frames", shapes.frame(), linear(INK), self.size)
+        self._shells = self._many(
+            "shells", shapes.ball(0.5 * (scene.d_min or 0.0)), self._colours, 1.0, opacity=0.18
+        )
+        width = 0.004 * scene.reach
+        ring = shapes.annulus(0.5 * (scene.d_safe or 1.0), width)
+        self._reach = self._many("reach", ring, self._colours, 1.0, opacity=0.55, side="double")
+        self._planes = stage.add_batched_meshes_simple(
+            f"{WORLD}/planes",
+            *shapes.tile(),
+            batched_wxyzs=np.tile(_UNTURNED, (MOST, 1)),
+            batched_positions=np.tile(_AWAY, (MOST, 1)),
+            batched_scales=np.full(MOST, 0.15 * scene.reach),
+            batched_colors=linear(ACCENT),
+            opacity=0.2,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._plans = stage.add_line_segments(
+            f"{WORLD}/plans", _NO_LINE, _NO_LINE.astype(np.uint8), thickness=3.0, thickness_units="screen"
+        )
+        self._drops = stage.add_line_segments(
+            f"{WORLD}/drops", _NO_LINE, SOLID, thickness=1.0, thickness_units="screen"
+        )
+        self._trails = Trails(stage, f"{WORLD}/trails", self._colours, 2.0)
+        self._labels = [
+            stage.add_label(
+                f"{WORLD}/label-{system}",
+                str(system),
+                font_screen_scale=0.9 if count <= 16 else 0.6,
+                anchor="bottom-center",
+                position=_AWAY,
+            )
+            for system in scene.systems
+        ]
+        self._look_at(server)
+        self.layers = Layers()
+
+    @property
+    def focus(self) -> Array:
+        """What (3,) lies in the middle, fleet-local ENU."""
+        return self._focus.copy()
+
+    @property
+    def layers(self) -> Layers:
+        """What is shown."""
+        return self._layers
+
+    @layers.setter
+    def layers(self, layers: Layers) -> None:
+        self._layers, scene = layers, self.scene
+        self._trails.show(layers.trails)
+        self._plans.visible = layers.plans
+        self._shells.visible = layers.shells and scene.d_min is not None
+        self._reach.visible = layers.reach and scene.d_safe is not None
+        self._planes.visible = layers.planes and scene.step_s is not None
+        for label in self._labels:
+            label.visible = layers.labels
+
+    def show(self, moment: Moment, past: tuple[Moment, ...] = ()) -> None:
+        """What is to be seen now; ``past``: what was before, for the trails."""
+        for one in (*past, moment):
+            self._trails.see(one.time, one.position)
+        there = np.asarray(np.isfinite(moment.position).all(axis=1))
+        place = np.where(there[:, None], moment.position, _AWAY).astype(np.float32)
+        attitude = np.where(np.isfinite(moment.attitude), moment.attitude, _UNTURNED).astype(np.float32)
+        for handle in (self._rotors, self._frames):
+            handle.batched_positions, handle.batched_wxyzs = place, attitude
+        for handle in (self._shells, self._reach):
+            handle.batched_positions = place
+        for label, at in zip(self._labels, place.tolist(), strict=True):
+            label.position = (at[0], at[1], at[2] + 0.45 * self.size)
+        self._draw_plans(moment)
+        ground = moment.position[there] * np.array((1.0, 1.0, 0.0), np.float32)
+        self._drops.points = np.stack([moment.position[there], ground], axis=1)
+        self._target.visible = bool(np.isfinite(moment.target).all())
+        if self._target.visible:
+            self._target.position = moment.target
+        for mover, at in zip(self._movers, moment.moving, strict=False):
+            mover.visible = bool(np.isfinite(at).all())
+            if mover.visible:
+                mover.position = at
+        if self.scene.follows and there.any():
+            self._follow(moment.position[there].mean(axis=0))
+
+    def _draw_plans(self, moment: Moment) -> None:
+        ways = moment.plan[..., :3]
+        points = np.stack([ways[:, :-1], ways[:, 1:]], axis=2)
+        there = np.isfinite(points).all(axis=(2, 3))
+        paint = np.broadcast_to(self._colours[:, None, None], points.shape)
+        self._plans.colors = np.ascontiguousarray(paint[there])
+        self._plans.points = points[there]
+        if self.scene.step_s is None or not self._layers.planes:
+            return
+        known = np.isfinite(moment.plan).all(axis=(1, 2))
+        found = between(moment.plan[known], self.scene.step_s)
+        self._planes.batched_positions, self._planes.batched_wxyzs = _pool(found)
+
+    def _follow(self, middle: Single) -> None:
+        """Go along, a little each time: nobody wants a picture that shakes."""
+        self._focus = self._focus + 0.15 * (middle - self._focus)
+        self._world.position = -self._focus
+
+    def _many(
+        self, name: str, mesh: shapes.Mesh, paint: NDArray[np.uint8], scale: float, **more: object
+    ) -> viser.BatchedMeshHandle:
+        """One for each vehicle."""
+        count = len(self.scene.systems)
+        return self._stage.add_batched_meshes_simple(
+            f"{WORLD}/{name}",
+            *mesh,
+            batched_wxyzs=np.tile(_UNTURNED, (count, 1)),
+            batched_positions=np.tile(_AWAY, (count, 1)),
+            batched_scales=np.full(count, scale),
+            batched_colors=paint,
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+            **more,  # type: ignore[arg-type]
+        )
+
+    def _ground(self) -> None:
+        cell = 10.0 ** np.floor(np.log10(self.scene.reach / 3.0))
+        self._stage.add_grid(
+            f"{WORLD}/ground",
+            infinite_grid=True,
+            cell_size=cell,
+            section_size=5.0 * cell,
+            cell_color=GRID,
+            section_color=LINE,
+            cell_thickness=0.8,
+            section_thickness=1.0,
+            fade_distance=14.0 * self.scene.reach,
+            shadow_opacity=0.0,
+        )
+
+    def _stand(self) -> None:
+        """What never moves: goals and obstacles."""
+        scene = self.scene
+        for k, goal in enumerate(scene.goals):
+            mark = shapes.annulus(0.35 * self.size, 0.06 * self.size)
+            self._stage.add_mesh_simple(
+                f"{WORLD}/goal-{k}",
+                *mark,
+                color=self._painted[k],
+                side="double",
+                position=goal,
+                cast_shadow=False,
+            )
+        for j, solid in enumerate(scene.solids):
+            handle = self._solid(f"solid-{j}", solid)
+            handle.position = solid.at
+
+    def _solid(self, name: str, solid: Solid) -> viser.FrameHandle:
+        """A frame with the shape in it, and around it where no vehicle's centre may be."""
+        frame = self._stage.add_frame(f"{WORLD}/{name}", show_axes=False)
+        shells: tuple[tuple[str, float, RGB, float | None], ...] = (
+            ("itself", solid.radius, SOLID, None),
+            ("shell", solid.radius + self.scene.d_min_solid, SOLID, 0.15),
+        )
+        for part, radius, color, opacity in shells:
+            if solid.kind == "post":
+                mesh = shapes.prism(32, radius, solid.height, (0.0, 0.0, 0.5 * solid.height))
+            else:
+                mesh = shapes.ball(radius)
+            self._stage.add_mesh_simple(
+                f"{WORLD}/{name}/{part}", *mesh, color=color, opacity=opacity, cast_shadow=False
+            )
+        return frame
+
+    def _around_the_target(self) -> viser.FrameHandle:
+        """The target, its shell, and the surfaces about it, in a frame that goes along with it."""
+        stage, scene, name = self._stage, self.scene, f"{WORLD}/target"
+        frame = stage.add_frame(name, show_axes=False, visible=False)
+        stage.add_icosphere(f"{name}/itself", 0.3 * self.size, color=_TARGET, cast_shadow=False)
+        stage.add_label(
+            f"{name}/label",
+            "target",
+            font_screen_scale=0.9,
+            anchor="bottom-center",
+            position=(0.0, 0.0, 0.4 * self.size),
+        )
+        if scene.d_min_target is not None:
+            stage.add_icosphere(
+                f"{name}/shell", scene.d_min_target, color=_TARGET, opacity=0.08, cast_shadow=False
+            )
+        for j, line in enumerate(scene.surfaces):
+            closed = np.vstack([line, line[:1]])
+            stage.add_line_segments(
+                f"{name}/surface-{j}",
+                np.stack([closed[:-1], closed[1:]], axis=1),
+                SOFT,
+                thickness=1.6,
+                thickness_units="screen",
+            )
+        return frame
+
+    def _look_at(self, server: viser.ViserServer) -> None:
+        distance = 1.05 * self.scene.reach / np.tan(0.5 * FIELD)
+        level = np.cos(ELEVATION)
+        direction = np.array([np.cos(AZIMUTH) * level, np.sin(AZIMUTH) * level, np.sin(ELEVATION)])
+        camera = server.initial_camera
+        camera.fov = float(FIELD)
+        camera.far = 100.0 * self.scene.reach
+        camera.look_at = (0.0, 0.0, 0.0)
+        camera.position = distance * direction
+
+
+def _drawn(scene: Scene) -> float:
+    """How large (m) a vehicle is drawn."""
+    return float(min(max(scene.span, _SHARE * scene.reach), _LARGER * scene.span))
+
+
+def _pool(found: Plane) -> tuple[Single, Single]:
+    """Places (MOST, 3) and attitudes (MOST, 4); those that are not needed are far away."""
+    place = np.tile(np.array(_AWAY, np.float32), (MOST, 1))
+    turned = np.tile(np.array(_UNTURNED, np.float32), (MOST, 1))
+    count = len(found.middle)
+    place[:count], turned[:count] = found.middle, facing(found.normal)
+    return place, turned

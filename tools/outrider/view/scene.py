@@ -1,0 +1,116 @@
+"""What a picture is made of before anything moves: who flies, what stands around, what may be changed."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.config.companion import Obstacle
+from outrider.scenarios.moving import MovingPostPart
+from outrider.scenarios.scenario import FixedTarget, Scenario
+from outrider.scenarios.starts import starts
+
+Array = NDArray[np.float64]
+Lever = Literal["pace", "methods", "loss", "target"]
+SPAN = 0.63
+"""m from tip to tip where nothing says otherwise: the firefly's."""
+LEAST_REACH = 4.0
+"""m: no picture shows less."""
+
+
+class Solid(NamedTuple):
+    """A ball around ``at``, or a post that stands on the ground at ``at``; m."""
+
+    kind: Literal["sphere", "post"]
+    at: tuple[float, float, float]
+    radius: float
+    height: float = 0.0
+
+
+class Scene(NamedTuple):
+    """Lengths in m, fleet-local ENU.
+
+    ``systems`` (K): ids of the vehicles, of which the first ``tasked`` fly the task. ``d_min``, ``d_safe``
+    between centres, ``d_min_target`` to the target, ``d_min_solid`` to a surface; None where it is not known.
+    ``movers`` (M): shapes of what moves. ``goals`` (k, 3). ``surfaces``: closed lines (n, 3) as offsets from
+    the target. ``centre`` (3,) and ``reach``: where to look at first, and how far from there something
+    is. ``follows``: whether the picture goes along with the vehicles. ``step_s``: of plans with planes
+    between them; None for a fleet without. ``levers``: what the view may change, ``methods`` and ``loss`` as
+    they are at first.
+    """
+
+    title: str
+    systems: tuple[int, ...]
+    tasked: int
+    span: float = SPAN
+    d_min: float | None = None
+    d_safe: float | None = None
+    d_min_target: float | None = None
+    d_min_solid: float = 0.0
+    solids: tuple[Solid, ...] = ()
+    movers: tuple[Solid, ...] = ()
+    goals: Array = np.empty((0, 3))
+    surfaces: tuple[Array, ...] = ()
+    centre: tuple[float, float, float] = (0.0, 0.0, 2.0)
+    reach: float = 10.0
+    follows: bool = False
+    step_s: float | None = None
+    levers: frozenset[Lever] = frozenset()
+    methods: str = ""
+    loss: float = 0.0
+
+
+def staged(scenario: Scenario, seed: int, span: float, levers: frozenset[Lever]) -> Scene:
+    """The scene of ``scenario`` for a seed; ``span`` (m) of its vehicles from tip to tip."""
+    companion = scenario.companion
+    begin = starts(scenario, seed, companion.planar)
+    goals = np.empty((0, 3)) if begin.goals is None else np.asarray(begin.goals, dtype=np.float64)
+    certified = companion.avoidance == "certified"
+    places = np.vstack([begin.positions, goals])
+    if isinstance(scenario.target, FixedTarget):
+        places = np.vstack([places, scenario.target.at, scenario.target.jump_to or scenario.target.at])
+    low, high = places.min(axis=0), places.max(axis=0)
+    centre = 0.5 * (low + high)
+    return Scene(
+        scenario.name,
+        tuple(scenario.systems),
+        scenario.vehicles,
+        span,
+        scenario.d_min,
+        companion.field.d_safe,
+        scenario.d_min_target,
+        scenario.d_min_obstacle,
+        tuple(_solid(one) for one in scenario.obstacles),
+        tuple(
+            Solid("post", (0.0, 0.0, 0.0), one.radius, one.height)
+            if isinstance(one, MovingPostPart)
+            else Solid("sphere", (0.0, 0.0, 0.0), one.radius)
+            for one in scenario.moving
+        ),
+        goals,
+        _surfaces(scenario),
+        (float(centre[0]), float(centre[1]), float(centre[2])),
+        max(float(np.linalg.norm(0.5 * (high - low))), LEAST_REACH),
+        not isinstance(scenario.target, FixedTarget),
+        1e-6 * companion.certified.dt_us if certified else None,
+        levers - {"methods"} if certified else levers,
+        "+".join(companion.methods),
+        scenario.links.swarm.loss,
+    )
+
+
+def _solid(obstacle: Obstacle) -> Solid:
+    if obstacle.kind == "post":
+        return Solid("post", (obstacle.at[0], obstacle.at[1], 0.0), obstacle.radius, obstacle.height)
+    return Solid("sphere", obstacle.at, obstacle.radius)
+
+
+def _surfaces(scenario: Scenario) -> tuple[Array, ...]:
+    """The fleet's, and those of vehicles that have their own; to a goal there is none."""
+    companion = scenario.companion
+    if companion.task != "escort":
+        return ()
+    own = [one.surface.outline() for one in companion.surfaces]
+    return (*([companion.surface.outline()] if len(own) < scenario.vehicles else []), *own)

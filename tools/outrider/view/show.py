@@ -1,0 +1,68 @@
+"""``--view``: a flight of ``outrider swarm`` with a view beside it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from outrider.view.lockstep import LockStepView
+from outrider.view.orders import Orders
+from outrider.view.realtime import RealTimeView
+from outrider.view.scene import Lever, staged
+from outrider.view.view_commands import Wishes
+from outrider.view.viewer_client import Attendant
+
+if TYPE_CHECKING:
+    from outrider.swarm import Prepared
+
+_CHANGES: frozenset[Lever] = frozenset({"methods", "loss", "target"})
+
+
+class Show:
+    """One flight for ``attendant``. ``watched``: whether somebody is at a terminal, for whom a lock-step
+    flight goes at the pace of time from the beginning."""
+
+    def __init__(self, attendant: Attendant, watched: bool) -> None:
+        self._attendant, self._watched = attendant, watched
+        self.orders = Orders()
+
+    def lock_step(self, prepared: Prepared, seed: int) -> LockStepView:
+        """The onlooker of a lock-step flight."""
+        self._begin(prepared, seed, _CHANGES | {"pace"}, Wishes(speed=1.0 if self._watched else None))
+        view = LockStepView(self._attendant.line)
+        self.orders = view.orders
+        return view
+
+    def real_time(self, prepared: Prepared, seed: int) -> RealTimeView:
+        """The same of one in real time."""
+        self._begin(prepared, seed, _CHANGES, Wishes())
+        view = RealTimeView(self._attendant.line)
+        self.orders = view.orders
+        return view
+
+    def stay(self, directory: Path) -> None:
+        """After the flight: for somebody at a terminal the run in ``directory`` is played until Ctrl-C."""
+        if self.orders.given:
+            sys.stderr.write(f"changed by hand {len(self.orders.given)} times: {directory / 'orders.json'}\n")
+        if self._watched:
+            self._attendant.landed(directory)
+            sys.stderr.write(f"{self._attendant.url} plays the run; Ctrl-C ends it\n")
+            self._attendant.wait()
+
+    def _begin(self, prepared: Prepared, seed: int, levers: frozenset[Lever], wishes: Wishes) -> None:
+        scene = staged(prepared.scenario, seed, prepared.vehicle.span, levers)
+        self._attendant.begin(scene, wishes)
+
+
+@contextmanager
+def showing() -> Iterator[Show]:
+    """A view on this machine, which ends afterwards. InputError if it cannot be."""
+    attendant = Attendant()
+    try:
+        sys.stderr.write(f"{attendant.url} shows the flight\n")
+        yield Show(attendant, sys.stderr.isatty() and sys.stdin.isatty())
+    finally:
+        attendant.close()

@@ -1,0 +1,78 @@
+"""What somebody at the view wishes of a simulation.
+
+All of it is said again and again: whatever is lost on the way is said once more, and what is no longer said
+no longer counts.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import NamedTuple
+
+from companion.config.planning import MethodName
+from outrider.scenarios.options import METHODS
+
+FASTEST = 100.0
+"""Times real time; beyond, a flight just goes as fast as it can."""
+LOSSY = ("swarm", "target")
+"""The links that lose what is wished, as those of ``--loss``."""
+_FAR = 10_000.0
+"""m"""
+_MOST = 1 << 31
+_LARGEST = 4096
+"""Bytes."""
+
+
+class Wishes(NamedTuple):
+    """``speed``: times real time, None for as fast as it goes; ``paused``; ``steps``: how often a single step
+    was asked for. ``methods`` joined by + and ``loss`` (0…1): None leaves what is. ``target`` (3,) m,
+    fleet-local ENU: where it shall go, for the ``moves``-th time."""
+
+    speed: float | None = None
+    paused: bool = False
+    steps: int = 0
+    methods: str | None = None
+    loss: float | None = None
+    target: tuple[float, float, float] | None = None
+    moves: int = 0
+
+    @property
+    def method_names(self) -> tuple[MethodName, ...]:
+        """``methods`` as a companion takes them."""
+        asked = (self.methods or "").split("+")
+        return tuple(name for name in METHODS if name in asked)
+
+
+def encoded(wishes: Wishes) -> bytes:
+    """For ``decoded``."""
+    return json.dumps(wishes._asdict()).encode()
+
+
+def decoded(data: bytes) -> Wishes | None:
+    """What ``encoded`` made; None for anything else."""
+    if len(data) > _LARGEST:
+        return None
+    try:
+        found = json.loads(data)
+        place = found.get("target")
+        wishes = Wishes(**{**found, "target": None if place is None else tuple(place)})
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        return None
+    return wishes if _sensible(wishes) else None
+
+
+def _sensible(wishes: Wishes) -> bool:
+    speed, loss, target, methods = wishes.speed, wishes.loss, wishes.target, wishes.methods
+    return (
+        (speed is None or (_number(speed) and 0.0 < speed <= FASTEST))
+        and isinstance(wishes.paused, bool)
+        and all(type(count) is int and 0 <= count < _MOST for count in (wishes.steps, wishes.moves))
+        and (methods is None or (isinstance(methods, str) and set(methods.split("+")) <= set(METHODS)))
+        and (loss is None or (_number(loss) and 0.0 <= loss <= 1.0))
+        and (target is None or (len(target) == 3 and all(_number(x) and abs(x) < _FAR for x in target)))
+    )
+
+
+def _number(value: object) -> bool:
+    return type(value) in (int, float) and math.isfinite(float(value))  # type: ignore[arg-type]
