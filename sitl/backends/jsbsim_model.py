@@ -155,8 +155,9 @@ def _motors(root: Element, config: VehicleConfig) -> None:
 
 
 def _aerodynamics(root: Element, config: VehicleConfig, *, isa: bool) -> None:
-    """The rotors' wrench, the RotorS model as in ``sitl.vehicle.rotors``: thrust k_f ω² along −b3, torque k_m
-    times it, and −c ω v⊥ for drag and for the rolling moment, v⊥ being the velocity of the hub through the air."""
+    """The rotors' wrench, the RotorS model as in ``sitl.vehicle.rotors``: thrust k_f ω² along −b3, torque
+    k_m times it, and −c ω v⊥ for drag and for the rolling moment, v⊥ being the velocity of the hub through
+    the air."""
     aerodynamics = SubElement(root, "aerodynamics")
     density: tuple[str, ...] = ("atmosphere/sigma",) if isa else ()
     sums: dict[str, list[Element]] = {axis: [] for axis in ("X", "Y", "Z", "ROLL", "PITCH", "YAW")}

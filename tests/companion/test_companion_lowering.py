@@ -13,8 +13,8 @@ from companion.config.planning import LimitsConfig
 from companion.flight.autopilots import Loop, Shaping
 from companion.flight.autopilots.limits import limits_of, stock_parameters
 from companion.flight.lowering import lowered
-from outrider.fly.fly_config import FlyConfig
 from outrider.resources import find
+from outrider.scenarios.fly_config import FlyConfig
 from outrider.scenarios.scenario import Scenario
 from outrider.yaml_files.yaml_file import load
 

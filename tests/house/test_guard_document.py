@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from companion.config.flight import GuardConfig
-from outrider.fly.fly_config import FlyConfig
 from outrider.resources import find
+from outrider.scenarios.fly_config import FlyConfig
 from outrider.yaml_files.yaml_file import load
 
 TEXT = (Path(__file__).parents[2] / "docs" / "guard.md").read_text(encoding="utf-8")

@@ -15,8 +15,9 @@ from shipped import FIREFLY, scenario
 
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from mavlink_bridge.wire.framing import frame_v2
-from outrider import swarm
 from outrider.__main__ import main
+from outrider.simulation.preparation import Prepared
+from outrider.swarm import command as swarm
 
 SYSTEMS = (11, 12, 13)
 
@@ -61,7 +62,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
             {"kind": "post", "through": [[-9, 0], [-8, 3], [-9, 6]], "speed": 1.0, "radius": 0.4},
         ],
     )
-    swarm.fly(swarm.Prepared(of, FIREFLY), 1, directory, lambda _stage, _seconds: None)
+    swarm.fly(Prepared(of, FIREFLY), 1, directory, lambda _stage, _seconds: None)
     return directory
 
 

@@ -19,12 +19,13 @@ from mavlink_bridge.messages import Message, Tunnel
 from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE
-from outrider import swarm
 from outrider.__main__ import main
 from outrider.certify.command import show
 from outrider.certify.reading import read
 from outrider.certify.verdict import judge
 from outrider.errors import InputError
+from outrider.simulation.preparation import Prepared
+from outrider.swarm import command as swarm
 
 
 class Ended(NamedTuple):
@@ -48,7 +49,7 @@ def fly(directory: Path, vehicles: int, *, airborne: bool = True) -> Path:
         starts={"radius": 3.0, "jitter": 0.0},
         companion={"avoidance": "certified"},
     )
-    swarm.fly(swarm.Prepared(of, FIREFLY), 1, directory, lambda _stage, _seconds: None)
+    swarm.fly(Prepared(of, FIREFLY), 1, directory, lambda _stage, _seconds: None)
     return directory
 
 

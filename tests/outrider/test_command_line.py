@@ -12,9 +12,9 @@ import pytest
 from said import Ended, Run
 from shipped import LOGS, SCENARIOS
 
-from outrider import swarm
 from outrider.errors import InputError, OutriderError
 from outrider.simulation.flight import Flight
+from outrider.swarm import command as swarm
 
 ANTIPODAL, ESCORT = SCENARIOS["antipodal-8"].read_text(), SCENARIOS["escort"].read_text()
 

@@ -10,10 +10,10 @@ import pytest
 from shipped import scenario
 
 from mavlink_bridge.frames import FleetFrame
+from outrider.runs.ground_truth import SAMPLE
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import starts
 from outrider.simulation.conductor import HOLD, Conductor, Sight, Stage
-from outrider.simulation.ground_truth import SAMPLE
 from outrider.simulation.operator import Operator
 
 EPOCH = 1_000_000

@@ -19,8 +19,8 @@ from pymavlink.dialects.v20 import all as dialect
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.export import mavlink_tables
 from outrider.export.command import export
-from outrider.export.dialect import identifiers, kind
 from outrider.export.mavlink_tables import HEAD, columns
+from outrider.logs.dialect import identifiers, kind
 
 AXES = ("east", "north", "up")
 

@@ -17,8 +17,8 @@ from pyulog.px4 import PX4ULog
 from mavlink_bridge.tlog.log import TlogWriter
 from mavlink_bridge.wire.framing import frame_v2
 from outrider.export.command import export
-from outrider.export.dialect import identifiers, kind
 from outrider.export.ulog_export import mavlink_topic
+from outrider.logs.dialect import identifiers, kind
 
 START = 1_700_000_000_000_000
 

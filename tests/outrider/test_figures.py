@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from shipped import scenario
 
 from outrider.runs.figures import draw
+from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
-from outrider.simulation.ground_truth import Samples
 
 
 def circling(vehicles: int, count: int = 60) -> Samples:

@@ -22,7 +22,6 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 from outrider.errors import InputError
-from outrider.fly.fly_config import RADIOS, FleetOrigin, FlyConfig
 from outrider.fly.link_budget import (
     FLEET,
     SHARE,
@@ -35,6 +34,7 @@ from outrider.fly.link_budget import (
     steered,
     told,
 )
+from outrider.scenarios.fly_config import RADIOS, FleetOrigin, FlyConfig
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
 

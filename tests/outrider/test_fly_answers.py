@@ -26,14 +26,14 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import EPOCH, Signing
 from outrider.errors import InputError
-from outrider.fly.duplicate_ids import Twin
-from outrider.fly.fly_config import FleetOrigin, FlyConfig
 from outrider.fly.identify import Identification
 from outrider.fly.orders import OPERATOR, Orders, answered
 from outrider.fly.process_channel import intercom
 from outrider.fly.request import Request
-from outrider.fly.supervised_node import Cockpit
 from outrider.fly.worker import Worker
+from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
+from outrider.supervision.duplicate_ids import Twin
+from outrider.supervision.supervised_node import Cockpit
 
 ORIGIN = (47.4, 8.5, 488.0)
 CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))

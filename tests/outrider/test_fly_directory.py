@@ -10,8 +10,8 @@ import pytest
 import yaml
 from said import Run
 
-from outrider.fly.fly_config import FlyConfig
 from outrider.resources import config_root, find
+from outrider.scenarios.fly_config import FlyConfig
 from outrider.yaml_files.yaml_file import load
 
 LOG = config_root() / "logs" / "escort-target.tlog"

@@ -15,10 +15,10 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.link import memory_pair
 from mavlink_bridge.messages import CommandLong, Heartbeat, Source
 from mavlink_bridge.wire.codec import Codec
-from outrider.fly.fly_config import FleetOrigin, FlyConfig
 from outrider.fly.hold_on_exit import farewell
 from outrider.fly.status import State
-from outrider.fly.supervised_node import OURS, Cockpit
+from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
+from outrider.supervision.supervised_node import OURS, Cockpit
 
 BEAT = Heartbeat(Source(1, 1), 2, 3, 0x80, ARDUPILOT.guided_custom_mode, 4)
 CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))

@@ -10,9 +10,9 @@ from companion.flight.landing import Landing
 from outrider.fly.event_log import Diary
 from outrider.fly.figures import summary
 from outrider.fly.flight import Flight
-from outrider.fly.fly_config import FleetOrigin, FlyConfig
 from outrider.fly.landing import verdict
 from outrider.fly.request import Request
+from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
 
 CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))
 

@@ -20,8 +20,8 @@ from companion.flight.setpoint import setpoint
 from mavlink_bridge.messages import LocalPosition, SetpointLocal
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.fly.fly_config import FlyConfig
 from outrider.resources import find
+from outrider.scenarios.fly_config import FlyConfig
 from outrider.yaml_files.yaml_file import load
 
 ROOT = Path(__file__).parents[2]

@@ -17,18 +17,18 @@ from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, LocalPosition, S
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from outrider.fly import flight
-from outrider.fly.duplicate_ids import Twin
 from outrider.fly.event_log import Diary
 from outrider.fly.flight import MOST, Flight
-from outrider.fly.fly_config import FleetOrigin, FlyConfig
 from outrider.fly.line_input import Typed
 from outrider.fly.process_channel import OrderLink, intercom
 from outrider.fly.request import Request
 from outrider.fly.status import News
-from outrider.fly.supervised_node import Cockpit
 from outrider.fly.transmit_statistics import Departures
 from outrider.fly.wiring import wire
 from outrider.fly.worker import Worker
+from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
+from outrider.supervision.duplicate_ids import Twin
+from outrider.supervision.supervised_node import Cockpit
 
 ORIGIN = (47.4, 8.5, 488.0)
 CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))

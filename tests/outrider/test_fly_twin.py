@@ -26,13 +26,13 @@ from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Mes
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import Header
-from outrider.fly.duplicate_ids import REMEMBERED, Twin
-from outrider.fly.fly_config import FleetOrigin, FlyConfig
 from outrider.fly.orders import Orders
 from outrider.fly.status import News
-from outrider.fly.supervised_node import CLOCK, TWIN, Cockpit
-from outrider.fly.takeoff_inhibit import Gate
 from outrider.fly.transmit_statistics import Departures
+from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
+from outrider.supervision.duplicate_ids import REMEMBERED, Twin
+from outrider.supervision.supervised_node import CLOCK, TWIN, Cockpit
+from outrider.supervision.takeoff_inhibit import Gate
 
 SECOND = 1_000_000
 OWN = Source(1, COMPONENT)

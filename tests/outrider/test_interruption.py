@@ -14,7 +14,8 @@ from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import OutriderError
 from outrider.interruption import Came, insisted, interruptible, noted
 from outrider.simulation.conductor import Stage
-from outrider.swarm import Prepared, fly
+from outrider.simulation.preparation import Prepared
+from outrider.swarm.command import fly
 
 
 @pytest.mark.usefixtures("ctrl_c")

@@ -21,10 +21,10 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import KNOTS, unpack
 from outrider.realtime.spawn import rough
 from outrider.runs import names
+from outrider.runs.ground_truth import Limits, Truth
 from outrider.scenarios.moving import MovingPostPart, MovingSpherePart
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.fleet import Fleet
-from outrider.simulation.ground_truth import Limits, Truth
 from outrider.simulation.moving import STEP, MovingObstacle, places
 from outrider.simulation.paths import ClosedPath
 

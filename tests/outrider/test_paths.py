@@ -14,8 +14,8 @@ from mavlink_bridge.wire.codec import Codec
 from outrider.scenarios.options import Options
 from outrider.scenarios.scenario import PathTarget
 from outrider.simulation.paths import ClosedPath
+from outrider.simulation.preparation import prepare
 from outrider.simulation.targets import Walking
-from outrider.swarm import prepare
 
 FLEET = FleetFrame(47.4, 8.5, 488.0)
 LAWS = settings(deadline=None, max_examples=40)

@@ -10,7 +10,8 @@ from said import Run
 from shipped import SCENARIOS
 
 from outrider.errors import InputError
-from outrider.swarm import Options, prepare
+from outrider.scenarios.options import Options
+from outrider.simulation.preparation import prepare
 
 ANTIPODAL = SCENARIOS["antipodal-8"].read_text()
 

@@ -9,8 +9,8 @@ from itertools import count
 import pytest
 
 from outrider.simulation.conductor import Stage
+from outrider.simulation.console import progress
 from outrider.terminal import progress_lines
-from outrider.terminal.console import progress
 from outrider.terminal.progress_lines import LINE_S
 from outrider.terminal.share_progress import share_progress
 

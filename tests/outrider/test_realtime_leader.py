@@ -20,10 +20,10 @@ from outrider.realtime.flight import _Leader
 from outrider.realtime.shared_page import Board
 from outrider.realtime.spawn import operators_turn, rough, turns
 from outrider.runs import names
+from outrider.runs.ground_truth import SAMPLE
+from outrider.simulation import console
 from outrider.simulation.conductor import PREPARE_CAP, Conductor, Stage
 from outrider.simulation.fleet import Fleet
-from outrider.simulation.ground_truth import SAMPLE
-from outrider.terminal import console
 
 OF = scenario("antipodal-8", vehicles=2, airborne=True)
 FLEET = Fleet(OF, FIREFLY, 1, LOGS)

@@ -15,12 +15,13 @@ from said import Run
 from shipped import FIREFLY, scenario
 
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
-from outrider import swarm
 from outrider.replay.run_replay import again
 from outrider.resources import config_root
 from outrider.runs.steps_file import read_steps
 from outrider.scenarios.options import METHODS
 from outrider.scenarios.scenario import Scenario
+from outrider.simulation.preparation import Prepared
+from outrider.swarm import command as swarm
 
 SHORT: dict[str, Any] = {"cap_s": 2.0, "airborne": True}
 SCENARIOS = sorted(path.stem for path in (config_root() / "scenarios").glob("*.yaml"))
@@ -33,7 +34,7 @@ WAYS: dict[str, dict[str, Any]] = {
 
 def flown(of: Scenario, directory: Path) -> Path:
     directory.mkdir()
-    swarm.fly(swarm.Prepared(of, FIREFLY), 1, directory, lambda _stage, _seconds: None)
+    swarm.fly(Prepared(of, FIREFLY), 1, directory, lambda _stage, _seconds: None)
     return directory
 
 

@@ -23,12 +23,13 @@ from mavlink_bridge.messages import CommandLong, GlobalPosition, Heartbeat, Setp
 from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
-from outrider import swarm
-from outrider.replay.roles import Cast, Part, survey
-from outrider.replay.setpoints import facts
-from outrider.replay.shadow_run import STEP, rehearse, steps
+from outrider.logs.timeline import on_one_line
 from outrider.replay.telemetry import TELEMETRY, Forwarder, paced
-from outrider.replay.timeline import on_one_line
+from outrider.shadow.roles import Cast, Part, survey
+from outrider.shadow.setpoints import facts
+from outrider.shadow.shadow_run import STEP, rehearse, steps
+from outrider.simulation.preparation import Prepared
+from outrider.swarm import command as swarm
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "tlogs"
 REAL = [("ap_copter463_guided_full", 9), ("ap_copter463_guided_pvy", 1), ("px4_1161_offboard_pvay", 1)]
@@ -40,7 +41,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("flown") / "run"
     directory.mkdir()
     of = scenario("antipodal-8", vehicles=2, cap_s=4.0, companion={"rates": {"replan_us": 50_000}})
-    swarm.fly(swarm.Prepared(of, FIREFLY), 1, directory, lambda _stage, _seconds: None)
+    swarm.fly(Prepared(of, FIREFLY), 1, directory, lambda _stage, _seconds: None)
     return directory / "vehicle-11.tlog"
 
 

@@ -24,11 +24,11 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Framer
 from mavlink_bridge.wire.signing import EPOCH, Signing
 from outrider.errors import InputError, OutriderError
+from outrider.logs.flight_modes import mode_name
 from outrider.sitl_server.addresses import addresses
 from outrider.sitl_server.display import watching
 from outrider.sitl_server.event_feed import Chronicle
 from outrider.sitl_server.figures import factor
-from outrider.sitl_server.modes import mode_name
 from outrider.sitl_server.persistence import Cabinet, prepare
 from outrider.sitl_server.request import Options, Request, checked
 from outrider.sitl_server.screen import Screen

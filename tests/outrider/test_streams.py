@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from outrider.simulation.streams import Stream, stream
+from outrider.scenarios.streams import Stream, stream
 
 
 @given(st.integers(0, 2**63))

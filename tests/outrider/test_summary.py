@@ -16,6 +16,7 @@ from hypothesis.extra import numpy as hnp
 from shipped import scenario
 
 from companion.planning import Tally
+from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Messages, Outcome, Punctuality
 from outrider.runs.summary import (
     WALL_FIELDS,
@@ -28,7 +29,6 @@ from outrider.runs.summary import (
     yaw_errors,
 )
 from outrider.scenarios.scenario import Scenario
-from outrider.simulation.ground_truth import Samples
 
 KEYS = {
     "scenario", "method", "avoidance", "planar", "turning_sense", "seed", "vehicles", "sensors",

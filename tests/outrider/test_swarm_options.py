@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 from shipped import FIREFLY, SCENARIOS, scenario
 
 from outrider.errors import InputError
+from outrider.scenarios.options import METHODS, Options, apply
 from outrider.scenarios.scenario import Scenario
-from outrider.swarm import METHODS, Options, apply, prepare, run_directory
+from outrider.simulation.preparation import prepare
+from outrider.swarm.command import run_directory
 
 BASE = scenario("antipodal-8")
 

@@ -15,8 +15,9 @@ import pytest
 import sweep_runs
 
 from outrider.errors import InputError
+from outrider.scenarios.options import Options
 from outrider.scenarios.scenario import Scenario
-from outrider.swarm import Options, prepare
+from outrider.simulation.preparation import prepare
 from outrider.sweep.cells import cells, scenario_of, task
 from outrider.sweep.command import sweep
 from outrider.sweep.grid import Sweep

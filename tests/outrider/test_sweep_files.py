@@ -13,7 +13,8 @@ import pytest
 import sweep_runs
 
 from outrider.errors import InputError
-from outrider.swarm import Options, prepare
+from outrider.scenarios.options import Options
+from outrider.simulation.preparation import prepare
 from outrider.sweep.cells import cells, scenario_of, task
 from outrider.sweep.command import sweep
 from outrider.sweep.grid import Sweep

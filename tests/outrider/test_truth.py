@@ -14,8 +14,8 @@ from shipped import FIREFLY
 
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.node import Datagram
+from outrider.runs.ground_truth import SAMPLE, Encounters, Limits, Truth
 from outrider.scenarios.scenario import FixedTarget
-from outrider.simulation.ground_truth import SAMPLE, Encounters, Limits, Truth
 from outrider.simulation.targets import Standing
 from outrider.simulation.truth_observer import Witness
 from sitl.config.autopilot import AutopilotConfig

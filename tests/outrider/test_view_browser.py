@@ -22,14 +22,15 @@ from playwright.sync_api import Page, sync_playwright
 from shipped import FIREFLY, scenario
 from view_flights import logs
 
-from outrider import swarm
 from outrider.scenarios.scenario import Scenario
+from outrider.scene.datagram_channel import Line
+from outrider.scene.palette import VEHICLES, rgb
 from outrider.simulation.flight import Flight
-from outrider.swarm import LOCK_STEP, Prepared
-from outrider.view.datagram_channel import Line
-from outrider.view.lockstep import LockStepView
-from outrider.view.palette import VEHICLES, rgb
-from outrider.view.show import Show
+from outrider.simulation.preparation import Prepared
+from outrider.swarm import command as swarm
+from outrider.swarm.command import LOCK_STEP
+from outrider.swarm.lockstep_view import LockStepView
+from outrider.swarm.show import Show
 from outrider.view.viewer_client import Attendant
 
 CHROMIUM = next(

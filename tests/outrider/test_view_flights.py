@@ -11,11 +11,11 @@ import pytest
 from shipped import FIREFLY, LOGS, scenario
 from view_flights import flown, line, logs, moments, small
 
+from outrider.runs.ground_truth import Samples
+from outrider.scene.datagram_channel import Line
+from outrider.scene.view_commands import Wishes, encoded
 from outrider.simulation.flight import Flight
-from outrider.simulation.ground_truth import Samples
-from outrider.view.datagram_channel import Line
-from outrider.view.lockstep import LockStepView, moment
-from outrider.view.view_commands import Wishes, encoded
+from outrider.swarm.lockstep_view import LockStepView, moment
 from outrider.view.viewer_client import Attendant
 
 

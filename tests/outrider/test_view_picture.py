@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from shipped import SCENARIOS, scenario
 
 from companion.values.horizon import roll_out
+from outrider.scene.palette import VEHICLES, linear, rgb
+from outrider.scene.scene import Scene, staged
+from outrider.scene.snapshot import KNOTS, Moment, State, euler_attitude, nearest, padded
 from outrider.view import shapes
-from outrider.view.palette import VEHICLES, linear, rgb
 from outrider.view.panel import struck, table
 from outrider.view.planes import MOST, between, facing
-from outrider.view.scene import Scene, staged
-from outrider.view.snapshot import KNOTS, Moment, State, euler_attitude, nearest, padded
 
 ANGLES = st.floats(-3.1, 3.1)
 PITCH = st.floats(-1.5, 1.5)

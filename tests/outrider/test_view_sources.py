@@ -21,19 +21,19 @@ from mavlink_bridge.messages import GlobalPosition, Heartbeat, Source, Tunnel
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
-from outrider import swarm
 from outrider.realtime.view_page import Window
 from outrider.runs import names
+from outrider.scene.changes import Change
+from outrider.scene.companion_snapshot import MODES, Glimpse
+from outrider.scene.scene import Scene
+from outrider.scene.snapshot import KNOTS, NO_PLAN, Moment, State
+from outrider.scene.view_commands import Wishes
 from outrider.simulation.flight import Flight
-from outrider.swarm import Prepared
-from outrider.view.companion_snapshot import MODES, Glimpse
+from outrider.simulation.preparation import Prepared
+from outrider.swarm import command as swarm
 from outrider.view.listener import Listener
-from outrider.view.orders import Change
 from outrider.view.player import Player, load
 from outrider.view.recorded import Record
-from outrider.view.scene import Scene
-from outrider.view.snapshot import KNOTS, NO_PLAN, Moment, State
-from outrider.view.view_commands import Wishes
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from outrider.scenarios.options import METHODS
-from outrider.view.orders import FILE, Change, Orders
-from outrider.view.pace import LEASE, STEP, Pace
-from outrider.view.view_commands import FASTEST, Wishes, decoded, encoded
+from outrider.scene.changes import FILE, Change, Orders
+from outrider.scene.view_commands import FASTEST, Wishes, decoded, encoded
+from outrider.swarm.pace import LEASE, STEP, Pace
 
 SHARES = st.floats(0.0, 1.0)
 PLACES = st.tuples(*[st.floats(-1000.0, 1000.0)] * 3)

@@ -11,10 +11,10 @@ from typing import Any
 from shipped import FIREFLY, LOGS, scenario
 
 from outrider.scenarios.scenario import Scenario
+from outrider.scene.datagram_channel import ROOM, Line, pair
+from outrider.scene.snapshot import Moment
 from outrider.simulation.flight import Flight
-from outrider.view.datagram_channel import ROOM, Line, pair
-from outrider.view.lockstep import LockStepView
-from outrider.view.snapshot import Moment
+from outrider.swarm.lockstep_view import LockStepView
 
 SMALL: dict[str, Any] = {
     "vehicles": 3,

@@ -13,9 +13,9 @@ from lockstep_flights import Flown
 from mavlink_bridge.messages import Message
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
+from outrider.runs.ground_truth import Samples
 from outrider.runs.names import LINK_NUMBERS
 from outrider.simulation.conductor import SLOW, Stage
-from outrider.simulation.ground_truth import Samples
 
 
 class Heard(NamedTuple):

@@ -8,7 +8,7 @@ import pytest
 from lockstep_flights import scenario
 
 from outrider.resources import find
-from outrider.swarm import Prepared, measure
+from outrider.simulation.preparation import Prepared, measure
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 

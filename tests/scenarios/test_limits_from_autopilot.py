@@ -22,11 +22,11 @@ from mavlink_bridge.messages import (
     ParamSet,
     SetpointLocal,
 )
-from outrider.fly.fly_config import FlyConfig
 from outrider.fly.status import News
-from outrider.fly.supervised_node import Cockpit
 from outrider.fly.transmit_statistics import Departures
 from outrider.resources import find
+from outrider.scenarios.fly_config import FlyConfig
+from outrider.supervision.supervised_node import Cockpit
 from outrider.yaml_files.yaml_file import load
 
 FLAVOURS = ("ardupilot", "px4")

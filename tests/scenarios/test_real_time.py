@@ -19,14 +19,14 @@ from mavlink_bridge.messages import GlobalPosition, Tunnel
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.realtime.flight import RealTimeFlight
+from outrider.realtime.view import RealTimeView
 from outrider.resources import config_root
 from outrider.runs.summary import Cost, exit_status, summarise
+from outrider.scene.changes import Change
+from outrider.scene.datagram_channel import Line, pair
+from outrider.scene.snapshot import Moment
+from outrider.scene.view_commands import Wishes, encoded
 from outrider.simulation.conductor import Stage
-from outrider.view.datagram_channel import Line, pair
-from outrider.view.orders import Change
-from outrider.view.realtime import RealTimeView
-from outrider.view.snapshot import Moment
-from outrider.view.view_commands import Wishes, encoded
 
 LOGS = config_root() / "logs"
 SMALL: dict[str, Any] = {

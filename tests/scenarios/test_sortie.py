@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from lockstep_flights import fly, setpoints
 
-from outrider.fly.fly_config import FlyConfig
 from outrider.resources import find
+from outrider.scenarios.fly_config import FlyConfig
 from outrider.scenarios.options import Options, apply
 from outrider.scenarios.scenario import Scenario
 from outrider.testing.scenes import merged

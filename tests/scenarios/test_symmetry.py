@@ -16,8 +16,8 @@ from lockstep_flights import FIREFLY, scenario
 from numpy.typing import NDArray
 
 from outrider.resources import config_root
+from outrider.runs.ground_truth import Samples
 from outrider.simulation.flight import Flight
-from outrider.simulation.ground_truth import Samples
 
 Array = NDArray[np.float64]
 

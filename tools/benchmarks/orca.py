@@ -28,8 +28,8 @@ from benchmarks.orca_table import Row, one_for_all, row_of, show
 from benchmarks.scenes import SCENES, places
 from outrider.errors import InputError, OutriderError
 from outrider.interruption import interruptible
+from outrider.processes.cores import cores
 from outrider.scenarios.starts import Array
-from outrider.sweep.execution import cores
 
 ADVICE = "pyrvo is not installed, and this benchmark needs it: .venv/bin/pip install -e '.[peers]'"
 _SIGHT = 30.0

@@ -13,7 +13,7 @@ from outrider.errors import InputError
 from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import Array, Starts, starts
-from outrider.simulation.streams import Stream, stream
+from outrider.scenarios.streams import Stream, stream
 from outrider.yaml_files.yaml_file import load
 
 VEHICLES, SIDE, HEIGHT, APART = 12, 12.0, 5.0, 1.5

@@ -14,9 +14,11 @@ from pathlib import Path
 from shutil import which
 from typing import NamedTuple
 
-from outrider import swarm
-from outrider.swarm import Options, Pace
-from outrider.view.show import Show
+from outrider.scenarios.options import Options
+from outrider.simulation.preparation import prepare
+from outrider.swarm import command as swarm
+from outrider.swarm.command import Pace
+from outrider.swarm.show import Show
 from outrider.view.viewer_client import Attendant
 
 VEHICLES = 4
@@ -33,7 +35,7 @@ class Punctual(NamedTuple):
 
 def flight(stack: ExitStack, options: set[str], view: bool, seed: int) -> Punctual:
     """One flight, with a view or without."""
-    prepared = swarm.prepare("antipodal", Options(vehicles=VEHICLES))
+    prepared = prepare("antipodal", Options(vehicles=VEHICLES))
     directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     show = None
     if view:

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from outrider.fly.fly_config import FlyConfig
+from outrider.scenarios.fly_config import FlyConfig
 from outrider.scenarios.scenario import Scenario
 from outrider.sweep.grid import Sweep
 from outrider.sweep.scenes import Scene

@@ -27,9 +27,10 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
 from outrider.bench import certified as bench_certified
 from outrider.bench import tlog as bench_tlog
 from outrider.resources import config_root, find
+from outrider.scenarios.options import Options
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.flight import Flight
-from outrider.swarm import Options, prepare
+from outrider.simulation.preparation import prepare
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.airframe import airframe, airframe_record
 from sitl.vehicle.config import VehicleConfig

@@ -13,7 +13,7 @@ from rich.text import Text
 from outrider.certify.histories import Kind
 from outrider.certify.reading import read
 from outrider.certify.verdict import Verdict, judge
-from outrider.terminal.console import share_progress
+from outrider.terminal.share_progress import share_progress
 
 MOST_SHOWN = 20
 

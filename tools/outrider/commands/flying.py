@@ -53,12 +53,15 @@ def swarm(
 ) -> None:
     """Fly a scenario, in lock-step unless told otherwise, and leave logs, summary and picture in a run
     directory."""
-    from outrider import swarm as flying
     from outrider.report.command import NAME, make, write
     from outrider.runs.summary import exit_status
-    from outrider.terminal.console import progress, share_progress, show
+    from outrider.scenarios.options import Options
+    from outrider.simulation.console import progress, show
+    from outrider.simulation.preparation import prepare
+    from outrider.swarm import command as flying
+    from outrider.terminal.share_progress import share_progress
 
-    options = flying.Options(
+    options = Options(
         method,
         avoidance,
         planar,
@@ -72,11 +75,11 @@ def swarm(
         flavour,
         response,
     )
-    prepared = flying.prepare(scenario, options)
+    prepared = prepare(scenario, options)
     with ExitStack() as open_:
         shown = None
         if view:
-            from outrider.view.show import showing
+            from outrider.swarm.show import showing
 
             shown = open_.enter_context(showing())
         directory = flying.run_directory(out, prepared.scenario, seed)

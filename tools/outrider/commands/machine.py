@@ -25,7 +25,8 @@ def bench(
 ) -> None:
     """Measure this machine: plan step, PIQP, physics, codec, tlog, real-time factor (CPU time)."""
     from outrider.bench.command import measure
-    from outrider.terminal.console import share_progress, show_bench
+    from outrider.simulation.console import show_bench
+    from outrider.terminal.share_progress import share_progress
 
     with share_progress() as watch:
         figures = measure(watch, quick=quick)

@@ -11,8 +11,8 @@ from companion.flight.autopilots.limits import STOCK, Limits, limits_of, stock_p
 from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
 from outrider.doctor.finding import Finding, Severity
 from outrider.doctor.identity import ROTORCRAFT
-from outrider.fly.fly_config import FlyConfig
 from outrider.resources import find
+from outrider.scenarios.fly_config import FlyConfig
 from outrider.yaml_files.yaml_file import load
 
 _FILES: Final = {ARDUPILOT_NUMBER: "ardupilot", PX4_NUMBER: "px4"}

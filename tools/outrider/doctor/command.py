@@ -22,8 +22,8 @@ from outrider.doctor.finding import Verdict
 from outrider.doctor.page import document, show
 from outrider.errors import InputError
 from outrider.key_files import key_of
-from outrider.replay.timeline import on_one_line
-from outrider.terminal.console import share_progress
+from outrider.logs.timeline import on_one_line
+from outrider.terminal.share_progress import share_progress
 
 READY, NOT_READY = 0, 1
 _STEP: Final = 20_000

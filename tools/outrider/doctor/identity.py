@@ -10,8 +10,8 @@ from mavlink_bridge.messages import AutopilotVersion, ExtendedSysState, Heartbea
 from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
 from outrider.doctor.finding import Finding, Severity
 from outrider.doctor.speaker import CRITICAL
+from outrider.logs.flight_modes import mode_name
 from outrider.logs.words import enumerated
-from outrider.sitl_server.modes import mode_name
 
 ROTORCRAFT: Final = {2, 3, 4, 13, 14, 15, 29, 35, 43}
 """MAV_TYPE of what can hover: quadrotor, coaxial, helicopter, hexa-, octo-, tri-, dodeca-, decarotor, generic

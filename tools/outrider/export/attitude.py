@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from outrider.export.arrays import Array, Motion
-from outrider.export.log import Spoken
+from outrider.logs.message_stream import Spoken
+from outrider.runs.arrays import Array, Motion
 
 SAID: Final = "ATTITUDE"
 _AUTOPILOT_LINK = 0

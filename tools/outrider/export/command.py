@@ -14,11 +14,11 @@ from rich.text import Text
 
 from mavlink_bridge.errors import LogError
 from outrider.errors import InputError
-from outrider.export.log import Watch, total_loss
 from outrider.export.place import FORMATS, destination, fresh
-from outrider.export.run import Run, read
 from outrider.export.written import Written
-from outrider.terminal.console import share_progress
+from outrider.logs.message_stream import Watch, total_loss
+from outrider.runs.source import Run, read
+from outrider.terminal.share_progress import share_progress
 
 
 class Result(NamedTuple):

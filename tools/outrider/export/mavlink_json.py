@@ -10,10 +10,10 @@ from functools import cache, lru_cache
 from typing import Final
 
 from outrider.export import foxglove, foxglove_schemas, json_schema
-from outrider.export.dialect import Field, Kind
 from outrider.export.json_schema import Node, Schema
-from outrider.export.log import Log, Spoken
 from outrider.export.mcap_file import Entry, entry
+from outrider.logs.dialect import Field, Kind
+from outrider.logs.message_stream import Log, Spoken
 
 POSITION, WORDS = "GLOBAL_POSITION_INT", "STATUSTEXT"
 _AUTOPILOT_LINK = 0

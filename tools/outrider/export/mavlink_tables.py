@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from outrider.export.dialect import Field, Kind, text
-from outrider.export.log import Spoken
 from outrider.export.table_files import Column, Part
+from outrider.logs.dialect import Field, Kind, text
+from outrider.logs.message_stream import Spoken
 
 HEAD: Final = ("time_us", "log", "link", "system", "component")
 """Columns before the fields: Unix µs, the vehicle whose log it is (0 for a log of no run), the link (0…3),

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from outrider.export import mavlink_json, scene, series
 from outrider.export.attitude import leanings
-from outrider.export.log import Watch, watched
 from outrider.export.mcap_file import Entry, McapFile
-from outrider.export.run import Run
 from outrider.export.written import Written
+from outrider.logs.message_stream import Watch, watched
 from outrider.runs.configuration import CONFIGURATION
+from outrider.runs.source import Run
 
 _ATTACHED = ((CONFIGURATION, "application/yaml"), ("summary.json", "application/json"))
 _PREPARED = 0.15

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from outrider.export.arrays import Motion, Plans, Whole
-from outrider.export.run import Run
 from outrider.export.table_files import Column, Part
+from outrider.runs.arrays import Motion, Plans, Whole
+from outrider.runs.source import Run
 
 _ROWS: Final = 65_536
 """Of a part, or few more."""

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from struct import Struct
 from typing import Any, Final, NamedTuple
 
-from outrider.export.dialect import Kind
 from outrider.export.ulog_file import Topic
+from outrider.logs.dialect import Kind
 
 _LOCAL_NED = 1
 _ARMED_FLAG, _ARMED, _DISARMED = 128, 2, 1

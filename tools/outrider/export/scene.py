@@ -16,11 +16,11 @@ from companion.config.companion import Obstacle
 from companion.config.obstacles import Post
 from outrider.errors import InputError
 from outrider.export import foxglove, foxglove_schemas
-from outrider.export.arrays import Array, Motion
 from outrider.export.attitude import quaternions, up_vectors
 from outrider.export.foxglove import Color, Json
 from outrider.export.mcap_file import Entry, entry
 from outrider.resources import find
+from outrider.runs.arrays import Array, Motion
 from outrider.scenarios.moving import MovingPostPart
 from outrider.scenarios.scenario import Scenario
 from outrider.yaml_files.yaml_file import load

@@ -11,10 +11,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from outrider.export.arrays import Motion, Plans, Single
 from outrider.export.json_schema import enu, number, schema
 from outrider.export.mcap_file import Entry, entry
-from outrider.export.run import Run
+from outrider.runs.arrays import Motion, Plans, Single
+from outrider.runs.source import Run
 
 MOTION: Final = schema(
     "outrider.Motion",

@@ -6,10 +6,10 @@ from itertools import chain
 from pathlib import Path
 
 from outrider.export import mavlink_tables, motion_tables
-from outrider.export.log import Watch, watched
-from outrider.export.run import Run
 from outrider.export.table_files import TableFiles
 from outrider.export.written import Written
+from outrider.logs.message_stream import Watch, watched
+from outrider.runs.source import Run
 
 
 def write(run: Run, folder: Path, form: str, watch: Watch) -> Written:

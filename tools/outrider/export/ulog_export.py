@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from outrider.errors import InputError
-from outrider.export.dialect import Kind
-from outrider.export.log import Log, Spoken, Watch, watched
 from outrider.export.px4_topics import TOPICS, Px4Topics
-from outrider.export.run import Run
 from outrider.export.ulog_file import Topic, UlogFile
 from outrider.export.written import Written
+from outrider.logs.dialect import Kind
+from outrider.logs.message_stream import Log, Spoken, Watch, watched
+from outrider.runs.source import Run
 
 AUTOPILOT: Final = 1
 """MAV_COMP_ID_AUTOPILOT1."""

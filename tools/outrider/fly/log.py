@@ -14,7 +14,7 @@ from typing import Final, NamedTuple, Self
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.node import Datagram
-from outrider.simulation.recorder import Recorder
+from outrider.runs.recorder import Recorder
 
 BATCH: Final = 16
 """Entries that are handed to the thread together: some hundredths of a second, which it writes within a

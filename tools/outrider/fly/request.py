@@ -12,10 +12,10 @@ from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Endpoint, Replay, parse_endpoint
 from outrider.address_scope import exposed
 from outrider.errors import InputError
-from outrider.fly.fly_config import FlyConfig
 from outrider.fly.link_budget import doubts, doubts_of_autopilot
 from outrider.key_files import key_of
 from outrider.resources import find
+from outrider.scenarios.fly_config import FlyConfig
 from outrider.yaml_files.yaml_file import load
 
 

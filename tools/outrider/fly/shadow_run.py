@@ -19,10 +19,10 @@ from outrider.errors import InputError
 from outrider.fly.request import Request
 from outrider.fly.setpoint_check import gauge_for
 from outrider.fly.trajectory_comparison import likeness
-from outrider.replay.findings import document_of, leave
-from outrider.replay.roles import Cast, Survey, survey
-from outrider.replay.shadow_run import Rehearsed, rehearse
 from outrider.runs.directories import new_directory
+from outrider.shadow.findings import document_of, leave
+from outrider.shadow.roles import Cast, Survey, survey
+from outrider.shadow.shadow_run import Rehearsed, rehearse
 from outrider.terminal.lines import say
 from outrider.terminal.share_progress import share_progress
 

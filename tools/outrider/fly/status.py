@@ -17,9 +17,9 @@ from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.wire.signing import Signing
-from outrider.fly.supervised_node import OURS, TWIN, Cockpit
 from outrider.fly.transmit_statistics import Departures
-from outrider.sitl_server.modes import mode_name
+from outrider.logs.flight_modes import mode_name
+from outrider.supervision.supervised_node import OURS, TWIN, Cockpit
 
 SHOWN = 200_000
 """µs of the wall between two states."""

@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from outrider.replay.setpoints import TOGETHER, Array, Course, course
-from outrider.replay.shadow_run import Rehearsed
+from outrider.shadow.setpoints import TOGETHER, Array, Course, course
+from outrider.shadow.shadow_run import Rehearsed
 
 _FRESH: Final = 500_000
 """µs. An older place says nothing."""

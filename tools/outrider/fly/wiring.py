@@ -17,7 +17,7 @@ from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.links.serial_port import SerialPort
 from mavlink_bridge.wire.header import Header
 from outrider.errors import InputError
-from outrider.fly.duplicate_ids import Twin
+from outrider.supervision.duplicate_ids import Twin
 
 LAST_VEHICLE = 250
 """System ids above are ground stations'."""

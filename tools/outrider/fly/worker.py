@@ -21,14 +21,14 @@ from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.priority import ask_for_priority, sharpen_timers
 from mavlink_bridge.loops.realtime import RealTime
 from mavlink_bridge.wire.signing import Signing
-from outrider.fly.duplicate_ids import Twin
 from outrider.fly.log import Log
 from outrider.fly.process_channel import OrderLink
 from outrider.fly.read_only_link import HarmlessLink
 from outrider.fly.request import Request
 from outrider.fly.status import News
-from outrider.fly.supervised_node import Cockpit
 from outrider.fly.transmit_statistics import Departures
+from outrider.supervision.duplicate_ids import Twin
+from outrider.supervision.supervised_node import Cockpit
 
 _IGNORED: Final = (
     signal.SIGINT,

@@ -14,7 +14,7 @@ from outrider.logs.census import Census, Vehicle
 from outrider.logs.tables import show
 from outrider.logs.tally import count
 from outrider.logs.words import MILLION, enumerated, rates
-from outrider.terminal.console import share_progress
+from outrider.terminal.share_progress import share_progress
 
 _ALLOWED = "allowed: a .tlog, or a .tlog.gz"
 

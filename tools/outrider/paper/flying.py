@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from outrider.runs.outcome import Outcome
-from outrider.swarm import measured
+from outrider.simulation.preparation import measured
 from outrider.sweep.flying import prepared
 from outrider.sweep.tasks import Task
 

@@ -23,18 +23,18 @@ from outrider.realtime.processes import Crew
 from outrider.realtime.shared_page import Board
 from outrider.realtime.spawn import muster, operators_turn, rough
 from outrider.realtime.traces import Moved, Trace, put_together
+from outrider.realtime.view import RealTimeView, Seen
 from outrider.realtime.view_page import Window
 from outrider.realtime.wiring import wire
 from outrider.realtime.workers import Remains
 from outrider.runs import names
+from outrider.runs.ground_truth import SAMPLE, Array
 from outrider.runs.outcome import Messages, Outcome, Punctuality
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.conductor import PREPARE_CAP, Conductor, Sight, Stage
 from outrider.simulation.disturbances import Event, events, strike_computer
 from outrider.simulation.fleet import Fleet
 from outrider.simulation.flight import Progress, truth_of
-from outrider.simulation.ground_truth import SAMPLE, Array
-from outrider.view.realtime import RealTimeView, Seen
 from sitl.vehicle.config import VehicleConfig
 
 _START, _START_WITH_PRIORITY = 1_000_000, 3_000_000

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavlink_bridge.frames import ned_to_enu
-from outrider.simulation.ground_truth import ROW, SAMPLE, Array, Truth
+from outrider.runs.ground_truth import ROW, SAMPLE, Array, Truth
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.moving import places as moving_places
 from outrider.simulation.targets import Placed, Target

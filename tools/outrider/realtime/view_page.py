@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.config.planning import MethodName
-from outrider.view.companion_snapshot import MODES, Glimpse
-from outrider.view.orders import Change
-from outrider.view.snapshot import KNOTS, Array, State
-from outrider.view.view_commands import Wishes
+from outrider.scene.changes import Change
+from outrider.scene.companion_snapshot import MODES, Glimpse
+from outrider.scene.snapshot import KNOTS, Array, State
+from outrider.scene.view_commands import Wishes
 
 EVERY = 50_000
 """µs between two looks at a node."""

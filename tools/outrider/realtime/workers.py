@@ -30,13 +30,13 @@ from outrider.realtime.shared_page import Board
 from outrider.realtime.traces import TraceWriter
 from outrider.realtime.view_page import EVERY, Window
 from outrider.runs import names
+from outrider.runs.recorder import Recorder
+from outrider.scene.companion_snapshot import glimpse
+from outrider.scene.view_commands import LOSSY
 from outrider.simulation.bystander import Bystander
 from outrider.simulation.disturbances import Event, strike_autopilot, strike_computer
 from outrider.simulation.moving import MovingObstacle
-from outrider.simulation.recorder import Recorder
 from outrider.simulation.targets import Target
-from outrider.view.companion_snapshot import glimpse
-from outrider.view.view_commands import LOSSY
 from sitl.node import Autopilot
 
 TOLERANCE = 1_000

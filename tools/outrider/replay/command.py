@@ -14,7 +14,7 @@ from mavlink_bridge.messages import Message
 from mavlink_bridge.wire.codec import Codec
 from outrider.replay.companion_replay import Difference, Reenacted, Sent
 from outrider.replay.run_replay import again
-from outrider.terminal.console import share_progress
+from outrider.terminal.share_progress import share_progress
 
 
 def replay(directory: Path, as_json: bool = False) -> int:

@@ -14,16 +14,17 @@ from rich.text import Text
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.log import Record, read_tlog
 from outrider.errors import InputError
-from outrider.replay.findings import document_of, leave
-from outrider.replay.roles import Cast, check, survey
-from outrider.replay.shadow_run import Rehearsed, rehearse
 from outrider.replay.target_replay import prepared, setpoints
 from outrider.resources import find
 from outrider.runs import names
 from outrider.runs.directories import new_directory
 from outrider.scenarios.scenario import FIRST_SYSTEM, Scenario
-from outrider.swarm import fly
-from outrider.terminal.console import progress, share_progress
+from outrider.shadow.findings import document_of, leave
+from outrider.shadow.roles import Cast, check, survey
+from outrider.shadow.shadow_run import Rehearsed, rehearse
+from outrider.simulation.console import progress
+from outrider.swarm.command import fly
+from outrider.terminal.share_progress import share_progress
 from outrider.yaml_files.yaml_file import load
 
 Pacing = Callable[[Iterable[Record]], Iterable[Record]]

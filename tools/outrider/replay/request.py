@@ -16,9 +16,9 @@ from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import InputError
 from outrider.replay.command import replay as reenacting
 from outrider.replay.log_command import Pacing, chasing, rehearsal
-from outrider.replay.roles import Cast
 from outrider.replay.telemetry import Forwarder, paced
-from outrider.terminal.console import share_progress
+from outrider.shadow.roles import Cast
+from outrider.terminal.share_progress import share_progress
 
 _ASKED = "allowed: --list, --own ID, --target ID, --to ENDPOINT, or the directory of a run"
 

@@ -12,11 +12,11 @@ from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import header
-from outrider import swarm
 from outrider.errors import InputError
-from outrider.replay.roles import SETPOINT, Survey
 from outrider.resources import find
 from outrider.scenarios.scenario import Origin, RecordedTarget, Ring, Scenario
+from outrider.shadow.roles import SETPOINT, Survey
+from outrider.simulation.preparation import Prepared
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
@@ -25,7 +25,7 @@ _ROOM = 20.0
 _LONGEST_S = 3600.0
 
 
-def prepared(log: Path, seen: Survey, target: int, like: str) -> swarm.Prepared:
+def prepared(log: Path, seen: Survey, target: int, like: str) -> Prepared:
     """One vehicle with the companion's settings of the scenario ``like`` around ``target``, of which ``seen``
     is the survey, from the first record of the log to the last, an hour at most. InputError for settings that
     are of no use."""
@@ -59,7 +59,7 @@ def prepared(log: Path, seen: Survey, target: int, like: str) -> swarm.Prepared:
     except ValidationError as error:
         said = "; ".join(one["msg"] for one in error.errors())
         raise InputError(f"{log}: cannot be flown like {like}: {said}") from None
-    return swarm.Prepared(scenario, load(find("vehicles", scenario.vehicle), VehicleConfig))
+    return Prepared(scenario, load(find("vehicles", scenario.vehicle), VehicleConfig))
 
 
 def setpoints(log: Path) -> list[tuple[int, SetpointLocal]]:

@@ -17,7 +17,7 @@ from mavlink_bridge.links.link import Link
 from mavlink_bridge.tlog.log import Record
 from mavlink_bridge.wire.framing import without_signature
 from mavlink_bridge.wire.header import header
-from outrider.replay.timeline import IDLE, on_one_line
+from outrider.logs.timeline import IDLE, on_one_line
 
 _NAMES = [
     "HEARTBEAT",

@@ -41,7 +41,7 @@ def report(directory: Path, out: Path | None = None, as_json: bool = False) -> i
 
     Raises InputError for what is no run, and for a file that is there and no report.
     """
-    from outrider.terminal.console import share_progress
+    from outrider.terminal.share_progress import share_progress
 
     path = directory / NAME if out is None else out
     if directory.is_dir():

@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict
 
 from outrider.errors import Fault, InputError
-from outrider.fly.fly_config import FlyConfig
+from outrider.scenarios.fly_config import FlyConfig
 from outrider.scenarios.scenario import Scenario
 from outrider.yaml_files.yaml_file import load
 

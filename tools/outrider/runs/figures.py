@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
 from outrider.runs.summary import Value, standoff_errors, yaw_errors
 from outrider.scenarios.scenario import TARGET_SYSTEM
-from outrider.simulation.ground_truth import Samples
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from companion.avoidance.field.plan_log import PlanLog
 from companion.planning import Tally
+from outrider.runs.ground_truth import Truth
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import Starts
-from outrider.simulation.ground_truth import Truth
 
 
 class Messages(NamedTuple):

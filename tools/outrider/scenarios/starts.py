@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from outrider.scenarios.places import Points, Ring
 from outrider.scenarios.scenario import Scenario
-from outrider.simulation.streams import Stream, stream
+from outrider.scenarios.streams import Stream, stream
 
 Array = NDArray[np.float64]
 

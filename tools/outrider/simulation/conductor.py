@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from outrider.runs.formation_error import standoff
+from outrider.runs.ground_truth import Array
 from outrider.scenarios.scenario import FixedTarget, Scenario
 from outrider.scenarios.starts import Starts
-from outrider.simulation.ground_truth import Array
 from outrider.simulation.operator import Operator
 from sitl.estimation.profiles import PROFILES
 

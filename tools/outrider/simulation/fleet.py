@@ -22,10 +22,10 @@ from outrider.scenarios.faults import ClockFault
 from outrider.scenarios.links import Links
 from outrider.scenarios.scenario import FixedTarget, PathTarget, Scenario
 from outrider.scenarios.starts import starts
+from outrider.scenarios.streams import Stream, stream
 from outrider.simulation.bystander import Bystander
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.operator import Operator
-from outrider.simulation.streams import Stream, stream
 from outrider.simulation.targets import Recorded, Standing, Target, Walking
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot

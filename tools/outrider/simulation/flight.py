@@ -17,15 +17,15 @@ from mavlink_bridge.loops.garbage import seldom_collected
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
 from mavlink_bridge.network.simulated import Ether
 from outrider.runs import names
+from outrider.runs.ground_truth import Limits, Truth
 from outrider.runs.outcome import Messages, Outcome
+from outrider.runs.recorder import Recorder
 from outrider.scenarios.faults import Vanish
 from outrider.scenarios.links import PartitionPart
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.conductor import Conductor, Sight, Stage
 from outrider.simulation.disturbances import Event, events, strike_autopilot, strike_computer
 from outrider.simulation.fleet import Fleet
-from outrider.simulation.ground_truth import Limits, Truth
-from outrider.simulation.recorder import Recorder
 from outrider.simulation.truth_observer import Witness
 from sitl.vehicle.config import VehicleConfig
 

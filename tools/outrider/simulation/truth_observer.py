@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mavlink_bridge.frames import ned_to_enu, yaw_to_enu
-from outrider.simulation.ground_truth import NOWHERE, ROW, SAMPLE, Array, Truth
+from outrider.runs.ground_truth import NOWHERE, ROW, SAMPLE, Array, Truth
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.moving import places as moving_places
 from outrider.simulation.targets import Placed, Target

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from outrider.sitl_server.modes import mode_name
+from outrider.logs.flight_modes import mode_name
 from outrider.sitl_server.request import Request
 from outrider.sitl_server.shared_page import SAYINGS, Board, Gauges
 

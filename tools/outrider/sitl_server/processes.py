@@ -12,10 +12,10 @@ from typing import Final
 from mavlink_bridge.clocks.clock import PacedClock, WallClock
 from mavlink_bridge.links.link import Link
 from outrider.errors import OutriderError
+from outrider.processes.cores import cores
 from outrider.sitl_server.request import Request
 from outrider.sitl_server.shared_page import Board
 from outrider.sitl_server.worker import PERIOD, STRIDE, Worker
-from outrider.sweep.execution import cores
 from sitl.autopilot.saved import Saved
 
 FULL: Final = 10

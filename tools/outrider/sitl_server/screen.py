@@ -14,10 +14,10 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from outrider.logs.flight_modes import mode_name
 from outrider.sitl_server.addresses import Address
 from outrider.sitl_server.event_feed import Chronicle
 from outrider.sitl_server.figures import factor
-from outrider.sitl_server.modes import mode_name
 from outrider.sitl_server.request import Request
 from outrider.sitl_server.shared_page import Board, Gauges, Pace
 

@@ -14,8 +14,9 @@ from pydantic import BaseModel, JsonValue, ValidationError
 
 from outrider.errors import Fault, InputError
 from outrider.resources import find
+from outrider.scenarios.options import Options
 from outrider.scenarios.scenario import Scenario
-from outrider.swarm import Options, prepare
+from outrider.simulation.preparation import prepare
 from outrider.sweep.draw import draw
 from outrider.sweep.grid import Point, Sweep, overlay, points
 from outrider.sweep.scenes import Scene

@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from outrider.errors import InputError
+from outrider.processes.cores import cores
 from outrider.resources import find
 from outrider.runs import whole_file
 from outrider.sweep import directory as places
 from outrider.sweep import page, picture, regressions, tables
 from outrider.sweep.cells import Cell, cells, task
-from outrider.sweep.execution import WALL_LIMIT_S, Workers, cores, has_ended, header, work
+from outrider.sweep.execution import WALL_LIMIT_S, Workers, has_ended, header, work
 from outrider.sweep.flying import RUN
 from outrider.sweep.grid import Sweep
 from outrider.sweep.journal import Journal, opened

@@ -6,9 +6,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from outrider.processes.cores import cores
 from outrider.sweep import directory as places
 from outrider.sweep.cells import Cell, task
-from outrider.sweep.execution import WALL_LIMIT_S, cores, has_ended, work
+from outrider.sweep.execution import WALL_LIMIT_S, has_ended, work
 from outrider.sweep.journal import Header, opened
 from outrider.sweep.pool import Pool
 from outrider.sweep.progress import watching

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import JsonValue
 
-from outrider.simulation.streams import Stream, stream
+from outrider.scenarios.streams import Stream, stream
 from outrider.sweep.grid import leaves, overlay
 from outrider.sweep.places import Array, Circles, obstacles, scatter, walk
 from outrider.sweep.scenes import Scene, Things

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
 
@@ -56,8 +55,3 @@ def header(name: str, found: Sequence[Cell]) -> Header:
     """The sweep is its cells: more runs of the same go on in the same journal."""
     of_cells = hashlib.sha256(" ".join(sorted(cell.key for cell in found)).encode()).hexdigest()
     return Header(name, of_cells, versions())
-
-
-def cores() -> int:
-    """Those that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 from outrider.runs.summary import Value
 from outrider.scenarios.scenario import Scenario
-from outrider.swarm import Prepared, measure
+from outrider.simulation.preparation import Prepared, measure
 from outrider.sweep.cells import scenario_of
 from outrider.sweep.tasks import Task
 from sitl.vehicle.config import VehicleConfig

@@ -10,11 +10,11 @@ from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.replay.run_replay import again
-from outrider.replay.shadow_run import Rehearsed
 from outrider.replay.target_replay import setpoints
 from outrider.report.log_events import mode
 from outrider.runs import names
 from outrider.runs.summary import Value
+from outrider.shadow.shadow_run import Rehearsed
 from outrider.testing.golden import Golden
 from outrider.testing.setpoints import Setpoints
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from outrider.replay.setpoints import Course
+from outrider.shadow.setpoints import Course
 
 FLAG = "--update-golden"
 _HEAD = (

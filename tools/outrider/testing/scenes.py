@@ -10,12 +10,13 @@ from pydantic import ValidationError
 
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.log import read_tlog
-from outrider import swarm
 from outrider.errors import InputError
-from outrider.replay.roles import Cast, check, survey
-from outrider.replay.shadow_run import rehearse
 from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
+from outrider.shadow.roles import Cast, check, survey
+from outrider.shadow.shadow_run import rehearse
+from outrider.simulation.preparation import Prepared
+from outrider.swarm import command as swarm
 from outrider.testing.flown import Flown, Replayed
 from outrider.testing.golden import Golden
 from outrider.yaml_files.yaml_file import load
@@ -30,7 +31,7 @@ def flown(scenario: str | Path, seed: int, changes: dict[str, Any], folder: Path
     while (directory := folder / f"{of.name}-{seed}-{number}").exists():
         number += 1
     directory.mkdir()
-    summary = swarm.fly(swarm.Prepared(of, vehicle), seed, directory, lambda _stage, _seconds: None)
+    summary = swarm.fly(Prepared(of, vehicle), seed, directory, lambda _stage, _seconds: None)
     return Flown(directory, summary, of.systems, golden)
 
 

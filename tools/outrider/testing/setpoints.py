@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mavlink_bridge.messages import SetpointLocal
-from outrider.replay.setpoints import Course, Facts, course, facts, steps
+from outrider.shadow.setpoints import Course, Facts, course, facts, steps
 from outrider.testing.golden import Golden
 
 _MEAN = 1_000_000

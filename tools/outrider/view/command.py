@@ -19,7 +19,7 @@ from mavlink_bridge.links.opening import open_link
 from outrider.errors import InputError
 from outrider.interruption import noted
 from outrider.scenarios.scenario import TARGET_SYSTEM
-from outrider.terminal.console import share_progress
+from outrider.terminal.share_progress import share_progress
 from outrider.view.listener import Listener
 from outrider.view.page_server import Theatre
 from outrider.view.player import Player, load

@@ -16,10 +16,10 @@ from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
-from outrider.sitl_server.modes import is_armed, told_mode
-from outrider.view.scene import LEAST_REACH, Scene
-from outrider.view.snapshot import NO_PLAN, Array, Moment, Single, State, euler_attitude, padded
-from outrider.view.view_commands import Wishes
+from outrider.logs.flight_modes import is_armed, told_mode
+from outrider.scene.scene import LEAST_REACH, Scene
+from outrider.scene.snapshot import NO_PLAN, Array, Moment, Single, State, euler_attitude, padded
+from outrider.scene.view_commands import Wishes
 
 LOST, CARRIED, FRESH = 10.0, 0.5, 1.0
 """s after which a vehicle unheard of is no longer shown; for which it is carried on at its velocity; for

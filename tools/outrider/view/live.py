@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from outrider.view.datagram_channel import Line
+from outrider.scene.datagram_channel import Line
+from outrider.scene.scene import Scene
+from outrider.scene.snapshot import Moment
+from outrider.scene.view_commands import Wishes, encoded
 from outrider.view.player import Player
-from outrider.view.scene import Scene
-from outrider.view.snapshot import Moment
-from outrider.view.view_commands import Wishes, encoded
 
 
 class Ready(NamedTuple):

@@ -8,11 +8,11 @@ from collections.abc import Callable
 
 import viser
 
+from outrider.scene.scene import Scene
+from outrider.scene.snapshot import Moment
 from outrider.view.origin_check import guarded
 from outrider.view.panel import Panel
 from outrider.view.renderer import Stage
-from outrider.view.scene import Scene
-from outrider.view.snapshot import Moment
 from outrider.view.source import Source
 
 PICTURE = 1.0 / 30.0

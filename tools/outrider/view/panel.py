@@ -11,11 +11,11 @@ import viser
 from viser import uplot
 
 from outrider.scenarios.options import METHODS
-from outrider.view.palette import hex_of
+from outrider.scene.palette import hex_of
+from outrider.scene.scene import Scene
+from outrider.scene.snapshot import Moment, nearest
+from outrider.scene.view_commands import Wishes
 from outrider.view.renderer import Stage
-from outrider.view.scene import Scene
-from outrider.view.snapshot import Moment, nearest
-from outrider.view.view_commands import Wishes
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4", "8", "as fast as it can")
 TABLE_EVERY, PLOT_EVERY = 0.2, 0.5

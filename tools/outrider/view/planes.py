@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.avoidance.certified.separating_planes import nearest
-from outrider.view.snapshot import Array, Single
+from outrider.scene.snapshot import Array, Single
 
 NEAR = 8.0
 """m: vehicles further from each other than that have no need of a plane in the picture."""

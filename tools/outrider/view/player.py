@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from outrider.errors import Fault, InputError
-from outrider.export.arrays import Motion, Plans
-from outrider.export.run import read
 from outrider.resources import find
 from outrider.runs import names
+from outrider.runs.arrays import Motion, Plans
+from outrider.runs.source import read
 from outrider.scenarios.scenario import Scenario
+from outrider.scene.scene import SPAN, Scene, staged
+from outrider.scene.snapshot import Moment, State
+from outrider.scene.view_commands import Wishes
 from outrider.view.recorded import Record, record
-from outrider.view.scene import SPAN, Scene, staged
-from outrider.view.snapshot import Moment, State
-from outrider.view.view_commands import Wishes
 from outrider.yaml_files.yaml_file import load as load_yaml
 from sitl.vehicle.config import VehicleConfig
 

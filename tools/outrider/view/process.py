@@ -9,7 +9,7 @@ import signal
 import socket
 import sys
 
-from outrider.view.datagram_channel import Line
+from outrider.scene.datagram_channel import Line
 from outrider.view.live import Live, Ready
 
 _GENTLE = 10

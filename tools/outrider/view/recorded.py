@@ -18,9 +18,9 @@ from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
+from outrider.logs.flight_modes import is_armed, told_mode
 from outrider.runs import names
-from outrider.sitl_server.modes import is_armed, told_mode
-from outrider.view.snapshot import NO_PLAN, Array, Single, euler_attitude, padded
+from outrider.scene.snapshot import NO_PLAN, Array, Single, euler_attitude, padded
 
 FRESH = 1_000_000
 """µs for which a plan is shown after its epoch."""

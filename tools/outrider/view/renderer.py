@@ -8,11 +8,11 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from outrider.scene.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, linear, rgb
+from outrider.scene.scene import Scene, Solid
+from outrider.scene.snapshot import Array, Moment, Single
 from outrider.view import shapes
-from outrider.view.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, linear, rgb
 from outrider.view.planes import MOST, Plane, between, facing
-from outrider.view.scene import Scene, Solid
-from outrider.view.snapshot import Array, Moment, Single
 from outrider.view.trails import Trails
 
 WORLD = "/world"

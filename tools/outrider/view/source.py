@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from outrider.view.scene import Scene
-from outrider.view.snapshot import Moment
-from outrider.view.view_commands import Wishes
+from outrider.scene.scene import Scene
+from outrider.scene.snapshot import Moment
+from outrider.scene.view_commands import Wishes
 
 
 class Source(Protocol):

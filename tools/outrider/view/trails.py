@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from outrider.view.snapshot import Single
+from outrider.scene.snapshot import Single
 
 if TYPE_CHECKING:
     import viser

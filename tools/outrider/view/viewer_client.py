@@ -10,10 +10,10 @@ from importlib import import_module
 from pathlib import Path
 
 from outrider.errors import InputError
-from outrider.view.datagram_channel import Line, pair
+from outrider.scene.datagram_channel import Line, pair
+from outrider.scene.scene import Scene
+from outrider.scene.view_commands import Wishes
 from outrider.view.live import Begin, Landed, Ready
-from outrider.view.scene import Scene
-from outrider.view.view_commands import Wishes
 
 _PATIENCE = 60.0
 """s that it has to start."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from outrider.errors import Fault, InputError
-from outrider.export.log import LATEST
+from outrider.logs.message_stream import LATEST
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]

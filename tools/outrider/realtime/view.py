@@ -9,10 +9,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from outrider.view.datagram_channel import Line
-from outrider.view.orders import Change, Orders
-from outrider.view.snapshot import Array, Moment, Single, State, enu_attitude
-from outrider.view.view_commands import decoded
+from outrider.scene.changes import Change, Orders
+from outrider.scene.datagram_channel import Line
+from outrider.scene.snapshot import Array, Moment, Single, State, enu_attitude
+from outrider.scene.view_commands import decoded
 
 PICTURE = 50_000
 """µs between two moments that are told."""

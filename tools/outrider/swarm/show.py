@@ -8,15 +8,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from outrider.view.lockstep import LockStepView
-from outrider.view.orders import Orders
-from outrider.view.realtime import RealTimeView
-from outrider.view.scene import Lever, staged
-from outrider.view.view_commands import Wishes
+from outrider.realtime.view import RealTimeView
+from outrider.scene.changes import Orders
+from outrider.scene.scene import Lever, staged
+from outrider.scene.view_commands import Wishes
+from outrider.swarm.lockstep_view import LockStepView
 from outrider.view.viewer_client import Attendant
 
 if TYPE_CHECKING:
-    from outrider.swarm import Prepared
+    from outrider.simulation.preparation import Prepared
 
 _CHANGES: frozenset[Lever] = frozenset({"methods", "loss", "target"})
 

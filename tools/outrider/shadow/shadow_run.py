@@ -23,12 +23,12 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog.log import Record
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import header
-from outrider.fly.supervised_node import Cockpit
-from outrider.replay.roles import GLOBAL, Cast, Part, Survey
-from outrider.replay.timeline import IDLE, on_one_line
+from outrider.logs.timeline import IDLE, on_one_line
 from outrider.scenarios.part import TARGET_SYSTEM
+from outrider.shadow.roles import GLOBAL, Cast, Part, Survey
 from outrider.simulation.beacon import Beacon
 from outrider.simulation.paths import Motion
+from outrider.supervision.supervised_node import Cockpit
 
 _NEVER = 1 << 60
 """µs, 36,000 years after 1970: damage."""

@@ -5,44 +5,30 @@ from __future__ import annotations
 import os
 import sys
 import time
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import yaml
 
-from mavlink_bridge.frames import FleetFrame
-from outrider.errors import Fault, InputError
 from outrider.interruption import interruptible
-from outrider.resources import config_root, find
+from outrider.resources import config_root
 from outrider.runs import figures
 from outrider.runs.directories import new_directory
 from outrider.runs.flight_file import write_flight, write_plan_times
 from outrider.runs.outcome import Outcome
 from outrider.runs.plans_file import write_plans
-from outrider.runs.summary import WALL_FIELDS, Cost, Value, summarise, write
-from outrider.scenarios.faults import MotorFailure
-from outrider.scenarios.options import METHODS, Options, apply
-from outrider.scenarios.scenario import RecordedTarget, Scenario
+from outrider.runs.summary import Cost, Value, summarise, write
+from outrider.scenarios.scenario import Scenario
 from outrider.simulation.flight import Flight, Progress
-from outrider.simulation.targets import load as load_log
-from outrider.yaml_files.yaml_file import load
-from sitl.vehicle.config import VehicleConfig
+from outrider.simulation.preparation import Prepared
 
 if TYPE_CHECKING:
-    from outrider.view.show import Show
+    from outrider.swarm.show import Show
 
 __all__ = [
     "LOCK_STEP",
-    "METHODS",
-    "Options",
     "Pace",
-    "Prepared",
-    "apply",
     "fly",
-    "measure",
-    "measured",
-    "prepare",
     "run_directory",
 ]
 
@@ -55,37 +41,6 @@ class Pace(NamedTuple):
 
 
 LOCK_STEP = Pace()
-
-
-class Prepared(NamedTuple):
-    """A scenario as it will be flown, with its vehicle."""
-
-    scenario: Scenario
-    vehicle: VehicleConfig
-
-
-def prepare(name: str, options: Options) -> Prepared:
-    """Load a scenario by name or path and apply ``options``. InputError in one line for whatever is wrong."""
-    path = find("scenarios", name)
-    scenario = apply(load(path, Scenario), options)
-    if isinstance(scenario.target, RecordedTarget):
-        # Before a run directory is made: a log that cannot be used leaves none behind.
-        origin = scenario.origin
-        frame = FleetFrame(origin.latitude, origin.longitude, origin.altitude)
-        load_log(scenario.target, config_root() / "logs" / scenario.target.log, frame)
-    if scenario.physics == "jsbsim":
-        # Nor does a package that is missing.
-        import_module("jsbsim")
-    vehicle = load(find("vehicles", scenario.vehicle), VehicleConfig)
-    last = len(vehicle.rotors) - 1
-    wrong = [
-        Fault(str(path), f"faults[{index}].rotor is {fault.rotor}; {scenario.vehicle} has rotors 0 to {last}")
-        for index, fault in enumerate(scenario.faults)
-        if isinstance(fault, MotorFailure) and fault.rotor > last
-    ]
-    if wrong:
-        raise InputError(*wrong)
-    return Prepared(scenario, vehicle)
 
 
 def fly(
@@ -117,21 +72,6 @@ def fly(
         write_plan_times(outcome, directory / "plan_times.npz")
         figures.draw(outcome, summary, directory / "flight.png")
         return summary
-
-
-def measure(prepared: Prepared, seed: int) -> dict[str, Value]:
-    """Fly it for what its seed decides: no files, and of the summary all but ``WALL_FIELDS``."""
-    return measured(prepared, seed)[1]
-
-
-def measured(prepared: Prepared, seed: int) -> tuple[Outcome, dict[str, Value]]:
-    """As ``measure``, with all that is left of the flight."""
-    # Reading the CPU clock before and after every plan costs more than a hundredth of a flight.
-    flight = Flight(*prepared, seed, config_root() / "logs", stopwatch=lambda: 0)
-    flight.run()
-    outcome = flight.outcome
-    summary = summarise(outcome, Cost(0.0, 0.0), None)
-    return outcome, {key: value for key, value in summary.items() if key not in WALL_FIELDS}
 
 
 def _flown(

@@ -19,8 +19,8 @@ from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
-from outrider.fly.duplicate_ids import Twin
-from outrider.fly.takeoff_inhibit import Gate
+from outrider.supervision.duplicate_ids import Twin
+from outrider.supervision.takeoff_inhibit import Gate
 
 CLOCK = "the rate of the autopilot's clock"
 TWIN = "the other companion with this system id to fall silent"

@@ -17,7 +17,7 @@ from mavlink_bridge.tlog.log import Record
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import header
 from outrider.errors import Fault, InputError
-from outrider.replay.timeline import on_one_line
+from outrider.logs.timeline import on_one_line
 
 SETPOINT, LOCAL, GLOBAL, ORIGIN = 84, 32, 33, 49
 _FAR = 5000.0

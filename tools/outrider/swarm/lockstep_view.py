@@ -8,13 +8,13 @@ import time
 import numpy as np
 
 from mavlink_bridge.frames import ned_to_enu
+from outrider.scene.changes import Change, Orders
+from outrider.scene.companion_snapshot import glimpse
+from outrider.scene.datagram_channel import Line
+from outrider.scene.snapshot import Moment, enu_attitude
+from outrider.scene.view_commands import LOSSY, Wishes, decoded
 from outrider.simulation.flight import EPOCH, Flight
-from outrider.view.companion_snapshot import glimpse
-from outrider.view.datagram_channel import Line
-from outrider.view.orders import Change, Orders
-from outrider.view.pace import Pace
-from outrider.view.snapshot import Moment, enu_attitude
-from outrider.view.view_commands import LOSSY, Wishes, decoded
+from outrider.swarm.pace import Pace
 
 PICTURE = 0.04
 """s of wall time between two moments that are told."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from outrider.view.view_commands import Wishes
+from outrider.scene.view_commands import Wishes
 
 LEASE = 2.0
 """s for which a wish counts after it was said."""

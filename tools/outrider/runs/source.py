@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 
 from mavlink_bridge.errors import LogError
 from outrider.errors import Fault, InputError
-from outrider.export.arrays import Motion, Plans, read_motion, read_plans
-from outrider.export.log import Log
+from outrider.logs.message_stream import Log
 from outrider.runs import names
+from outrider.runs.arrays import Motion, Plans, read_motion, read_plans
 from outrider.runs.configuration import CONFIGURATION, configured
 from outrider.scenarios.scenario import Scenario
 

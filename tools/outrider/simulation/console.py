@@ -13,7 +13,6 @@ from rich.table import Table
 from outrider.runs.summary import Value
 from outrider.simulation.conductor import Stage
 from outrider.terminal.progress_lines import ProgressLines
-from outrider.terminal.share_progress import share_progress as share_progress
 
 _REFRESH_S = 0.1
 _WORDS = {

@@ -9,7 +9,7 @@ import numpy as np
 from companion.flight.guard import Holding
 from companion.node import Companion
 from companion.values.phase import Phase
-from outrider.view.snapshot import NO_PLAN, Single, State, padded
+from outrider.scene.snapshot import NO_PLAN, Single, State, padded
 
 _HELD = {Holding.HELD: ", old plan", Holding.BRAKING: ", braking"}
 MODES = tuple(phase.value + held for phase in Phase for held in ("", *_HELD.values()))

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from outrider.view.view_commands import Wishes
+from outrider.scene.view_commands import Wishes
 
 FILE = "orders.json"
 """In the run directory, if there were any."""

@@ -10,7 +10,7 @@ from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.framing import Flaw, frame_at
 from mavlink_bridge.wire.signing import SETUP_SIGNING
-from outrider.export.dialect import Kind, kind
+from outrider.logs.dialect import Kind, kind
 
 LATEST: Final = (1 << 63) // 1000 - 1
 """µs, in the year 2262: later stamps do not fit the formats that count nanoseconds, and are damage."""

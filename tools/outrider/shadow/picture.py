@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from outrider.replay.setpoints import TOGETHER, Course, course
-from outrider.replay.shadow_run import Rehearsed
+from outrider.shadow.setpoints import TOGETHER, Course, course
+from outrider.shadow.shadow_run import Rehearsed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from outrider.replay.picture import draw
-from outrider.replay.setpoints import apart, course, facts
-from outrider.replay.shadow_run import Rehearsed
+from outrider.shadow.picture import draw
+from outrider.shadow.setpoints import apart, course, facts
+from outrider.shadow.shadow_run import Rehearsed
 
 _COLUMNS = (
     *("who", "time_us", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s"),
