@@ -1,4 +1,4 @@
-"""The compiled part of the JSBSim backend: what JSBSim measures → state row → speeds asked of the motors.
+"""Compiled part of the JSBSim backend: JSBSim's measurements → state row → commanded speeds of the motors.
 
 Rows are those of ``sitl.vehicle.pipeline``; controller, allocation and observer are its kernels. A *place*
 row has 12 columns: the origin of the site 0:3 (m, earth-centred, earth-fixed) and, row by row, the rotation
@@ -26,14 +26,14 @@ from sitl.vehicle.vectors import Axes, Vector, plus, times, to_body, to_ned
 
 @kernel
 def ned_rows(latitude: float, longitude: float) -> Axes:
-    """North, east and down (rad in, ECEF out) at a geodetic latitude and a longitude."""
+    """Return north, east and down (in ECEF) at a geodetic latitude and a longitude (rad)."""
     sa, ca, so, co = math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
     return ((-sa * co, -sa * so, ca), (-so, co, 0.0), (-ca * co, -ca * so, -sa))
 
 
 @kernel
 def euler_rows(roll: float, pitch: float, yaw: float) -> Axes:
-    """The rows of the rotation from NED to body axes (FRD): the body axes in NED. Angles in rad."""
+    """Return the rows of the rotation from NED to body axes (FRD), the body axes in NED; angles in rad."""
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     sy, cy = math.sin(yaw), math.cos(yaw)
     return (
@@ -45,7 +45,7 @@ def euler_rows(roll: float, pitch: float, yaw: float) -> Axes:
 
 @kernel
 def quaternion(axes: Axes) -> Quaternion:
-    """The attitude (w, x, y, z) whose body axes are these, in NED; by the largest of its parts (Shepperd)."""
+    """Return the attitude (w, x, y, z) with these body axes in NED; by its largest element (Shepperd)."""
     b1, b2, b3 = axes
     w = 1.0 + b1[0] + b2[1] + b3[2]
     x = 1.0 + b1[0] - b2[1] - b3[2]
@@ -65,7 +65,10 @@ def quaternion(axes: Axes) -> Quaternion:
 
 @kernel
 def motion_of(measured: FloatArray, place: FloatArray) -> tuple[Vector, Vector, Axes, Vector]:
-    """Position (m), velocity (m/s) and body axes in the site's NED, and body rates (rad/s), as measured."""
+    """Return the measured motion in the site's NED.
+
+    The result is position (m), velocity (m/s), body axes and body rates (rad/s).
+    """
     site = (three_at(place, 3), three_at(place, 6), three_at(place, 9))
     position = to_body(site, plus(times(FOOT, three_at(measured, 0)), -1.0, three_at(place, 0)))
     velocity = to_body(site, times(FOOT, three_at(measured, 3)))
@@ -150,8 +153,8 @@ def _build(digest: int) -> tuple[_Steer, _Sense]:
 
 _steer, _sense = _build(
     sources_digest(
-        "lanes.py",
-        "lanes_compiled.py",
+        "simd.py",
+        "simd_compiled.py",
         "vectors.py",
         "derivatives.py",
         "angles.py",
@@ -161,8 +164,8 @@ _steer, _sense = _build(
         "controller.py",
         "observer.py",
         "pipeline.py",
-        "backends/jsbsim_model.py",
-        "backends/jsbsim_pilot.py",
+        "../backends/jsbsim_model.py",
+        "../backends/jsbsim_pilot.py",
     )
 )
 
@@ -170,8 +173,10 @@ _steer, _sense = _build(
 def steer(
     state: FloatArray, command: FloatArray, airframes: NDArray[np.void], t: float, commanded: FloatArray
 ) -> None:
-    """Write the speeds (n,) (rad/s) asked of the motors ``t`` seconds into a command row; ``airframes`` (1,)
-    is the record."""
+    """Write the motors' commanded speeds (n,) (rad/s) ``t`` seconds into a command row.
+
+    ``airframes`` (1,) is the record.
+    """
     _steer(state, command, airframes, t, commanded)
 
 
@@ -182,6 +187,8 @@ def sense(
     command: FloatArray,
     airframes: NDArray[np.void],
 ) -> bool:
-    """Bring a state row up to what is ``measured`` after a step under a command row; False, having changed
-    nothing, when that is not finite."""
+    """Update a state row from the ``measured`` row after a step under a command row.
+
+    Return False, and change nothing, if the measured row is not finite.
+    """
     return _sense(state, measured, place, command, airframes)

@@ -95,8 +95,8 @@ def _build(digest: int) -> tuple[_Rows, _Rows]:
 
 _singly, _in_blocks = _build(
     sources_digest(
-        "lanes.py",
-        "lanes_compiled.py",
+        "simd.py",
+        "simd_compiled.py",
         "vectors.py",
         "derivatives.py",
         "angles.py",
@@ -104,7 +104,7 @@ _singly, _in_blocks = _build(
         "rotors.py",
         "allocation.py",
         "controller.py",
-        "environment.py",
+        "ground.py",
         "observer.py",
         "pipeline.py",
         "batch.py",
