@@ -1,0 +1,1 @@
+"""Companion computer: takes MAVLink messages and the time, gives set-points, plans and status messages."""

@@ -1,17 +1,17 @@
-"""The helm: carries a committed plan on when the companion that made it falls silent.
+"""Backup node: flies a committed plan to its end when the companion that made it falls silent.
 
-A vehicle that is promised to keep to its plan has to be told so every 20 ms; without a word its autopilot
-flies on along the last set-point for a time-out and then brakes, beside its plan and in the way of others
-that count on it. So a second, small program listens to what its companion tells: plans on the swarm link,
-set-points on the autopilot's. While these flow it says nothing. When they stop, and the autopilot is still in
-the mode in which set-points steer, it sends those of the newest committed plan, to its end and for some
-seconds of hover; then it leaves the vehicle to the autopilot's own failsafe. When the companion is back, it
-is at the same plan.
+A vehicle that must keep to its plan needs a set-point every 20 ms. Without one its autopilot flies on along
+the last set-point for a time-out and then brakes: beside its plan, and in the way of others that rely on it.
+So a second, small program receives what its companion sends: plans on the swarm link, set-points on the
+autopilot's link. While these arrive it sends no set-points. When they stop, and the autopilot is still in the
+mode in which it follows set-points, the backup node sends those of the newest committed plan, to its end and
+for some seconds of hover; then the autopilot's own failsafe applies. A companion that returns continues the
+same plan.
 
-It carries on only what it knows to be flown: the companion's last set-point has to agree with the plan that
-the helm holds, by its own clock and in its own local frame. It starts before the companion steers, or else it
-waits for the next plan; and an order to land, a farewell, another mode, a disarmed vehicle or three seconds
-without a heartbeat make it forget all.
+The backup node continues only a plan that is known to be flown: the companion's last set-point must agree
+with the plan that the backup node holds, by its own clock and in its own local frame. It must start before
+the companion steers; otherwise it waits for the next plan. An order to land, a farewell, another mode, a
+disarmed vehicle or three seconds without a heartbeat discard all plans.
 """
 
 from __future__ import annotations
@@ -55,19 +55,20 @@ from mavlink_bridge.wire.signing import Signing
 HELM = 191
 """MAV_COMP_ID_ONBOARD_COMPUTER."""
 _AGREES = 0.3
-"""m between a set-point of the companion and the own plan: what is flown in the time that it takes to
-arrive."""
+"""Largest distance (m) between a set-point and the own plan: what is flown while the set-point travels."""
 _EPOCHS = 4
-"""A plan that begins further from now is none of this time."""
+"""Largest distance, in epochs, between now and the beginning of a plan that is accepted."""
 _SECOND = 1_000_000
 _SILENT = 4
-"""Set-points missing on end after which the companion counts as silent."""
+"""Number of consecutive missing set-points after which the companion counts as silent."""
 _HEARTBEAT, _SETPOINT, _ORIGIN, _COMMAND, _TUNNEL = 0, 84, 49, 76, 385
 
 
 class BackupNode:
-    """A ``Node`` beside the companion of ``system``, on the same clock. Links: ``autopilot``, ``swarm``.
-    ``signing``: its own, with the companion's key."""
+    """Backup ``Node`` beside the companion of ``system``, on the same clock.
+
+    Links: ``autopilot``, ``swarm``. ``signing`` is the node's own instance, with the companion's key.
+    """
 
     def __init__(
         self, config: CompanionConfig, system: int, fleet: FleetFrame, signing: Signing | None = None
@@ -103,10 +104,10 @@ class BackupNode:
         self._next = self._next_beat = 0
         self._boot: int | None = None
         self.carried = 0
-        """Set-points sent in the companion's place."""
+        """Number of set-points sent in place of the companion."""
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Listen; and where the companion is silent, send what its plan says at ``now`` (µs)."""
+        """Receive messages; while the companion is silent, send the set-point of its plan at ``now`` (µs)."""
         self._boot = now if self._boot is None else self._boot
         if self._signing is not None:
             self._signing.present(now)
@@ -116,7 +117,7 @@ class BackupNode:
         beat = self._heartbeat(now)
         profile = self._profile(now)
         if profile is None:
-            # Somebody else has the vehicle, or may have it: what was planned before that counts no more.
+            # Another controller has the vehicle, or may have it: plans made before no longer count.
             self._forget()
         if now < self._next or profile is None or self._local is None or self._heard is None:
             return beat
@@ -129,7 +130,7 @@ class BackupNode:
             return beat
         self._next = now + period
         self.carried += 1
-        # The nose stays where it was: whom it faces is not known here.
+        # The yaw stays as it was: the target is not known here.
         yaw = Yaw(self._local.yaw_to_fleet(last.yaw), 0.0, 0.0)
         time = now + self._config.setpoint_lead_us
         mask = profile.setpoint_mask
@@ -137,7 +138,7 @@ class BackupNode:
         return [*beat, Datagram("autopilot", self._codecs["autopilot"].encode(message))]
 
     def _heartbeat(self, now: int) -> list[Datagram]:
-        """Once a second: so that routers know the way to it, and people that it is there."""
+        """Return a heartbeat once a second: routers learn the route from it, and operators see the node."""
         if now < self._next_beat:
             return []
         self._next_beat = now + _SECOND
@@ -160,7 +161,7 @@ class BackupNode:
                 pass
 
     def _file(self, now: int, message: Tunnel) -> None:
-        """A plan of the companion's; or, with a farewell, the end of its plans: it lands."""
+        """Store a plan of the companion; discard all plans on a farewell, after which the companion lands."""
         try:
             if message.payload_type == ROSTER and unpack_roster(message.payload).farewell:
                 self._forget()
@@ -173,12 +174,12 @@ class BackupNode:
         if plan.origin != self._fleet.fingerprint or not rests(plan) or not near:
             return
         self._plans[plan.epoch] = plan
-        # The one that is flown, and what follows it.
+        # Keep the plan that is flown, and those after it.
         flown = max((epoch for epoch in self._plans if epoch <= now), default=plan.epoch)
         self._plans = {epoch: kept for epoch, kept in self._plans.items() if epoch >= flown}
 
     def _horizon(self, now: int) -> Horizon | None:
-        """The committed plan at ``now`` (µs): the newest that has begun."""
+        """Return the committed plan at ``now`` (µs): the newest that has begun; None without one."""
         epoch = max((epoch for epoch in self._plans if epoch <= now), default=None)
         if epoch is None:
             return None
@@ -188,13 +189,13 @@ class BackupNode:
         return self._flown[1]
 
     def _agrees(self, now: int, message: SetpointLocal) -> bool:
-        """Whether the companion sends what the own plan says."""
+        """Return whether the set-point of the companion agrees with the own plan."""
         horizon = self._horizon(now)
         if horizon is None or self._local is None:
             return False
         planned = self._local.position_to_local(horizon.at(now + self._config.setpoint_lead_us).position)
         off = planned - np.array(message.position)
-        # Asked so that a NaN does not agree.
+        # Written so that a NaN does not agree.
         return bool(off @ off <= _AGREES**2)
 
     def _forget(self) -> None:
@@ -202,7 +203,7 @@ class BackupNode:
         self._heard = None
 
     def _profile(self, now: int) -> Profile | None:
-        """What the autopilot wants, where it is armed and follows set-points."""
+        """Return the autopilot's profile if it is armed and follows set-points; else None."""
         if self._beat is None or now - self._beat[0] > HEARTBEAT_LOST:
             return None
         beat = self._beat[1]

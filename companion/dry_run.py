@@ -1,7 +1,7 @@
-"""An understudy on a live link: it asks for the messages that it needs, and orders nothing.
+"""Shadow companion on a live link: it requests the messages that it needs, and commands nothing.
 
-What leaves it: heartbeats, requests for messages, parameters and the time, and texts; not as the companion,
-which may be there as well. It answers no order.
+It sends heartbeats, requests for messages, parameters and the time, and status texts. Its component id is not
+the companion's, because the companion may be on the link as well. It answers no orders.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from mavlink_bridge.node import Datagram
 ONLOOKER = 194
 """MAV_COMP_ID_ONBOARD_COMPUTER4."""
 REQUESTS = (SET_MESSAGE_INTERVAL, REQUEST_MESSAGE)
-"""Commands that change nothing of what a vehicle does."""
+"""Commands that change nothing in a vehicle's behaviour."""
 
 
 class _Asking(Onlooker):
-    """``lacking``: what a flight would wait for before it takes off."""
+    """Onlooker that sends requests. ``lacking``: the input that a flight would wait for before take-off."""
 
     lacking = ""
 
     def __init__(self, config: CompanionConfig, own: Source, origin_altitude: float) -> None:
-        # Whom the answers are to: the companion may ask as well.
+        # The answers go to this component: the companion may send requests as well.
         super().__init__(config, own._replace(component=ONLOOKER), origin_altitude)
 
     def step(self, now: int, view: View) -> list[Message]:
-        """Requests for messages and parameters alone."""
+        """Return requests for messages and parameters alone."""
         super().step(now, view)
         self.lacking = self._readiness.missing(view, go=self._height is not None)
         wishes = self._readiness.wishes(now) if self._readiness.heard else []
@@ -46,7 +46,7 @@ class _Asking(Onlooker):
 
 
 class DryRun(ShadowCompanion):
-    """As ``Companion``; nothing leaves it that would change what the vehicle or anybody else does."""
+    """Companion that sends nothing that would change what the vehicle or another node does."""
 
     pilot: _Asking
     pilots = _Asking

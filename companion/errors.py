@@ -1,4 +1,7 @@
-"""What the companion raises. Nothing that arrives by a link raises: it is counted and dropped."""
+"""Errors that the companion raises.
+
+Input from a link never raises: it is counted and dropped.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,11 @@ class CompanionError(Exception):
 
 
 class ShapeError(CompanionError):
-    """A vector of the wrong size was about to reach the solver, which would not have noticed."""
+    """Vector of the wrong size, or with NaN, for the solver, which would not have detected it."""
 
 
 class SolverError(CompanionError):
-    """No acceptable solution; carries the solver's status, never a half-made plan."""
+    """No acceptable solution; carries the solver's status, never a partial plan."""
 
     def __init__(self, status: str, iterations: int) -> None:
         super().__init__(f"the QP was not solved: {status} after {iterations} iterations")
@@ -21,8 +24,8 @@ class SolverError(CompanionError):
 
 
 class SurfaceError(CompanionError):
-    """A user's surface cannot be used. Example: its function raises, or gives a NaN."""
+    """Unusable surface of a user: for example, its function raises or returns a NaN."""
 
 
 class CertificateError(CompanionError):
-    """A plan that may not be committed: it does not end at rest, or breaks its planes."""
+    """Plan that may not be committed: it does not end at rest, or it is not finite."""

@@ -1,4 +1,7 @@
-"""The companion computer: receive → world → plan → guard → set-point → bytes. No socket, no clock."""
+"""Node of the companion computer: receive → world → plan → guard → set-point → bytes.
+
+It uses no socket and no clock.
+"""
 
 from __future__ import annotations
 
@@ -37,17 +40,18 @@ from mavlink_bridge.wire.codec import Codec, Counters
 from mavlink_bridge.wire.signing import Signing
 
 _LOOK = 100_000
-"""µs between two looks at what may be wrong."""
+"""Period of the health checks, µs."""
 _PLAIN = str.maketrans({"²": "2", "³": "3", "°": "deg"})
-"""STATUSTEXT is ASCII."""
+"""Replacements for STATUSTEXT, which is ASCII."""
 _NOTHING: dict[str, list[Message]] = {"autopilot": [], "ground": []}
 
 
 class Companion:
-    """One vehicle's companion, a ``Node``. Links: ``autopilot``, ``swarm``, ``target``, ``ground``.
+    """Companion of one vehicle, a ``Node``.
 
-    ``stopwatch`` (ns) only measures how long planning takes; nothing depends on it. ``signing``: its own, for
-    all links, whose number in ``LINKS`` is the link id; without, whatever it hears counts.
+    Links: ``autopilot``, ``swarm``, ``target``, ``ground``. ``stopwatch`` (ns) only measures how long
+    planning takes; nothing depends on it. ``signing`` is the companion's own instance for all links; the
+    index of a link in ``LINKS`` is its link id. Without ``signing`` the companion accepts unsigned messages.
     """
 
     pilots: ClassVar[type[Pilot]] = Pilot
@@ -93,7 +97,7 @@ class Companion:
         self._boot: int | None = None
         self._next_setpoint = 0
         self.not_finite = 0
-        """Set-points that were none, and were not sent."""
+        """Number of set-points that were not finite and therefore not sent."""
 
     @property
     def tally(self) -> Tally:
@@ -102,66 +106,69 @@ class Companion:
 
     @property
     def held(self) -> int:
-        """How often an old plan was kept."""
+        """Number of times that an old plan was kept."""
         return self._planning.held
 
     @property
     def planner(self) -> Planner:
-        """Makes the plans, unless they are committed."""
+        """Planner that makes the plans, except where plans are committed."""
         return self._planning.planner
 
     @property
     def guard(self) -> Guard:
-        """Has what is flown."""
+        """Guard that holds the horizon that is flown."""
         return self._planning.guard
 
     @property
     def plan(self) -> Plan | None:
-        """The last of the planner."""
+        """Last plan of the planner; None before the first."""
         return self._planning.plan
 
     @property
     def plan_log(self) -> PlanLog:
-        """Of all plans of the planner since the log was last taken away."""
+        """Log of all plans of the planner since the last ``shed``."""
         return self._planning.log
 
     @property
     def flown(self) -> Horizon | None:
-        """What it flies; None while it steers nothing."""
+        """Horizon that is flown; None while the companion steers nothing."""
         return self.guard.horizon
 
     @property
     def last_spent(self) -> int | None:
-        """The stopwatch's reading (ns) of the last plan."""
+        """Stopwatch reading (ns) of the last plan; None without a plan since the last ``shed``."""
         spent = self._planning.spent
         return spent[-1] if spent else None
 
     def use(self, methods: tuple[MethodName, ...]) -> None:
-        """From the next plan on."""
+        """Use ``methods`` from the next plan on."""
         self.planner.use(methods)
         self._relevance.use(methods)
 
     def shed(self) -> Sequence[int]:
-        """Take the stopwatch's readings (ns) away, and the plan log with them: for who runs for days."""
+        """Remove and return the stopwatch readings (ns), and empty the plan log.
+
+        For processes that run for days.
+        """
         return self._planning.shed()
 
     @property
     def system(self) -> int:
-        """The vehicle's system id, and its own."""
+        """System id of the vehicle and of its companion."""
         return self._source.system
 
     @property
     def counters(self) -> Mapping[str, Counters]:
-        """What became of the bytes of each link."""
+        """Counters of the received bytes and frames of each link, by link."""
         return {link: codec.counters for link, codec in self._codecs.items()}
 
     @property
     def bad_frames(self) -> int:
-        """Frames that no link's codec could make sense of."""
+        """Number of frames, on all links, that the codec could not decode."""
         return sum(codec.counters.bad for codec in self._codecs.values())
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Handle what arrived and do what is due at ``now`` (µs)."""
+        """Handle the messages that arrived and do what is due at ``now`` (µs)."""
         if self._boot is None:
             self._boot = self._planning.next_due = self._next_setpoint = self._next_look = now
         if self._signing is not None:
@@ -189,7 +196,7 @@ class Companion:
         )
 
     def _said(self, now: int) -> dict[str, list[Message]]:
-        """What the ground is told, by link: events and figures."""
+        """Return the messages for the ground by link: events and metrics."""
         if not (self.config.voice.texts or self.config.voice.values):
             return _NOTHING
         report_silence(now, self.world, self.voice)
@@ -198,7 +205,7 @@ class Companion:
         return {link: said if link in self.config.voice.links else [] for link in ("autopilot", "ground")}
 
     def _has_to_act(self, now: int) -> bool:
-        """Under way there is nothing to do between two deadlines but to listen."""
+        """Return whether anything is due; in the escort only messages are received between two deadlines."""
         return (
             self.pilot.phase is not Phase.ESCORT
             or (self._certified is not None and not self._certified.idle(now))
@@ -225,13 +232,13 @@ class Companion:
         return answers
 
     def _receive_time(self, now: int, message: Timesync) -> None:
-        """What may be the autopilot's answer to what it was asked for the time."""
+        """Process a TIMESYNC that may answer this companion's request for the autopilot's time."""
         answer = self._round_trips.receive(message)
         if answer is not None:
             self.world.answered(now, answer)
 
     def _look(self, now: int, view: View) -> None:
-        """See what is wrong, ten times a second, and react to what begins."""
+        """Run the health checks ten times a second and react to each concern that begins."""
         late, self._looked_late = max(self._looked_late, now - self._next_setpoint), 0
         if now < self._next_look:
             self._looked_late = late
@@ -257,14 +264,14 @@ class Companion:
         )
         for change in self.watch.look(situation):
             concern = change.concern
-            if concern.name != "target":  # of that the world tells
+            if concern.name != "target":  # ``report_silence`` reports the target
                 self.voice.report(concern.severity, concern.text, begins=change.begins)
             self._reactions.note(change)
         self._reactions.follow(self.pilot)
         self._tell_limits()
 
     def _tell_limits(self) -> None:
-        """To the ground, what was found out of the autopilot's limits."""
+        """Report to the ground what was found out about the autopilot's limits."""
         limits = self.pilot.limits
         new = min(limits.said - self._remarked, len(limits.remarks))
         for text in list(limits.remarks)[len(limits.remarks) - new :]:
@@ -296,7 +303,7 @@ class Companion:
             0 if self._certified is not None else self._planning.tracking.lead(self.pilot.loop),
         )
         if not is_finite(message):
-            # Nothing of it may leave: the plan begins anew where the vehicle is measured to be.
+            # Such a set-point must not be sent: the plan starts anew at the measured position.
             self.not_finite += 1
             self.guard.horizon = None
             return []

@@ -1,4 +1,4 @@
-"""What the vehicle flies: the next plan when it is due, one that is held, or the one that is committed."""
+"""Planning of what the vehicle flies: the next plan when due, a held plan, or the committed plan."""
 
 from __future__ import annotations
 
@@ -37,8 +37,11 @@ _NOBODY.flags.writeable = False
 
 
 class Tally(NamedTuple):
-    """What a companion counted so far; ``plan_ns`` holds one stopwatch reading per plan, at most 4.29 s, and
-    ``plan_at`` when that plan was due (µs on its clock)."""
+    """Counters of one companion so far.
+
+    ``plan_ns``: one stopwatch reading (ns) per plan, at most 4.29 s. ``plan_at``: time (µs on the companion's
+    clock) at which that plan was due.
+    """
 
     plans: int
     relaxed: int
@@ -50,9 +53,13 @@ class Tally(NamedTuple):
 
 
 class Planning:
-    """Of one vehicle, among what ``world`` knows, towards what ``goals`` says, while ``pilot`` has the
-    vehicle. ``certified`` makes plans, committed ones; without it ``planner`` does. ``stopwatch`` (ns) only
-    measures how long planning takes, and ``took`` is told of each plan (ns); nothing depends on it."""
+    """Planning of one vehicle.
+
+    ``world`` holds what is known of the surroundings, ``goals`` gives the destination, and ``pilot`` reports
+    whether the companion controls the vehicle. ``certified`` makes committed plans; without it ``planner``
+    makes the plans. ``stopwatch`` (ns) only measures how long planning takes, and ``took`` receives the time
+    of each plan (ns); nothing depends on them.
+    """
 
     def __init__(
         self,
@@ -79,18 +86,18 @@ class Planning:
         self._shares_surface = isinstance(config.formation, Spread)
         self._lowered = pilot.limits.lowered
         self.fastest: Array = np.array(config.limits.v_max)
-        """v_max (3,), m/s, as the autopilot's parameters leave it."""
+        """v_max (3,), m/s, as lowered by the autopilot's parameters."""
         self._fading = fading(config)
         self._flown = 0
         self._plans = self._relaxed = 0
         self._plan_ns = array("I")
         self._plan_at = array("q")
         self.plan: Plan | None = None
-        """The last of the ``planner``."""
+        """Last plan of the ``planner``."""
         self.log = PlanLog()
-        """Of all its plans since the log was last taken away."""
+        """Log of all plans of the ``planner`` since the last ``shed``."""
         self.next_due = 0
-        """When (µs) the next plan is to be made; where plans are committed, the next yaw."""
+        """Time (µs) at which the next plan is due; with committed plans, the next yaw."""
 
     @property
     def tally(self) -> Tally:
@@ -105,30 +112,35 @@ class Planning:
 
     @property
     def held(self) -> int:
-        """How often an old plan was kept."""
+        """Number of times that an old plan was kept."""
         certified = self._certified
         return self.guard.held if certified is None else sum(certified.commitment.held.values())
 
     @property
     def spent(self) -> Sequence[int]:
-        """The stopwatch's reading (ns) of every plan since they were last taken away."""
+        """Stopwatch readings (ns) of all plans since the last ``shed``."""
         return self._plan_ns
 
     def shed(self) -> Sequence[int]:
-        """Take the stopwatch's readings (ns) away, and the log with them: for who runs for days."""
+        """Remove and return the stopwatch readings (ns), and empty the log.
+
+        For processes that run for days.
+        """
         taken, self._plan_ns = self._plan_ns, array("I")
         self._plan_at = array("q")
         self.log = PlanLog()
         return taken
 
     def yaw(self, time: int) -> Yaw:
-        """As planned, at ``time`` (µs)."""
+        """Return the planned yaw at ``time`` (µs)."""
         return self._heading.at(time)
 
     def told(self, now: int, view: View) -> Horizon | None:
-        """What the others are told of the way ahead; None where plans are committed, or nothing is flown. One
-        of those that share a surface takes part from the way up on, as fast as it is: with the others' places
-        chosen without it, they would have to turn round."""
+        """Return the horizon to share with the neighbours; None with committed plans or if nothing is flown.
+
+        A vehicle that shares a surface with others takes part from its climb on, with its present velocity:
+        if the others chose their places without it, they would have to turn round.
+        """
         if self._certified is not None:
             return None
         if self.guard.horizon is not None:
@@ -141,15 +153,18 @@ class Planning:
         return roll_out(now, dt, own.position, self._bounded(own.velocity), np.zeros((n, 3)))
 
     def fly(self, now: int, view: View, *, cautious: bool) -> None:
-        """Plan when due; start from the measured state each time the vehicle becomes ours. ``cautious``: no
-        further in a horizon than ``guard.cautious_speed`` goes."""
+        """Plan when due; start from the measured state each time control of the vehicle begins.
+
+        ``cautious`` limits the way within a horizon to what ``guard.cautious_speed`` covers.
+        """
         if view.local is not self._frame:
-            # Where the vehicle was in the old frame must not be flown to in the new one.
+            # Positions in the old frame must not be flown to in the new one.
             self._frame, self.guard.horizon = view.local, None
         if self._pilot.limits.lowered is not self._lowered:
             self._keep(self._pilot.limits.lowered)
         if self._certified is None and now - self._flown > self._config.guard.hold_us:
-            # It hung, and the autopilot did as it saw fit: the old plan leads from where nobody is any more.
+            # This process hung and the autopilot flew on its own: the vehicle is no longer where the old plan
+            # is.
             self.guard.horizon = None
         self._flown = now
         if not self._pilot.streaming or view.own is None or view.local is None:
@@ -175,7 +190,7 @@ class Planning:
             self.tracking.forget()
             return
         if not self._pilot.steers(now):
-            # Set-points flow before they steer: a plan would run away from the vehicle.
+            # Set-points are sent before the autopilot follows them: a plan would run away from the vehicle.
             self.guard.start(now, measured)
             self.tracking.reset()
             return
@@ -183,7 +198,7 @@ class Planning:
         self._plan(now, view, measured, cautious=cautious)
 
     def _keep(self, lowered: Lowered) -> None:
-        """Plan, brake and compensate within what the autopilot can follow."""
+        """Plan, brake and compensate within ``lowered``, the limits that the autopilot can follow."""
         self._lowered = lowered
         self.fastest = np.array(lowered.limits.v_max)
         self.planner.keep(lowered.limits)
@@ -191,7 +206,7 @@ class Planning:
         self.tracking.keep(lowered.acceleration)
 
     def _observe(self, now: int, measured: Motion) -> None:
-        """See how the vehicle follows what it was sent."""
+        """Update the tracking with how the vehicle follows the set-points sent."""
         horizon, loop = self.guard.horizon, self._pilot.loop
         if horizon is not None and loop is not None:
             later = horizon.at(now + self.tracking.lead(loop)).acceleration
@@ -199,7 +214,7 @@ class Planning:
             self.tracking.observe(now, sent, measured, loop)
 
     def _begin(self, now: int, yaw: float, measured: Motion) -> None:
-        """To steer, from the ``measured`` state on."""
+        """Start to steer from the ``measured`` state and ``yaw`` (rad, ENU)."""
         self._heading.reset(yaw)
         self._goals.begin(measured.position)
         self.guard.start(now, measured)
@@ -207,14 +222,17 @@ class Planning:
             self._certified.stand(now, measured.position)
 
     def _bounded(self, velocity: Array) -> Array:
-        """A measured ``velocity`` (3,) as a plan may begin with it: whatever the own autopilot, or who speaks
-        in its name, says of its speed, nothing faster than the limits is asked for on any axis."""
+        """Return a measured ``velocity`` (3,), m/s, clipped to the limits, as the start of a plan.
+
+        Whatever speed the own autopilot reports, or a sender that uses its id, no axis is asked for more than
+        its limit.
+        """
         return np.minimum(np.maximum(velocity, -self.fastest), self.fastest)
 
     def _fly_certified(
         self, now: int, view: View, measured: Motion, flight: CertifiedFlight, *, stale: bool, cautious: bool
     ) -> None:
-        """As committed; the next epoch's plan when it is due."""
+        """Fly the committed plan, and make the next epoch's plan when it is due."""
         if not self._pilot.guided:
             flight.stand(now, measured.position)
         elif not stale:
@@ -271,24 +289,27 @@ class Planning:
         self._face(now, view, self.plan.horizon.knots[1:, 0:3])
 
     def _face(self, now: int, view: View, places: Array) -> None:
-        """Plan the yaw along the own ``places`` (N + 1, 3) of the next steps; a companion that plans nothing
-        keeps its yaw."""
+        """Plan the yaw along the own ``places`` (N + 1, 3), m, of the next steps.
+
+        A companion that makes no plan keeps its yaw.
+        """
         if view.target is None:
             return
         ahead: Array = 1e-6 * self._config.horizon.dt_us * np.arange(1.0, len(places) + 1.0)
         self._heading.plan(now, places, view.target.ahead(ahead).positions)
 
     def _took(self, now: int, started: int) -> None:
-        """The plan that was due at ``now``, and begun when the stopwatch showed ``started``, is done."""
+        """Record the plan that was due at ``now`` (µs) and started at stopwatch reading ``started`` (ns)."""
         self._plan_at.append(now)
         spent = min(max(self._stopwatch() - started, 0), _LONGEST_NS)
         self._plan_ns.append(spent)
         self._told(spent)
 
     def _aim(self, now: int, view: View, measured: Motion, *, cautious: bool) -> Aim | None:
-        """Where to; None when nobody knows."""
+        """Return the aim of the next plan; None if the surface has no nearest point."""
         if self._pilot.phase is Phase.SETTLE:
-            # Of the others as they are now: who begins to steer has no plan yet that was made among them.
+            # Use the others' present positions: a vehicle that has just begun to steer has no plan yet that
+            # was made among them.
             here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
             self._obstacles = self._world.obstacles(now, view, here)
         try:

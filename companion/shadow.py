@@ -1,8 +1,8 @@
-"""A companion that only rehearses: it plans as if it flew the vehicle it listens to, and sends nothing at
-all.
+"""Shadow companion: plans as if it flew the vehicle whose messages it receives, and sends nothing.
 
-For logs, and for looking on at a flight of others. The vehicle does not do what is planned, so every plan
-begins where the vehicle really is; committed plans, which begin where the last one said, are not for it.
+It serves for logs, and for observing a flight that another controller flies. The vehicle does not follow
+these plans, so every plan begins at the vehicle's actual position. Committed plans begin on the previous plan
+and are therefore not supported.
 """
 
 from __future__ import annotations
@@ -22,38 +22,43 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
 
 _ALWAYS_ANEW = 1e-6
-"""m: a plan that the vehicle is further from than that begins anew at the vehicle."""
+"""Distance (m) between vehicle and plan beyond which a plan begins anew at the vehicle."""
 
 
 class Onlooker(Pilot):
-    """A pilot that is ready as soon as it knows enough to plan, whoever steers the vehicle; it takes no
-    orders."""
+    """Pilot that is ready once planning is possible, whichever controller steers; it refuses all orders."""
 
     @property
     def guided(self) -> bool:
+        """Whether the shadow plans."""
         return self.phase is Phase.ESCORT
 
     @property
     def streaming(self) -> bool:
+        """Whether the shadow plans."""
         return self.phase is Phase.ESCORT
 
     def go(self, height: float) -> bool:
+        """Refuse the order."""
         return False
 
     def hold(self) -> bool:
+        """Refuse the order."""
         return False
 
     def come_back(self) -> bool:
+        """Refuse the order."""
         return False
 
     def land(self) -> bool:
+        """Refuse the order."""
         return False
 
     def alight(self) -> None:
-        """The vehicle is somebody else's to land."""
+        """Do nothing: another controller lands the vehicle."""
 
     def step(self, now: int, view: View) -> list[Message]:
-        """No commands, ever."""
+        """Update the phase; return no commands, ever."""
         self.vehicle.tick(now)
         self.waiting_for = self._readiness.unseen(view)
         self.phase = Phase.CONNECT if self.waiting_for else Phase.ESCORT
@@ -61,10 +66,10 @@ class Onlooker(Pilot):
 
 
 class ShadowCompanion(Companion):
-    """As ``Companion``, on the vehicle of ``system``. ``would``: the set-points that it would have sent since
-    they were last taken away.
+    """Companion that sends nothing, for the vehicle of ``system``.
 
-    CompanionError for ``avoidance: certified``.
+    ``would``: the set-points that it would have sent since the list was last emptied. Raises CompanionError
+    for ``avoidance: certified``.
     """
 
     pilots = Onlooker
@@ -82,13 +87,13 @@ class ShadowCompanion(Companion):
             raise CompanionError("committed plans cannot be rehearsed; allowed: avoidance 'field'")
         changes = {"tube": _ALWAYS_ANEW, "blend": None, "astray_us": 0}
         guard = config.guard.model_copy(update=changes)
-        # The vehicle follows somebody else's set-points: nothing is learnt from how it does.
+        # The vehicle follows another controller's set-points: how it follows them teaches nothing here.
         config = config.model_copy(update={"guard": guard, "tracking": TrackingConfig()})
         super().__init__(config, system, target_system, fleet, stopwatch, signing)
         self.would: list[SetpointLocal] = []
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:
-        """Nothing leaves it, on any link."""
+        """Record the set-points and send nothing, on any link."""
         self.would += [
             message for message in links.get("autopilot", ()) if isinstance(message, SetpointLocal)
         ]
@@ -96,7 +101,7 @@ class ShadowCompanion(Companion):
 
     @property
     def lacking(self) -> str:
-        """What there is no set-point for want of; empty if there is one."""
+        """The missing input without which there is no set-point, or an empty string."""
         if self.pilot.waiting_for:
             return self.pilot.waiting_for
         return "" if self.guard.horizon is not None else "a place to plan from"

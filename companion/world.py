@@ -1,5 +1,4 @@
-"""The world picture, from MAVLink alone: own vehicle, neighbours, target, each with its age, in the fleet
-frame."""
+"""World picture from MAVLink alone: own vehicle, neighbours and target with ages, in the fleet frame."""
 
 from __future__ import annotations
 
@@ -36,15 +35,15 @@ from mavlink_bridge.messages import (
 _ORIGIN = np.zeros(3)
 _ORIGIN.flags.writeable = False
 _STEEPEST = 0.1
-"""Cosine of a pitch beyond which a heading means nothing."""
+"""Least cosine of the pitch in the yaw rate; beyond that pitch a heading has no meaning."""
 
 
 class View(NamedTuple):
-    """The picture at one time: fleet-local ENU, SI; None where nothing has been heard yet.
+    """World picture at one time: fleet-local ENU, SI; None where nothing has been received yet.
 
-    ``yaw`` is ENU (counter-clockwise from east), None also when it is older than the own state may be.
-    ``target`` is None also when it has been unheard of for too long to be followed; ``target_last`` is where
-    it was last, whatever its age: who falls silent may well be there.
+    ``yaw`` is ENU (rad, counter-clockwise from east); it is also None when it is older than the own state may
+    be. ``target`` is also None when its last message is too old for the target to be followed.
+    ``target_last`` is the target's last state at whatever age: a target that falls silent may still be there.
     """
 
     own: State | None
@@ -53,24 +52,26 @@ class View(NamedTuple):
     local: LocalFrame | None
     target_last: State | None = None
     adrift: int = 0
-    """µs since the own place was told last, where it is none since, for the frame is another; else 0."""
+    """Age (µs) of the last own position if the frame has changed since and none has followed; else 0."""
 
     @property
     def own_age(self) -> int:
-        """µs since the own place was told last, in whatever frame; 0 before it first was."""
+        """Age (µs) of the last own position in whatever frame; 0 before the first."""
         return self.adrift if self.own is None else self.own.age
 
 
 def reach(config: CompanionConfig) -> float:
-    """How far from the own horizon (m) something can be and still act: the field and the band, both grown for
-    closing at v_max."""
+    """Return how far (m) from the own horizon an obstacle can still act.
+
+    It covers the field and the tangential band, both grown for closing at v_max.
+    """
     field, band, speed = config.field, config.tangential, max(config.limits.v_max)
     stopping = 0.0 if field.braking is None else speed**2 / (2.0 * field.braking) + field.reaction * speed
     return field.d_safe + field.margin(1) + max(stopping, band.d_band + band.reach_s * speed)
 
 
 class World:
-    """Gathers messages by link; answers with a view at any later time."""
+    """World picture of one companion: takes messages by link, and gives a view at any later time."""
 
     def __init__(self, config: CompanionConfig, system: int, target_system: int, fleet: FleetFrame) -> None:
         self.config = config
@@ -92,19 +93,19 @@ class World:
         self._yaw_rate = 0.0
         self._left: State | None = None
         self._placed = 0
-        # Of the tracks in the frames before.
+        # Totals of the tracks in the earlier frames.
         self._clock_steps = self._clock_lost = 0
         self.moves = 0
-        """How often the autopilot's origin has moved in flight."""
+        """Number of times that the autopilot's origin has moved in flight."""
         self.displaced = 0.0
-        """m by which the last of these moved the vehicle itself in the fleet's frame; it should not have."""
+        """Distance (m) by which the last such move moved the vehicle itself in the fleet frame; it should not."""
         self.doubt = 0.0
-        """How far (m) the own vehicle may be from where it says that it is, beyond what is usual."""
+        """Distance (m) by which the own position may be wrong, beyond the usual error."""
         self.stamp = 0
-        """The last time (µs since its boot) that the own autopilot told, 0 before the first."""
+        """Last time (µs since its boot) that the own autopilot reported, 0 before the first."""
 
     def receive(self, now: int, link: str, message: Message) -> None:
-        """Take one message that arrived by ``link``; what does not concern the picture is ignored."""
+        """Receive one message from ``link``; a message that does not concern the picture is ignored."""
         if link == "swarm" and isinstance(message, GlobalPosition):
             self.neighbours.receive_position(now, message)
         elif link == "swarm" and isinstance(message, Tunnel):
@@ -120,7 +121,7 @@ class World:
             self._receive_own(now, message)
 
     def at(self, now: int) -> View:
-        """The view at ``now`` (µs)."""
+        """Return the view at ``now`` (µs)."""
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
         own, last = self._own.at(now), self.target.last(now)
         adrift = now - self._placed if own is None and self._left is not None else 0
@@ -128,40 +129,43 @@ class World:
 
     @property
     def simulated(self) -> bool:
-        """Whether the autopilot's clock is a simulation's, which may stand for a moment."""
+        """Whether the autopilot's clock is a simulation's, which may stop for a moment."""
         return self._own.brief
 
     @simulated.setter
     def simulated(self, value: bool) -> None:
-        # The others' clocks follow the same simulation's, each by what it sees of it.
+        # The neighbours' clocks follow the same simulation's clock, each as it observes it.
         self._own.brief = self.neighbours.brief = value
 
     @property
     def late(self) -> int:
-        """By how much (µs) messages of the own autopilot are later than its clock and link explain."""
+        """Delay (µs) of the own autopilot's messages beyond what its clock and link explain."""
         return self._own.late
 
     @property
     def clock_lost(self) -> int:
-        """What (µs) the autopilot's clock has lost against ours, by its own answers."""
+        """Time (µs) that the autopilot's clock has lost against the own clock, by its TIMESYNC answers."""
         return self._clock_lost + self._own.clock_lost
 
     def answered(self, now: int, answer: Answer) -> None:
-        """The own autopilot has told what its clock shows."""
+        """Process an answer of the own autopilot about the time on its clock."""
         self._own.answered(now, *answer)
 
     @property
     def clock_steps(self) -> int:
-        """How often the autopilot's clock was found to be another."""
+        """Number of times that the autopilot's clock was re-synchronised, in all frames."""
         return self._clock_steps + self._own.clock_steps
 
     def obstacles(self, now: int, view: View, prediction: Array) -> Obstacles:
-        """Neighbours and what else moves, the target where it is one, and what stands near the own
-        ``prediction`` (N + 1, 3), aligned with ``now + n·dt``."""
+        """Return the obstacles near the own ``prediction`` (N + 1, 3), m, aligned with ``now + n·dt``.
+
+        They are neighbours and other moving obstacles, the target where it is configured as an obstacle, and
+        fixed and sensed obstacles near the prediction.
+        """
         config, field = self.config, self.config.field
         places = None
         if config.avoidance != "certified":
-            # A plan begins on the last one, or where the vehicle is when that has been left.
+            # A plan begins on the last plan, or at the vehicle when it has left that plan.
             places = prediction[:1] if view.own is None else np.stack([prediction[0], view.own.position])
         obstacles = self.neighbours.obstacles(now, places)
         if len(self._moving):
@@ -199,7 +203,7 @@ class World:
         return obstacles
 
     def _receive_distances(self, now: int, message: ObstacleDistance) -> None:
-        """Of a sensor of the own system, placed where the vehicle was, and looked, when that was true."""
+        """Process an OBSTACLE_DISTANCE of the own system, with the vehicle's pose at measurement time."""
         config, own, local = self.config, self._own.at(now), self._local
         if config.proximity is None or message.source.system != self._system:
             return
@@ -242,20 +246,20 @@ class World:
         elif isinstance(message, GpsGlobalOrigin):
             origin = (message.latitude, message.longitude, message.altitude)
             if self._origins.counts(now, message) and origin != self._origin:
-                # Of two origins before a position the first one's leave counts.
+                # If two origins arrive before a position, the state left at the first one counts.
                 if self._left is None and (left := self._own.at(now)) is not None:
                     self._left, self._placed = left, now - left.age
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
                 self._clock_steps += self._own.clock_steps
                 self._clock_lost += self._own.clock_lost
-                # Where the vehicle was in the old frame must not be flown to in the new one.
+                # Positions in the old frame must not be flown to in the new one.
                 simulated, self._own = self.simulated, Track(self.config.own)
                 self.simulated = simulated
 
 
 def _turns(attitude: Attitude) -> float:
-    """How fast the nose turns, rad/s, counter-clockwise from above."""
+    """Return the yaw rate, rad/s, counter-clockwise from above."""
     _, q, r = attitude.body_rates
     level = max(cos(attitude.pitch), _STEEPEST)
     return -(q * sin(attitude.roll) + r * cos(attitude.roll)) / level

@@ -1,19 +1,24 @@
-"""What the bridge raises. Bad bytes from outside never raise: they are counted and dropped."""
+"""Exceptions of the bridge.
+
+Bad bytes from outside never raise: they are counted and dropped.
+"""
 
 from __future__ import annotations
 
 
 class BridgeError(Exception):
-    """Base of every error of ``mavlink_bridge``."""
+    """Base class of every error of ``mavlink_bridge``."""
 
 
 class EncodeError(BridgeError):
-    """A value does not fit its MAVLink field: a programming error or a NaN that must not leave the
-    process."""
+    """A value that does not fit its MAVLink field.
+
+    The cause is a programming error, or a NaN that must not leave the process.
+    """
 
 
 class LogError(BridgeError):
-    """A tlog cannot be opened or holds no MAVLink at all."""
+    """A tlog that cannot be opened, or that holds no MAVLink."""
 
 
 class ScheduleError(BridgeError):
@@ -25,12 +30,15 @@ class PlanWireError(BridgeError):
 
 
 class EndpointError(BridgeError):
-    """A text that names no endpoint: what is wrong with it, and what is allowed."""
+    """A text that is not a valid endpoint; the message states the fault and the allowed forms."""
 
 
 class LinkError(BridgeError):
-    """An endpoint cannot be opened: a host without address, a port in use, a device that is not there."""
+    """An endpoint that cannot be opened: a host without address, a port in use, a missing device."""
 
 
 class KeyFileError(BridgeError):
-    """A key file that is not there, holds no key, or is open to others: what, where, and what is allowed."""
+    """A key file that is missing, holds no key, or is accessible to others.
+
+    The message states the fault, the file and what is allowed.
+    """

@@ -1,9 +1,9 @@
-"""The only conversions between frames: NED ↔ ENU, geodetic ↔ fleet-local, a vehicle's own NED ↔ fleet-local.
+"""The only conversions between frames: NED ↔ ENU, geodetic ↔ fleet-local, vehicle-local NED ↔ fleet-local.
 
 The fleet frame is ENU (x east, y north, z up; m), tangent to WGS84 at an explicit origin. ENU yaw counts
-counter-clockwise from east, NED yaw clockwise from north: yaw_ned = π/2 − yaw_enu. pymap3d does the geodesy.
-Altitudes are taken as they come: mixing mean sea level and ellipsoid is harmless as long as all of a fleet do
-the same, because the geoid is level across a flying site.
+counter-clockwise from east, NED yaw clockwise from north: yaw_ned = π/2 − yaw_enu. pymap3d computes the
+geodesy. Altitudes are used as given: either mean sea level or ellipsoid height works as long as the whole
+fleet uses the same one, because the geoid is level across a flying site.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ Array = npt.NDArray[np.float64]
 _WGS84 = Ellipsoid.from_name("wgs84")
 _MOST_ITERATIONS = 8
 _SETTLED = 1e-6  # m
-# Swaps x and y and turns z round: its own inverse.
+# Swaps x and y and negates z; the matrix is its own inverse.
 _SWAP: Array = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
 
 def ned_to_enu(v: npt.ArrayLike) -> Array:
-    """Components of vectors (…, 3) in NED, given in ENU of the same tangent plane."""
+    """Convert vectors (…, 3) from NED to ENU of the same tangent plane."""
     v = np.asarray(v, dtype=np.float64)
     out = np.empty(v.shape)
     out[..., 0] = v[..., 1]
@@ -38,33 +38,36 @@ def ned_to_enu(v: npt.ArrayLike) -> Array:
 
 
 def enu_to_ned(v: npt.ArrayLike) -> Array:
-    """Components of vectors (…, 3) in ENU, given in NED of the same tangent plane."""
+    """Convert vectors (…, 3) from ENU to NED of the same tangent plane."""
     return ned_to_enu(v)
 
 
 def wrap(angle: float) -> float:
-    """The same direction (rad) in (−π, π]. NaN stays NaN; ValueError for an infinity."""
+    """Return the same direction (rad) in (−π, π].
+
+    NaN stays NaN. Raises ValueError for an infinity.
+    """
     turned = math.remainder(angle, math.tau)
     return turned if turned != -math.pi else math.pi
 
 
 def yaw_to_ned(yaw_enu: float) -> float:
-    """Rad counter-clockwise from east → rad clockwise from north, in (−π, π]."""
+    """Convert rad counter-clockwise from east to rad clockwise from north, in (−π, π]."""
     return wrap(math.pi / 2 - yaw_enu)
 
 
 def yaw_to_enu(yaw_ned: float) -> float:
-    """Rad clockwise from north → rad counter-clockwise from east, in (−π, π]."""
+    """Convert rad clockwise from north to rad counter-clockwise from east, in (−π, π]."""
     return wrap(math.pi / 2 - yaw_ned)
 
 
 def _ecef_of_enu(latitude: float, longitude: float) -> Array:
-    """Rotation (3, 3), columns east, north, up in earth-centred earth-fixed components."""
+    """Return the rotation (3, 3) with columns east, north, up in earth-centred earth-fixed components."""
     return np.array(enu2uvw(*np.eye(3), latitude, longitude), dtype=np.float64)
 
 
 class FleetFrame:
-    """The frame all planning happens in: ENU, m, origin at (latitude °, longitude °, altitude m) on WGS84."""
+    """Frame of all planning: ENU (m), with its origin at (latitude °, longitude °, altitude m) on WGS84."""
 
     def __init__(self, latitude: float, longitude: float, altitude: float) -> None:
         self.latitude = latitude
@@ -81,17 +84,18 @@ class FleetFrame:
         )
 
     def to_enu(self, latitude: float, longitude: float, altitude: float) -> Array:
-        """Position (3,), m, of a point given in degrees and m."""
+        """Return the position (3,), m, of a point given in degrees and m."""
         x, y, z = geodetic2ecef(latitude, longitude, altitude, _WGS84)
         x0, y0, z0 = self._ecef
         enu: Array = self._enu_of_ecef @ (x - x0, y - y0, z - z0)
         return enu
 
     def to_geodetic(self, enu: npt.ArrayLike) -> tuple[float, float, float]:
-        """Latitude °, longitude °, altitude m of a position (3,), m; to 1 µm within 100 km.
+        """Return latitude °, longitude °, altitude m of a position (3,), m; accurate to 1 µm within 100 km.
 
-        Inverts ``to_enu`` by fixed-point iteration from the origin at an eighth of the cost of the closed
-        form, which takes over where that does not settle (hundreds of kilometres away, next to a pole).
+        Inverts ``to_enu`` by fixed-point iteration from the origin, at an eighth of the cost of the closed
+        form. The closed form takes over where the iteration does not converge (hundreds of kilometres away,
+        next to a pole).
         """
         east, north, up = (float(part) for part in np.asarray(enu, dtype=np.float64))
         latitude, longitude, altitude = self.latitude, self.longitude, self.altitude
@@ -113,22 +117,24 @@ class FleetFrame:
 
     @cached_property
     def fingerprint(self) -> int:
-        """8 bits that change with the origin (as degE7 and mm, the steps of the wire): plans in another frame
-        are told apart, all but one in 256."""
+        """8 bits derived from the origin, which detect plans made in another frame, except for one in 256.
+
+        The origin is rounded to the steps of the wire: degE7 and mm.
+        """
         origin = round(self.latitude * 1e7), round(self.longitude * 1e7), round(self.altitude * 1e3)
         return crc32(b"".join(part.to_bytes(8, "little", signed=True) for part in origin)) & 0xFF
 
     def local(self, latitude: float, longitude: float, altitude: float) -> LocalFrame:
-        """The local NED frame of a vehicle whose GPS_GLOBAL_ORIGIN is here."""
+        """Return the local NED frame of a vehicle whose GPS_GLOBAL_ORIGIN is the given point."""
         rotation = self._enu_of_ecef @ _ecef_of_enu(latitude, longitude) @ _SWAP
         return LocalFrame(rotation, self.to_enu(latitude, longitude, altitude))
 
 
 class LocalFrame:
-    """A vehicle's own local NED against the fleet's ENU: p_fleet = R p_ned + t; R (3, 3), t (3,) m.
+    """Transform between a vehicle's local NED and the fleet's ENU: p_fleet = R p_ned + t; R (3, 3), t (3,) m.
 
-    Two tangent planes are tilted by 0.16 mrad per km. Yaw turns by the part of R about the
-    vertical, so that its two directions undo each other.
+    Two tangent planes are tilted by 0.16 mrad per km. Yaw is rotated by the part of R about the vertical, so
+    that the two directions of conversion are inverse to each other.
     """
 
     def __init__(self, rotation: Array, origin_fleet: Array) -> None:
@@ -140,25 +146,25 @@ class LocalFrame:
         self._turn = math.atan2(between_enu[1, 0] - between_enu[0, 1], between_enu[0, 0] + between_enu[1, 1])
 
     def position_to_fleet(self, ned: npt.ArrayLike) -> Array:
-        """Positions (…, 3), m: own local NED → fleet ENU."""
+        """Convert positions (…, 3), m, from vehicle-local NED to fleet ENU."""
         return np.asarray(ned, dtype=np.float64) @ self.rotation.T + self.origin_fleet
 
     def velocity_to_fleet(self, ned: npt.ArrayLike) -> Array:
-        """Free vectors (…, 3), velocities or accelerations: own local NED → fleet ENU."""
+        """Convert free vectors (…, 3), velocities or accelerations, from vehicle-local NED to fleet ENU."""
         return np.asarray(ned, dtype=np.float64) @ self.rotation.T
 
     def position_to_local(self, enu: npt.ArrayLike) -> Array:
-        """Positions (…, 3), m: fleet ENU → own local NED."""
+        """Convert positions (…, 3), m, from fleet ENU to vehicle-local NED."""
         return (np.asarray(enu, dtype=np.float64) - self.origin_fleet) @ self.rotation
 
     def velocity_to_local(self, enu: npt.ArrayLike) -> Array:
-        """Free vectors (…, 3), velocities or accelerations: fleet ENU → own local NED."""
+        """Convert free vectors (…, 3), velocities or accelerations, from fleet ENU to vehicle-local NED."""
         return np.asarray(enu, dtype=np.float64) @ self.rotation
 
     def yaw_to_fleet(self, yaw_ned: float) -> float:
-        """Rad clockwise from own north → rad counter-clockwise from the fleet's east, in (−π, π]."""
+        """Convert rad clockwise from local north to rad counter-clockwise from fleet east, in (−π, π]."""
         return wrap(math.pi / 2 - yaw_ned + self._turn)
 
     def yaw_to_local(self, yaw_enu: float) -> float:
-        """Rad counter-clockwise from the fleet's east → rad clockwise from own north, in (−π, π]."""
+        """Convert rad counter-clockwise from fleet east to rad clockwise from local north, in (−π, π]."""
         return wrap(math.pi / 2 - yaw_enu + self._turn)

@@ -13,45 +13,48 @@ from typing import Final
 from mavlink_bridge.errors import KeyFileError
 
 LENGTH: Final = 32
-"""Bytes of a key."""
+"""Length of a key in bytes."""
 _LONGEST: Final = 1024
-# An all too short number of digits must not become a passphrase that nobody meant.
+# A number with too few digits must not silently become a passphrase.
 _FEWEST_DIGITS: Final = 32
 _DIGITS: Final = frozenset("0123456789abcdefABCDEF")
-# 160 random bits that can be typed into a tablet: no digit looks like a letter.
+# 160 random bits in letters that can be typed on a tablet: no digit looks like a letter.
 _LETTERS: Final = "abcdefghijklmnopqrstuvwxyz234567"
 _GROUPS, _GROUP = 8, 4
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
 
 class Key:
-    """32 secret bytes. What is printed of a key is its fingerprint, which tells keys apart and no more."""
+    """Secret of 32 bytes, printed only as its fingerprint.
+
+    The fingerprint tells keys apart and reveals nothing else.
+    """
 
     __slots__ = ("_secret",)
 
     def __init__(self, secret: bytes) -> None:
-        """Raises ValueError for another number of bytes."""
+        """Raise ValueError unless ``secret`` has 32 bytes."""
         if len(secret) != LENGTH:
             raise ValueError(f"a key has {LENGTH} bytes, not {len(secret)}")
         self._secret = bytes(secret)
 
     @classmethod
     def of_passphrase(cls, text: str) -> Key:
-        """As the ground stations make one: SHA-256 of the text in UTF-8."""
+        """Return the key of a passphrase as ground stations derive it: SHA-256 of the text in UTF-8."""
         return cls(hashlib.sha256(text.encode()).digest())
 
     def signature(self, data: bytes) -> bytes:
-        """The six bytes that end a signed frame, of which ``data`` is all before them."""
+        """Return the six signature bytes that end a signed frame; ``data`` is everything before them."""
         return hashlib.sha256(self._secret + data).digest()[:6]
 
     @property
     def blank(self) -> bool:
-        """All zeros, by which SETUP_SIGNING means none."""
+        """Whether the key is all zeros, which means "no key" in SETUP_SIGNING."""
         return not any(self._secret)
 
     @property
     def fingerprint(self) -> str:
-        """Eight hexadecimal digits."""
+        """Eight hexadecimal digits that identify the key."""
         return hashlib.sha256(b"fingerprint" + self._secret).hexdigest()[:8]
 
     def __bytes__(self) -> bytes:
@@ -68,10 +71,10 @@ class Key:
 
 
 def read_key(path: Path | str) -> Key:
-    """The key in a file of one line: 64 hexadecimal digits, or a passphrase.
+    """Read the key from a file of one line: 64 hexadecimal digits, or a passphrase.
 
-    Raises KeyFileError, one line, if there is no such file, if it holds something else, or if others than its
-    owner may read it or write to it.
+    Raises KeyFileError, with a message of one line, if the file is missing, if it holds anything else, or if
+    users other than its owner may read it or write to it.
     """
     text = _text(path)
     line = text.removesuffix("\n").removesuffix("\r")
@@ -93,9 +96,10 @@ def read_key(path: Path | str) -> Key:
 
 
 def create_key(path: Path | str) -> Key:
-    """Write a new random passphrase to a new file that only its owner may read, and return its key.
+    """Write a random passphrase to a new file that only its owner may read, and return its key.
 
-    A passphrase and not digits, as ground stations take nothing else. Raises KeyFileError, one line.
+    The file holds a passphrase and not digits, because ground stations accept nothing else. Raises
+    KeyFileError, with a message of one line.
     """
     groups = ("".join(secrets.choice(_LETTERS) for _ in range(_GROUP)) for _ in range(_GROUPS))
     line = "-".join(groups)
@@ -112,7 +116,7 @@ def create_key(path: Path | str) -> Key:
 
 def _text(path: Path | str) -> str:
     try:
-        # A pipe would let wait.
+        # Without O_NONBLOCK, opening a pipe would block.
         number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
         with open(number, "rb") as file:
             found = os.fstat(number)

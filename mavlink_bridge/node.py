@@ -1,4 +1,4 @@
-"""The contract of every node: bytes in, bytes out, time as an argument. No socket, no clock, no sleep."""
+"""Interface of every node: bytes in, bytes out, time as an argument; no socket, no clock, no sleep."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 
 class Datagram(NamedTuple):
-    """Some whole MAVLink frames, and the link they came by or shall leave by.
+    """One or more complete MAVLink frames, and the link on which they arrived or will leave.
 
     ``link`` is one of the names that the node declares (``autopilot``, ``swarm``, ``target``, …).
     """
@@ -17,13 +17,13 @@ class Datagram(NamedTuple):
 
 
 class Node(Protocol):
-    """A sans-I/O participant: a companion, an emulated autopilot, a target."""
+    """Sans-I/O participant: a companion, an emulated autopilot, a target."""
 
     @property
     def name(self) -> str:
-        """Unique among the nodes of a run; seeds and log files are named after it."""
+        """Name, unique among the nodes of a run; seeds and log files are named after it."""
         ...
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Handle what arrived, advance to ``now`` (µs, never decreasing) and return what to send."""
+        """Handle ``inbox``, advance to ``now`` (µs, never decreasing) and return the datagrams to send."""
         ...

@@ -1,14 +1,16 @@
-"""An emulated autopilot with its vehicle: bytes in, bytes out, nothing else.
+"""Emulated autopilot with its vehicle: it takes MAVLink bytes and returns MAVLink bytes.
 
     bytes → codec → reception ─→ orders ──→ commander (armed? which mode?) ─┐
                         └──────→ steering (a set-point?) ───────────────────┴→ guidance → shaper
                                                                                              │ reference
     bytes ← codec ← telemetry ← sensors ← body ← rotors ← allocation ← controller ←──────────┘
 
-``node.Autopilot`` is the whole of it; ``plant`` is the lower row with its air (``weather``, ``turbulence``)
-and what is believed of it (``sensors`` with their ``profiles``, ``positioning``). ``flavours`` holds what
-ArduPilot and PX4 do differently, ``shaper`` makes every reference flyable, ``course`` shifts it by the
-estimate's error, ``origin`` turns the vehicle's own frame into the site's. ``pipeline`` is the compiled part
-from controller to body, with ``observer`` between them; ``lanes`` let the same kernels run on eight vehicles
-at once (``batch``). ``backends`` can put JSBSim in the place of all from rotors to body.
+``node.Autopilot`` is the whole. ``autopilot.plant`` is the lower row with its air (``environment.weather``,
+``environment.turbulence``) and its estimate (``estimation.sensors`` with ``estimation.profiles`` and
+``estimation.gps_faults``). ``autopilot.firmware`` holds the differences between ArduPilot and PX4,
+``autopilot.shaper`` makes every reference flyable, ``autopilot.course`` shifts it by the estimate's error,
+``values.origin`` transforms the vehicle's own frame into the site's. ``vehicle.pipeline`` is the compiled
+part from controller to body, with ``vehicle.observer`` between them; ``vehicle.simd`` runs the same kernels
+on eight vehicles at once (``vehicle.batch``). ``backends`` can replace everything from rotors to body by
+JSBSim.
 """

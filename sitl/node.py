@@ -1,6 +1,6 @@
-"""The emulated autopilot as a node: datagrams in, datagrams out, physics in between.
+"""Emulated autopilot as a node: it receives datagrams, simulates the physics and returns datagrams.
 
-A longer module as it is where the parts are put together.
+The module is long because it composes all parts.
 """
 
 from __future__ import annotations
@@ -61,14 +61,14 @@ from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.multirotor import Reference, VehicleState
 
 LINK: Final = "autopilot"
-"""The one link of the node."""
+"""The only link of the node."""
 
 # MAV_COMP_ID_AUTOPILOT1
 _COMPONENT: Final = 1
-# SET_MODE, PING, GLOBAL_POSITION_INT, COMMAND_INT, COMMAND_LONG, SET_ATTITUDE_TARGET,
-# SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT, TIMESYNC, FOLLOW_TARGET; and the services'.
+# Message ids of SET_MODE, PING, GLOBAL_POSITION_INT, COMMAND_INT, COMMAND_LONG, SET_ATTITUDE_TARGET,
+# SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT, TIMESYNC, FOLLOW_TARGET. The services add their own.
 _HEARD: Final = frozenset((4, 11, 33, 75, 76, 82, 84, 86, 111, 144))
-# Messages, in answer to one datagram at most; what is more in it counts no more.
+# Limit of messages in answer to one datagram; the rest of the datagram is ignored.
 _ANSWERS: Final = 32
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
 _FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
@@ -77,10 +77,10 @@ _FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPil
 class Autopilot:
     """One vehicle with its autopilot, as a ``Node`` with the link ``autopilot``.
 
-    The physics moves in the NED frame of ``site``; what is sent and received is in the vehicle's own local
-    NED. It flies on what its sensors make it believe. The truth of the last step is there for who composes a
-    simulation: ``trace``, ``trace_times``, ``moved_to``, ``state``, ``reference``; and so are ``begin`` and
-    the faults, which act from the next step on.
+    The physics runs in the NED frame of ``site``; messages use the vehicle's own local NED. The autopilot
+    flies on the estimate of its sensors. The program that composes a simulation can read the truth of the
+    last step (``trace``, ``trace_times``, ``moved_to``, ``state``, ``reference``), call ``begin`` and inject
+    faults, which act from the next step on.
     """
 
     def __init__(
@@ -93,10 +93,13 @@ class Autopilot:
         saved: Saved | None = None,
         signing: Signing | None = None,
     ) -> None:
-        """On the ground at the configured place, which becomes the origin of its local frame, or as high
-        above it as the configuration says. ``seed`` (≥ 0) with the system id for all noise. ``weather`` is
-        the air around it; without, the air stands still. ``saved``: what it kept of an earlier time.
-        ``signing``: its own, with the key of all who may command it; without, whoever can may."""
+        """Start at the configured place, on the ground or at the configured height above it.
+
+        The place becomes the origin of the vehicle's local frame. ``seed`` (≥ 0) and the system id seed all
+        noise. ``weather`` describes the surrounding air; without it the air is still. ``saved`` is the data
+        kept from an earlier run. ``signing`` is the autopilot's own, with the key shared by all authorised
+        senders; without it any sender may command the autopilot.
+        """
         saved = saved or Saved()
         rotors = len(vehicle.rotors)
         self._values = Values(_TABLES[config.flavour](rotors), config, saved.parameters)
@@ -232,13 +235,13 @@ class Autopilot:
         self._services.handlers[SetupSigning] = self._trust.set_up
         heard = _HEARD | {BY_TYPE[kind].id for kind in self._services.handlers}
         self._codec = Codec(lambda message_id, _system, _component: message_id in heard, signing)
-        # What nearly every step finds empty and undue is looked at here, not asked for.
+        # These values are cached because they are empty or not due in nearly every step.
         self._reached = itinerary.reached
         self._work_due = self._services.next_due
-        # A real ArduCopter beats at once when its mode was changed. Quiet flights stay as they are.
+        # A real ArduCopter sends HEARTBEAT at once after a mode change. Quiet flights do not.
         self._announces = config.streams == "normal" and not bytewise
         self.untold = 0
-        """Messages that could not be told."""
+        """Number of messages that could not be encoded."""
         self._boot: int | None = None
         self._now = 0
         if config.start_height:
@@ -246,14 +249,14 @@ class Autopilot:
 
     @property
     def name(self) -> str:
-        """Unique as the system id is."""
+        """Name of the node, as unique as its system id."""
         return f"sitl-{self.config.system_id}"
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Move to ``now``, then act on what arrived, then tell what is due: one datagram, or none, but for a
-        flood of questions.
+        """Advance to ``now`` (µs), process the received datagrams, then return the messages due.
 
-        What arrives at ``now`` steers from ``now`` on. The first call is the boot.
+        The result is one datagram or none, and more only after a flood of requests. Messages received at
+        ``now`` take effect from ``now`` on. The first call is the boot.
         """
         if self._boot is None:
             self._boot = now
@@ -283,7 +286,7 @@ class Autopilot:
         enough = len(self._outbox) + _ANSWERS
         for message in self._codec.feed(datagram.data, whole=True):
             if len(self._outbox) >= enough:
-                # Answers go to all: what one asks beyond measure would be in the way of all others.
+                # Answers go to all receivers: excessive requests of one sender would crowd out the others.
                 break
             mode = self._commander.mode
             self._reception.handle(message, self._now, self._plant.estimate())
@@ -301,7 +304,7 @@ class Autopilot:
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
             told = self._telemetry.collect(self._now, self._gauges.read(self._now))
-            # Where there are many answers, what comes first has the better chance to find room on its way.
+            # If there are many answers, the datagrams sent first are more likely to fit the link.
             messages = told + messages if len(messages) > _ANSWERS else messages + told
         if not messages:
             return []
@@ -310,7 +313,10 @@ class Autopilot:
         return [Datagram(LINK, parcel) for parcel in data]
 
     def _encoded(self, message: Message) -> bytes:
-        """Nothing for what does not fit its message: one that cannot be told must not end the vehicle."""
+        """Encode a message.
+
+        Return empty bytes if a value does not fit, because such a message must not stop the vehicle.
+        """
         try:
             return self._codec.encode(message)
         except EncodeError:
@@ -318,8 +324,10 @@ class Autopilot:
             return b""
 
     def _configure(self) -> None:
-        """Take over the parameters that are settings, but for the system id, which counts from the next boot
-        on."""
+        """Apply the parameters that are settings.
+
+        The system id is excepted: it takes effect at the next boot.
+        """
         changed = self._values.configured(self._configured)
         self.config = changed.model_copy(update={"system_id": self.config.system_id})
         for part in (self._flavour, self._guidance, self._commander, self._journeys, self._gauges):
@@ -327,36 +335,40 @@ class Autopilot:
 
     @property
     def saved(self) -> Saved:
-        """What there is to keep for the next boot."""
+        """Data to keep for the next boot."""
         until = 0 if self._signing is None else self._signing.newest
         return Saved(parameters=self._values.changed, plans=self._plans.all, signed_until=until)
 
-    # Events and faults, from the next step on
+    # Events and faults, effective from the next step
 
     def begin(self, now: int) -> None:
-        """The goal event, on the clock of ``step`` (µs): the weather's gusts count from it."""
+        """Mark the goal event at ``now`` (µs, clock of ``step``); the weather's gusts are timed from it."""
         self._plant.begin(now - (now if self._boot is None else self._boot))
 
     def lose_gps(self) -> None:
-        """No more GPS: the estimate drifts, and after the firmware's patience there is no position."""
+        """Stop GPS: the estimate drifts, and after the firmware's time-out there is no position."""
         self._plant.lose_gps()
 
     def regain_gps(self) -> None:
-        """GPS again: the estimate returns to it, in one jump if the position was given up."""
+        """Restore GPS: the estimate converges to it, in one jump if the position had been given up."""
         self._plant.sensors.gps.regain()
 
     def fail_rotor(self, index: int, left: float) -> None:
-        """From now on the rotor ``index`` (0…n−1) has the part ``left`` (0…1) of its motor's speed; nothing
-        tells the autopilot. Raises IndexError and ValueError."""
+        """Limit the rotor ``index`` (0…n−1) to the fraction ``left`` (0…1) of its motor's speed from now on.
+
+        The autopilot receives no indication. Raises IndexError and ValueError.
+        """
         self._plant.vehicle.fail_rotor(index, left)
 
     def shift_gps(self, offset_enu: Vector) -> None:
-        """GPS is off by ``offset_enu`` (m, fleet-local ENU) in all; zero ends it. The estimate follows within
-        some seconds, or jumps after having refused for seven."""
+        """Set the total GPS error to ``offset_enu`` (m, fleet-local ENU); zero ends it.
+
+        The estimate follows within some seconds, or jumps after rejecting GPS for seven seconds.
+        """
         east, north, up = offset_enu
         self._plant.shift_gps(self._origin.vector_to_local(np.array((north, east, -up))))
 
-    # The truth
+    # Ground truth
 
     @property
     def trace(self) -> npt.NDArray[np.float64]:
@@ -365,17 +377,17 @@ class Autopilot:
 
     @property
     def moved_to(self) -> int:
-        """When the last physics step ended (µs, on the clock of ``step``)."""
+        """End time of the last physics step (µs, on the clock of ``step``)."""
         return self._plant.time + (self._boot or 0)
 
     @property
     def trace_times(self) -> npt.NDArray[np.int64]:
-        """When (n,) the vehicle was there (µs, on the clock of ``step``)."""
+        """Times (n,) of the positions in ``trace`` (µs, on the clock of ``step``)."""
         return self._plant.trace_times + (self._boot or 0)
 
     @property
     def state(self) -> VehicleState:
-        """The true state, site NED."""
+        """True state, site NED."""
         return self._plant.vehicle.state
 
     @property
@@ -390,35 +402,35 @@ class Autopilot:
 
     @property
     def airborne(self) -> bool:
-        """Off the ground; after a touchdown until it counts as landed."""
+        """Whether it is off the ground; after a touchdown, true until it counts as landed."""
         return not self._commander.landed
 
     @property
     def mode(self) -> Mode:
-        """The flight mode."""
+        """Flight mode."""
         return self._commander.mode
 
     @property
     def custom_mode(self) -> int:
-        """The flight mode as HEARTBEAT (0) says it."""
+        """Flight mode as encoded in HEARTBEAT (0)."""
         return self._flavour.custom_mode(self._commander.mode)
 
     @property
     def charge(self) -> float:
-        """What is left in the battery, 0…1; 1 without one."""
+        """Remaining battery charge, 0…1; 1 without a battery."""
         return 1.0 if self._battery is None else self._battery.charge.remaining
 
     @property
     def estimate(self) -> Estimate:
-        """What is believed, in the own local NED."""
+        """Estimated state, in the own local NED."""
         return self._plant.estimate()
 
     @property
     def estimate_error(self) -> npt.NDArray[np.float64]:
-        """Estimated minus true position (3,) (m, site NED): what ``reference`` is off by on purpose."""
+        """Estimated minus true position (3,) (m, site NED), the deliberate offset of ``reference``."""
         return self._plant.estimate_error
 
     @property
     def reference(self) -> Reference | None:
-        """What is tracked now (site NED), as the estimate has it; None when nothing is."""
+        """Reference tracked now (site NED, in terms of the estimate), or None."""
         return self._plant.course.reference

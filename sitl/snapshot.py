@@ -1,4 +1,4 @@
-"""All that telemetry may tell of an autopilot at one moment, read off its parts."""
+"""Snapshot of an autopilot for telemetry, read from its parts."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from sitl.vehicle.battery import Battery
 from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.ground import GRAVITY
 
-# In the air; with thrust cut it is about to be on the ground.
+# In the air; IDLE (thrust cut) counts as landing because touchdown is imminent.
 _LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, Activity.IDLE: LANDING}
-# MAV_SYS_STATUS_GEOFENCE: MAVProxy takes a bit that is not set for a breach, as ArduPilot sets it always.
+# MAV_SYS_STATUS_GEOFENCE: MAVProxy takes a cleared bit as a breach, because ArduPilot always sets it.
 _GEOFENCE: Final = 0x100000
 
 
 class Gauges:
-    """Makes snapshots for ``Telemetry``."""
+    """Reader that makes snapshots for ``Telemetry``."""
 
     def __init__(
         self,
@@ -65,11 +65,11 @@ class Gauges:
         self._now = 0
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other settings from now on."""
+        """Use new settings from now on."""
         self._config = config
 
     def read(self, now: int) -> Snapshot:
-        """At ``now`` (µs since boot)."""
+        """Return the snapshot at ``now`` (µs since boot)."""
         self._now = now
         commander, flavour, plant = self._commander, self._flavour, self._plant
         return Snapshot(
@@ -109,7 +109,7 @@ class Gauges:
         return not self._failsafes.doubts() and self._commander.mode_doubt(now) is None
 
     def _landed_state(self) -> int:
-        """MAV_LANDED_STATE. Who sinks because nobody steers is not landing."""
+        """Return the MAV_LANDED_STATE; a descent without a controller is not LANDING."""
         if self._commander.landed:
             return ON_GROUND
         if self._commander.mode is Mode.POSITION:
@@ -122,20 +122,20 @@ class Gauges:
         return guidance.wanted(self._now) if follows else None
 
     def _waking(self) -> float:
-        """How far GPS and filter have come up, 0…1."""
+        """Return the start-up progress of GPS and filter, 0…1."""
         config = self._config
         if self._now >= config.ready_after * 1e6:
             return 1.0
         return self._now * 1e-6 / config.ready_after if config.startup == "in stages" else 0.0
 
     def _lift(self) -> float:
-        """m/s²."""
+        """Return the specific lift (m/s²)."""
         if self._plant.vehicle.on_ground:
             return GRAVITY
         return GRAVITY * _squares(self._plant.state.rotor_speeds.tolist()) / self._hovering
 
     def _throttle(self) -> float:
-        """Thrust as a part of twice what hovering takes, 0…1."""
+        """Return thrust as a fraction of twice the hover thrust, 0…1."""
         return min(1.0, 0.5 * _squares(self._plant.state.rotor_speeds.tolist()) / self._hovering)
 
 

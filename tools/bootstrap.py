@@ -1,7 +1,7 @@
-"""Make the environment in ``.venv``: with uv where it is, else with venv and pip, both from locked versions.
+"""Make the environment in ``.venv`` from locked versions: with uv if available, else with venv and pip.
 
-Run by `make`, with whatever python3 the machine has: its syntax is that of Python 3.6, so that an older one
-than is needed can still say what is missing.
+`make` runs this with whatever python3 the machine has. The syntax is that of Python 3.6, so that an older
+version than required can still report what is missing.
 """
 
 import os
@@ -20,11 +20,11 @@ REQUIREMENTS = os.path.join(ROOT, "requirements.txt")
 
 
 class SetupError(Exception):
-    """Why there is no environment, in one line."""
+    """The reason why the environment cannot be made, in one line."""
 
 
 def main() -> int:
-    """Make the environment and stamp it; status 1 and one line if that is impossible here."""
+    """Make the environment and stamp it; return 1 after one line of error if that is impossible."""
     try:
         uv = shutil.which("uv")
         if uv:
@@ -40,7 +40,7 @@ def main() -> int:
 
 
 def new_enough_python() -> str:
-    """This interpreter, or a newer one that is installed beside it."""
+    """Return this interpreter, or a newer one that is installed beside it; raise SetupError if none is."""
     if sys.version_info >= NEEDED:
         return sys.executable
     for name in NEWER:
@@ -55,7 +55,7 @@ def new_enough_python() -> str:
 
 
 def with_uv(uv: str) -> None:
-    """uv makes .venv, finds or fetches a Python, and shows its own progress."""
+    """Make .venv with uv, which finds or downloads a Python and shows its own progress."""
     say("setting up .venv with uv")
     environment = dict(os.environ, UV_PROJECT_ENVIRONMENT=VENV)
     extras = [word for extra in ("sitl", "export", "view", "cluster") for word in ("--extra", extra)]
@@ -65,7 +65,7 @@ def with_uv(uv: str) -> None:
 
 
 def with_pip(python: str) -> None:
-    """venv (or virtualenv) and pip; each package is checked against its hash."""
+    """Make .venv with venv (or virtualenv) and pip, which checks each package against its hash."""
     say("setting up .venv with pip, about a minute the first time")
     is_good = f"import sys; sys.exit(sys.version_info < {NEEDED})"
     pip = find_pip(python, PYTHON) if works([PYTHON, "-c", is_good]) else []
@@ -76,7 +76,7 @@ def with_pip(python: str) -> None:
 
 
 def make_environment(python: str, folder: str) -> "list[str]":
-    """A new environment in place of what was there, and a pip that installs into it."""
+    """Replace ``folder`` by a new environment, and return a pip command that installs into it."""
     for way in (
         [python, "-m", "venv"],
         [python, "-m", "venv", "--without-pip"],
@@ -95,16 +95,17 @@ def make_environment(python: str, folder: str) -> "list[str]":
 
 
 def find_pip(python: str, target: str) -> "list[str]":
-    """A pip that installs for the Python ``target``: its own, or one of the machine that can be told to; else
-    empty."""
+    """Return a pip command that installs for the Python ``target``, or an empty list.
+
+    It is the target's own pip, or one of the machine that supports ``--python``.
+    """
     own = [target, "-m", "pip"]
     steered = [[*pip, "--python", target] for pip in ([python, "-m", "pip"], ["pip3"], ["pip"])]
     return next((pip for pip in (own, *steered) if works([*pip, "--version"])), [])
 
 
 def install(command: "list[str]", requirements: str) -> None:
-    """Run pip; of all that it says show how far it is in the file ``requirements``, and the end if it
-    fails."""
+    """Run pip, and show its progress through the file ``requirements``; show its last lines if it fails."""
     with open(requirements) as file:
         expected = sum("==" in line for line in file)
     quiet = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
@@ -132,7 +133,7 @@ def install(command: "list[str]", requirements: str) -> None:
 
 
 def show(text: str, milestone: bool) -> None:
-    """A line that replaces the last on a terminal; elsewhere only a milestone is worth one."""
+    """Show a line that replaces the last one on a terminal; elsewhere show milestones only."""
     if sys.stdout.isatty():
         sys.stdout.write("\r\033[K" + text[:78])
         sys.stdout.flush()
@@ -141,13 +142,13 @@ def show(text: str, milestone: bool) -> None:
 
 
 def say(text: str) -> None:
-    """One line, at once."""
+    """Write one line at once."""
     sys.stdout.write(text + "\n")
     sys.stdout.flush()
 
 
 def works(command: "list[str]") -> bool:
-    """Whether a command can be run and succeeds, quietly."""
+    """Return whether a command can be run and succeeds; its output is discarded."""
     nothing = subprocess.DEVNULL
     try:
         return subprocess.call(command, stdin=nothing, stdout=nothing, stderr=nothing) == 0

@@ -1,8 +1,10 @@
-"""Make the environments of the client software that tests/clients flies: one in .venv/clients for each file
-of tests/clients/requirements, as MAVSDK's two APIs have one name and MAVProxy wants versions of its own.
+"""Make the environments of the client software that tests/clients flies.
 
-Run by `make slow`, by the Python in .venv. What is there and up to date is left alone. Where a client has no
-wheel for this machine, its tests are skipped, and that is said; but in CI it is an error.
+Each file of tests/clients/requirements gets an environment of its own in .venv/clients, because MAVSDK's two
+APIs share one name and MAVProxy requires particular versions.
+
+`make slow` runs this with the Python in .venv. Environments that are up to date are left unchanged. Where a
+client has no wheel for this machine, its tests are skipped and a message says so; in CI it is an error.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ CLIENTS = ROOT / ".venv" / "clients"
 
 
 def main() -> int:
-    """Status 1 if an environment is missing where none may be."""
+    """Make all environments; return 1 if one is missing in CI."""
     missing = []
     for requirements in sorted(REQUIREMENTS.glob("*.txt")):
         try:
@@ -40,8 +42,10 @@ def main() -> int:
 
 
 def provide(requirements: Path) -> None:
-    """An environment with just what one file names, unless it is there. Raises SetupError; then there is
-    none."""
+    """Make the environment of one requirements file, unless it is up to date.
+
+    Raises SetupError and leaves no environment if that fails.
+    """
     folder = CLIENTS / requirements.stem
     stamp, python = folder / ".made", folder / "bin" / "python"
     content = hashlib.sha256(requirements.read_bytes()).hexdigest()
@@ -59,21 +63,21 @@ def provide(requirements: Path) -> None:
 
 
 def fill(folder: Path, python: str, requirements: str) -> None:
-    """A new environment with what a file names. Raises SetupError."""
+    """Make a new environment with the packages of a file; raise SetupError if that fails."""
     options = ["--no-deps", "--require-hashes", "--only-binary", ":all:", "-r", requirements]
     uv = shutil.which("uv")
     if uv:
         run(uv, "venv", "--quiet", "--python", sys.executable, str(folder))
         run(uv, "pip", "install", "--quiet", "--python", python, *options)
         return
-    # The pip of .venv can do it, as a rule, which saves each client one of its own.
+    # The pip of .venv can usually do it, which saves each client a pip of its own.
     made = works([sys.executable, "-m", "venv", "--without-pip", str(folder)])
     pip = find_pip(sys.executable, python) if made else []
     install([*(pip or make_environment(sys.executable, str(folder))), "install", *options], requirements)
 
 
 def run(*command: str) -> None:
-    """Raises SetupError."""
+    """Run a command; raise SetupError if it fails."""
     if subprocess.call(command, stdin=subprocess.DEVNULL) != 0:
         raise SetupError(f"{command[0]} failed, see above")
 

@@ -1,11 +1,11 @@
-"""Cut some messages out of a tlog, every record byte for byte as it was.
+"""Extract some messages of a tlog, every record byte for byte as it was.
 
     .venv/bin/python tools/extract_log.py INPUT OUTPUT --message GLOBAL_POSITION_INT --start 475 --duration 70
     .venv/bin/python tools/extract_log.py INPUT OUTPUT --message HEARTBEAT --message ATTITUDE/10 --system 1 2
 
 ``NAME/10`` keeps the first and every tenth after it. ``--start`` and ``--duration`` are s of receive time
-from the log's first record on; without them it is the whole log. What was cut, and what is to be known of
-it, stands in a README beside it. An OUTPUT that ends in .gz is compressed.
+from the log's first record on; without them it is the whole log. A README beside the result describes what
+was extracted. An OUTPUT that ends in .gz is compressed.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ from mavlink_bridge.wire.framing import Frame, frame_at
 
 
 def wish(text: str) -> tuple[int, int]:
-    """The number of a message of the dialect, and of how many one is kept. Raises
-    argparse.ArgumentTypeError."""
+    """Parse ``NAME[/N]``: return the message number, and N, of which one is kept.
+
+    Raises argparse.ArgumentTypeError.
+    """
     name, _, every = text.partition("/")
     if every and not (every.isdecimal() and int(every) > 0):
         raise argparse.ArgumentTypeError(f"{text!r}: behind the / there must be a whole number from 1 on")
@@ -38,8 +40,10 @@ def wish(text: str) -> tuple[int, int]:
 def stretch(
     source: Path, wishes: dict[int, int], systems: list[int], start_s: float, duration_s: float
 ) -> list[Record]:
-    """The records in [start, start + duration) of the messages ``wishes`` (number → of how many one) from
-    ``systems``, in the order of the log."""
+    """Return the records in [start, start + duration) that match ``wishes`` and ``systems``, in log order.
+
+    ``wishes`` maps a message number to N: one of N messages is kept.
+    """
     kept = []
     seen: Counter[int] = Counter()
     first: int | None = None
@@ -57,7 +61,7 @@ def stretch(
 
 
 def main() -> int:
-    """The command line; the exit status is 2 if the log cannot be read or nothing of it is kept."""
+    """Run the command line; return 2 if the log cannot be read or no record is kept."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,9 +1,10 @@
-"""What one measurement makes of a belief: gate, Kalman filter, and the doubts that may become a new belief.
+"""Measurement update of one sender's filter state: gate, Kalman filter and competing hypotheses.
 
-State [p, v] per axis; constant velocity with white acceleration; a measurement is position and velocity, as
-GLOBAL_POSITION_INT and LOCAL_POSITION_NED carry both, or position alone, as FOLLOW_TARGET and cameras may
-have it. The three axes have the same model and the same noise, hence one gain and one covariance P (2, 2):
-together they are the filter of six states, of covariance P ⊗ I₃, exactly (``gains``).
+The state is [p, v] per axis; the model is constant velocity with white acceleration. A measurement is
+position and velocity, as in GLOBAL_POSITION_INT and LOCAL_POSITION_NED, or position alone, as FOLLOW_TARGET
+and cameras may send it. The three axes have the same model and the same noise, hence one gain and one
+covariance P (2, 2). Together they are exactly the filter of six states with covariance P ⊗ I₃
+(``kalman_gains``).
 """
 
 from __future__ import annotations
@@ -16,25 +17,27 @@ from companion.estimation.kalman_gains import Noise, Square, gain, prepared
 from companion.estimation.turn_rate import Turn, TurnFilter
 
 Six = tuple[float, float, float, float, float, float]
-"""Position (m) and velocity (m/s), fleet-local ENU. Floats, not arrays: numpy would take longer over six of
-them than all the rest of a step."""
+"""Position (m) and velocity (m/s), fleet-local ENU.
+
+Floats, not arrays: numpy operations on six elements would take longer than the rest of a step.
+"""
 
 Three = tuple[float, float, float]
 """Position (m) alone."""
 Measured = Six | Three
 
 _BLIND = 1e4
-"""m/s: who says nothing of a velocity is taken to measure it so badly that nothing is learnt of it."""
+"""m/s: σ of the velocity for a measurement without one, so large that it has no effect."""
 _ANY_SPEED = 5.0
-"""m/s, σ of the velocity of one who has told a place, and never a velocity."""
+"""m/s: σ of the velocity of a sender that has reported positions, but never a velocity."""
 _DOUBTS = 4
-"""So many stories may be told beside the one that is believed."""
+"""Maximum number of hypotheses beside the current state."""
 _STEPS = 2048
-"""Steps that are remembered: of two hundred senders those of a second."""
+"""Number of cached steps: one second's worth for two hundred senders."""
 
 
 class Doubt(NamedTuple):
-    """The last of ``witnesses`` refused measurements that agree with each other, and when it was true, µs."""
+    """The last of ``witnesses`` refused measurements that agree with each other, true at ``time`` (µs)."""
 
     time: int
     z: Six
@@ -42,10 +45,10 @@ class Doubt(NamedTuple):
 
 
 class Belief(NamedTuple):
-    """What is known of one sender: the state, the covariance P (2, 2) of each axis, row by row, and how fast
-    it turns.
+    """Filter state of one sender: state vector, covariance P (2, 2) of each axis row by row, and turn rate.
 
-    ``time``: when the last accepted measurement was true, µs; ``refused``: how many were not accepted.
+    ``time``: when the last accepted measurement was true, µs; ``refused``: number of measurements that were
+    not accepted.
     """
 
     time: int
@@ -57,8 +60,11 @@ class Belief(NamedTuple):
 
 
 class Estimator:
-    """Steps from belief to belief: ``after`` is a function of its arguments alone, so that of many who hear
-    the same sender in one process the first takes the step for all."""
+    """Steps from filter state to filter state.
+
+    ``after`` is a pure function of its arguments: if many companions in one process receive the same sender,
+    the first one computes the step and the others use the cached result.
+    """
 
     def __init__(self, config: TrackConfig) -> None:
         self._noise = Noise(config.sigma_position, config.sigma_velocity, config.sigma_acceleration)
@@ -73,15 +79,16 @@ class Estimator:
         self.after = lru_cache(maxsize=_STEPS)(self._after)
 
     def _after(self, belief: Belief | None, time: int, z: Measured) -> Belief:
-        """The belief after a measurement ``z`` that was true at ``time`` (µs), no earlier than the belief's.
+        """Return the filter state after a measurement ``z`` that was true at ``time`` (µs).
 
-        It is refused when d² = yᵀS⁻¹y exceeds the gate (χ² of six), or when it lies further from the
-        prediction than ``jump`` metres, or would in a second, for every second since the last and one more.
-        Refused ones agree when each lies within that distance of where the one before it was going: after
-        ``witnesses`` of them the state begins anew with the last. They need not fit the model, or who
-        manoeuvres harder than the model thinks would be locked out.
+        ``time`` is no earlier than the previous state's. The measurement is refused when d² = yᵀS⁻¹y exceeds
+        the gate (χ² of six), or when it lies further from the prediction than ``jump`` metres, or would do so
+        within a second, for every second since the last measurement plus one. Refused measurements agree when
+        each lies within that distance of the extrapolation of the one before it: after ``witnesses`` of them
+        the state restarts at the last one. They need not fit the motion model; otherwise a sender that
+        manoeuvres harder than the model assumes would be locked out.
 
-        Of a place alone no turn is learnt: the velocities that follow from places lag behind.
+        A measurement of position alone gives no turn rate: velocities derived from positions lag behind.
         """
         if len(z) == 3:
             return self._after_place(belief, time, z)
@@ -110,8 +117,10 @@ class Estimator:
         return Belief(time, x, P, turn, (), belief.refused)
 
     def _after_place(self, belief: Belief | None, time: int, z: Three) -> Belief:
-        """The same where only a place was measured: as if the velocity were as predicted, and hardly
-        measured."""
+        """Update with a position alone.
+
+        The innovation of the velocity is 0 and its measurement noise is very large.
+        """
         if belief is None:
             return Belief(time, (*z, 0.0, 0.0, 0.0), self._first_blind, self._turning.unknown, (), 0)
         elapsed = time - belief.time
@@ -147,5 +156,5 @@ class Estimator:
 
 @lru_cache(maxsize=64)
 def estimator(config: TrackConfig) -> Estimator:
-    """One for all tracks of the same settings."""
+    """Return the estimator shared by all tracks with the same settings."""
     return Estimator(config)

@@ -1,7 +1,8 @@
-"""filterpy's Kalman filter of one axis: what a step does to the covariance, and the gain that it gives.
+"""filterpy's Kalman filter of one axis: covariance after a step, and gain.
 
-Neither depends on what is measured, so they recur: a sender that keeps its pace settles on one gain within a
-few seconds, and one that loses messages now and then passes through the same few again. They are kept.
+Neither depends on the measured values, so they recur. For a sender with a constant rate they converge to one
+gain within a few seconds; a sender that loses messages now and then passes through the same few gains again.
+Therefore they are cached.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ Square = tuple[float, float, float, float]
 
 
 class Noise(NamedTuple):
-    """Standard deviations of a measured position (m) and velocity (m/s), and of the acceleration (m/s²)."""
+    """Standard deviations of measured position (m) and velocity (m/s), and of the acceleration (m/s²)."""
 
     position: float
     velocity: float
@@ -26,8 +27,11 @@ class Noise(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """``S``: covariance of the innovation, its upper triangle; ``K``: the gain; ``P``: the covariance
-    after."""
+    """Innovation covariance, gain and posterior covariance.
+
+    ``S``: upper triangle of the covariance of the innovation; ``K``: the gain; ``P``: the covariance after
+    the update.
+    """
 
     S: tuple[float, float, float]
     K: Square
@@ -36,7 +40,7 @@ class Gain(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def gain(noise: Noise, P: Square, elapsed: int) -> Gain:
-    """From covariance ``P``, ``elapsed`` µs later, when position and velocity are measured."""
+    """Compute the gain for a position and velocity measured ``elapsed`` µs after the covariance was ``P``."""
     kalman = prepared(noise)
     kalman.P = np.array(P).reshape(2, 2)
     if elapsed > 0:
@@ -49,7 +53,7 @@ def gain(noise: Noise, P: Square, elapsed: int) -> Gain:
 
 @lru_cache(maxsize=1024)
 def model(elapsed: int, sigma: float) -> tuple[Array, Array]:
-    """F and Q (2, 2) of ``elapsed`` µs of white acceleration with the spectral density σ²·(1 s)."""
+    """Return F and Q (2, 2) for ``elapsed`` µs of white acceleration of spectral density σ²·(1 s)."""
     dt = elapsed * 1e-6
     q = sigma**2 * dt
     return (
@@ -60,8 +64,11 @@ def model(elapsed: int, sigma: float) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def prepared(noise: Noise) -> Any:
-    """The filter. Whoever is to be timely asks for it beforehand: the first one loads filterpy."""
-    # That brings scipy.stats along, which takes longer than all else of a companion together.
+    """Return the configured filter.
+
+    The first call loads filterpy, so time-critical callers call this beforehand.
+    """
+    # filterpy also imports scipy.stats, which takes longer than the rest of a companion's start.
     from filterpy.kalman import KalmanFilter
 
     kalman = KalmanFilter(dim_x=2, dim_z=2)
@@ -73,7 +80,7 @@ def prepared(noise: Noise) -> Any:
 
 
 def _inverse(S: Array) -> Array:
-    """Of a (2, 2) in closed form: numpy's is made for larger ones."""
+    """Invert a (2, 2) matrix in closed form: numpy's inverse is optimised for larger ones."""
     (a, b), (c, d) = S.tolist()
     scale = 1.0 / (a * d - b * c)
     return np.array([[d * scale, -b * scale], [-c * scale, a * scale]])

@@ -1,8 +1,8 @@
-"""The last seconds of a track, so that a late measurement is taken in its place.
+"""Out-of-sequence buffer: the last seconds of a track, so that late measurements are inserted in order.
 
-The measurements lie in the order of the times at which they were true, each with the belief after it. A late
-one goes between them, and those after it are taken again, gate and doubts included: what comes of them is the
-same, bit by bit, as if they had come in order.
+Measurements are sorted by the times at which they were true, each with the filter state after it. A late one
+is inserted, and those after it are processed again, gate and hypotheses included: the result is bit-identical
+to the result of an arrival in order.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from companion.estimation.sender_clock import Dated
 
 
 class OutOfSequenceBuffer:
-    """Measurements of the last ``window`` µs, and for a while some older ones, and what was believed before
-    them."""
+    """Measurements of at least the last ``window`` µs, and the filter state before them.
+
+    Some older measurements are kept for a while, too.
+    """
 
     __slots__ = (
         "_before",
@@ -39,10 +41,10 @@ class OutOfSequenceBuffer:
         self.too_late = 0
 
     def put(self, dated: Dated, z: Measured) -> bool:
-        """Take a measurement ``z``; whether it became part of the belief.
+        """Add a measurement ``z``; return whether it became part of the filter state.
 
-        One from before the window is refused and counted. Of several with the same stamp the first counts:
-        the answer for the others is its own.
+        A measurement from before the window is refused and counted. If several have the same stamp the first
+        counts, and the others get the first one's answer.
         """
         times = self._times
         time = dated.time
@@ -56,13 +58,13 @@ class OutOfSequenceBuffer:
         times.append(time)
         self._measured.append(z)
         self._beliefs.append(belief)
-        # Not one by one: what is kept for longer is never asked for.
+        # Removed in batches: keeping some longer than the window does no harm, because they are never used.
         if times[0] < time - 2 * self._window:
             self._forget()
         return before is None or belief.refused == before.refused
 
     def _between(self, dated: Dated, z: Measured) -> bool:
-        """Take a late measurement."""
+        """Insert a late measurement; return whether it became part of the filter state."""
         times, time = self._times, dated.time
         place = bisect_right(times, time)
         if dated.stamped and place > 0 and times[place - 1] == time:
@@ -73,7 +75,7 @@ class OutOfSequenceBuffer:
         return self._accepted(place)
 
     def _replay(self, first: int) -> None:
-        """Take the measurements from ``first`` on, again or for the first time."""
+        """Process the measurements from index ``first`` on, again or for the first time."""
         beliefs = self._beliefs
         del beliefs[first:]
         belief = beliefs[-1] if first > 0 else self._before
@@ -87,7 +89,7 @@ class OutOfSequenceBuffer:
         return before is None or self._beliefs[place].refused == before.refused
 
     def _forget(self) -> None:
-        """Nothing may still come between those from before the window."""
+        """Remove measurements from before the window: no late one is inserted between them."""
         old = bisect_left(self._times, self._times[-1] - self._window)
         self._before = self._beliefs[old - 1]
         del self._times[:old], self._measured[:old], self._beliefs[:old]

@@ -1,11 +1,11 @@
-"""When a shared plan begins, by our clock.
+"""Clock of a sender of plans: estimates when a shared plan begins, on the own clock.
 
-A plan carries its epoch in Unix time: both clocks are set by GPS or over the network, and a millisecond
-counts for little. One that is wrong lays every plan where its sender is not, and is not to be told from a
-right one by a single plan. So the clock is estimated from all of them, as those of the tracks are: the
-estimate is off by what the quickest plan took longer than the least delay that is set, which is little after
-some plans, and the positions of the same sender are dated alike. An epoch near the estimate is its sender's
-own word, and better; another is replaced by the estimate.
+A plan carries its epoch in Unix time. Usually both clocks are set by GPS or over the network, and a
+millisecond matters little. A wrong clock, however, shifts every plan away from its sender's true position,
+and a single plan does not show that the clock is wrong. So the clock is estimated from all plans, as the
+tracks' clocks are: the error of the estimate is the time by which the fastest plan exceeded the configured
+least delay, which is small after some plans, and the positions of the same sender are dated alike. An epoch
+near the estimate is used as sent, since it is more accurate; any other is replaced by the estimate.
 """
 
 from __future__ import annotations
@@ -13,18 +13,25 @@ from __future__ import annotations
 from companion.estimation.sender_clock import SenderClock
 
 _NEAR = 50_000
-"""µs between epoch and estimate: two clocks that are off by some milliseconds, and a link that is slower than
-it is said to be by a few periods. At 5 m/s it is a quarter of a metre, half of d_min."""
+"""µs; tolerated difference between epoch and estimate.
+
+It covers two clocks that are off by some milliseconds, and a link that is slower than configured by a few
+periods. At 5 m/s it is a quarter of a metre, half of d_min.
+"""
 _ENOUGH = 3
-"""Plans that tell of the same wrong clock before an epoch that cannot be true is replaced."""
+"""Number of consistent plans before an impossible epoch is replaced by the estimate."""
 _MANY = 10
-"""Plans before one that may be true is: of so many, with a jitter of 100 ms, one in a thousand times none is
-quicker than ``_NEAR``."""
+"""Number of plans before a possible epoch is replaced by the estimate.
+
+With a jitter of 100 ms, the probability that none of ten is faster than ``_NEAR`` is one in a thousand.
+"""
 
 
 class PlanClock:
-    """The clock of one sender of plans, all times µs. ``delay``: the least age of a message at its arrival;
-    ``stale``: how old a plan may be."""
+    """The clock of one sender of plans; all times in µs.
+
+    ``delay``: the least age of a message at its arrival; ``stale``: how old a plan may be.
+    """
 
     __slots__ = (
         "_begins",
@@ -41,7 +48,7 @@ class PlanClock:
 
     @property
     def brief(self) -> bool:
-        """Whether its sender's clock is a simulation's, see ``SenderClock``."""
+        """Whether the sender's clock is a simulation's clock, see ``SenderClock``."""
         return self._clock.brief
 
     @brief.setter
@@ -49,8 +56,11 @@ class PlanClock:
         self._clock.brief = value
 
     def begins(self, now: int, epoch: int, dt: int) -> int | None:
-        """When a plan of steps ``dt`` that arrives at ``now`` with ``epoch`` begins; None while it is not
-        clear what to make of that. A plan that its sender holds, and tells of again, began when it did."""
+        """Return when a plan with ``epoch`` and steps of ``dt``, received at ``now``, begins.
+
+        Returns None while that cannot be determined. A plan that its sender keeps, and sends again, keeps its
+        beginning.
+        """
         if epoch != self._epoch:
             self._epoch, self._begins = epoch, self._first(now, epoch, dt)
         return self._begins

@@ -1,27 +1,29 @@
-"""When a measurement was true, by its sender's own clock.
+"""Clock of a sender: estimates from its time stamps when a measurement was true.
 
-A message arrives later by a delay that changes; its stamp (``time_boot_ms`` of GLOBAL_POSITION_INT and
-LOCAL_POSITION_NED) does not. The *lag* arrival − stamp is the offset between the two clocks, plus the delay.
-A line below all lags is the offset plus the least delay, which is a setting; what a lag is above the line is
-age. One way alone, a link that became slow cannot be told from a clock that stood still. So the line falls
-with any lag, and rises no faster than clocks drift: **a delay that grows never makes a message younger**.
+The delay of a message varies; its stamp (``time_boot_ms`` of GLOBAL_POSITION_INT and LOCAL_POSITION_NED) does
+not. The *lag* arrival − stamp is the offset between the two clocks plus the delay. The estimator keeps a line
+below all lags: the offset plus the least delay, which is a setting. The part of a lag above the line is the
+age of the message. One-way messages cannot distinguish a link that became slow from a clock that stood still.
+So the line falls with any lag, and rises no faster than clocks drift: **a growing delay never makes a message
+younger**.
 
-A sender that can be asked tells the two apart: what its clock shows in an answer it showed after the question
-left, so the offset is at least the question's time minus that stamp, however slow the way back. To that the
-line is laid at once, and for as long as answers come nothing else raises it: a message's age is then never
-understated, and overstated by no more than the question took.
+A sender that answers requests allows the distinction: the clock value in an answer was shown after the
+request left, so the offset is at least the request's time minus that stamp, however slow the way back. The
+line is set to that at once, and as long as answers arrive nothing else raises it: a message's age is then
+never understated, and overstated by no more than the time the request took.
 
-Where no answers come, two things are believed after long evidence. A lag that has grown steadily for half a
-minute is a clock of another rate, as a simulator's is (1 % and more); the rate is that of the line below the
-lags, as Moon, Skelly and Towsley lay it ("Estimation and removal of clock skew from network delay
-measurements", 1999). And where a minute long nothing was younger than would be of use, that is the clock:
-one that stood for a moment must not ground a vehicle for ever. A step *back* of the stamps further than
-messages can overtake each other is a clock that began anew, as soon as a second of it has been heard as it
-was sent: what waited somewhere comes in a burst instead.
+Without answers, two explanations are accepted after long evidence. First, a lag that has grown steadily for
+half a minute is attributed to a clock of another rate, such as a simulator's (1 % and more); the rate is that
+of the line below the lags as defined by Moon, Skelly and Towsley ("Estimation and removal of clock skew from
+network delay measurements", 1999). Second, if for a whole minute no message was young enough to be useful,
+that is attributed to the clock: a clock that stood for a moment must not ground a vehicle permanently. If the
+stamps step *back* further than messages can overtake each other, the sender's clock has restarted. That is
+accepted as soon as one second of the new clock has been received at the rate at which it was sent; delayed
+messages arrive in a burst instead.
 
-A track keeps its own time, which runs as the sender's clock does and is only read with an offset: it is the
-sender's where stamps were of use from the first. So what a track makes of a message does not depend on when
-it came, nor on who heard it; and where the stamps step, or are of no use, the track's time goes on.
+A track keeps its own time, which runs at the rate of the sender's clock and is read with an offset: it is the
+sender's time if the stamps were usable from the first. So the result for a message depends neither on its
+arrival time nor on its receiver, and where the stamps step, or are unusable, the track's time continues.
 """
 
 from __future__ import annotations
@@ -33,44 +35,62 @@ from typing import NamedTuple
 
 _SECOND = 1_000_000
 _DRIFT = 200e-6
-"""The line rises at this rate: no quartz is off by more, nor two of them against each other."""
+"""Rate at which the line rises: no quartz clock, and no two against each other, drift by more."""
 _PIECE = 5 * _SECOND
-"""µs of which the least lag is kept."""
+"""µs; length of a piece, of which the least lag is kept."""
 _MEMORY = 13
-"""Pieces; from the first to the last they reach over a minute."""
+"""Number of pieces; from the first to the last they cover more than a minute."""
 _EVIDENCE = 7
-"""Pieces, half a minute, over which lags must have changed steadily for a rate to be learnt: all within
-``_BENT`` of the whole change of one line, as no few steps of a delay are. A rate below ``_PLAIN`` is not
-worth the risk."""
+"""Number of pieces (half a minute) over which lags must have changed steadily for a rate to be learnt.
+
+Steadily: all lags lie within ``_BENT`` of the whole change of one line, which a few steps of a delay do not.
+A rate below ``_PLAIN`` is not worth the risk.
+"""
 _BENT, _PLAIN = 0.125, 0.002
 _USELESS = 400_000
-"""µs above the line; a sender that is so old all the time is out of use, below it is but old."""
+"""µs above the line; if all messages of a sender are older than this, it is unusable.
+
+Below this they are only old.
+"""
 _STEP = 2 * _SECOND
-"""µs; messages do not overtake each other by more, nor does a lag fall by more: the clock was set, or the
-sender began anew."""
+"""µs; messages do not overtake each other by more, nor does a lag fall by more.
+
+A larger step means that the clock was set or that the sender restarted.
+"""
 _WITNESSES = 3
-"""Successive messages off the line that agree with each other before it is laid through them."""
+"""Number of successive messages off the line that must agree before the line is set through them."""
 _LIVE = 0.75
-"""So much of their stamps' span must the arrivals of witnesses take; a queue that drains takes less."""
+"""Least share of the span of their stamps over which those messages must arrive.
+
+The messages of a queue that drains arrive in less.
+"""
 _FEW = 8
-"""Messages of a brief line."""
+"""Number of messages that define the line of a ``brief`` clock."""
 _ANSWERED = 10 * _SECOND
-"""µs after an answer in which the line is not raised by what lags seem to say."""
+"""µs after an answer during which the lags cannot raise the line."""
 _REPEATS = 4
-"""The same stamp so often in succession, and for a second, is no duplicate: this clock stands."""
+"""Number of repetitions of one stamp, over at least a second, after which the clock counts as stopped.
+
+Fewer repetitions are duplicates.
+"""
 
 
 class Dated(NamedTuple):
-    """``time`` in the track's own time, µs; ``stamped`` when it is the sender's word: then there is one
-    measurement of that time, and another is its duplicate."""
+    """Time of a message in the track's own time, µs.
+
+    ``stamped``: the time comes from the sender's stamp. Then there is one measurement of that time, and
+    another with the same time is its duplicate.
+    """
 
     time: int
     stamped: bool
 
 
 class _Least(NamedTuple):
-    """The least ``lag`` of a piece that ``begun`` then, when it was ``received``, and how far it was
-    ``above`` the line."""
+    """The least ``lag`` of a piece that started at ``begun``.
+
+    ``received``: when its message arrived; ``above``: its distance above the line. All µs.
+    """
 
     begun: int
     received: int
@@ -86,18 +106,19 @@ class _Suspect(NamedTuple):
 
     @property
     def lag(self) -> int:
+        """Arrival time minus stamp, µs."""
         return self.received - self.stamp
 
 
 class SenderClock:
-    """The clock of one sender, all times µs.
+    """The clock of one sender; all times in µs.
 
-    ``delay``: the least age of a message at its arrival. ``latest``: by how much others may overtake one that
-    is still dated, two seconds at least. ``skew``: the companion's time minus the track's own, as known at
-    the last message. ``heard``: messages that the line stands on; ``laid``: how often there was a new one.
-    ``brief``: the line is that of the last few messages alone. It is for a simulation's clock, which stands
-    whenever its machine is busy; a delay that grows is then not seen. ``lost``: what the sender's clock has
-    lost against ours, by its own answers.
+    ``delay``: the least age of a message at its arrival. ``latest``: how far in time other messages may
+    overtake one that is still dated, at least two seconds. ``skew``: the companion's time minus the track's
+    own, as of the last message. ``heard``: number of messages that support the line; ``laid``: number of
+    times that a new line was set. ``brief``: the line is computed from the last few messages alone. This is
+    for a simulation's clock, which stops whenever its machine is busy; a growing delay is then not detected.
+    ``lost``: time that the sender's clock has lost against the companion's, according to its answers.
     """
 
     __slots__ = (
@@ -138,7 +159,7 @@ class SenderClock:
         self._lately: deque[int] = deque(maxlen=_FEW)
         self._delay = delay
         self._tolerance = max(latest, _STEP)
-        # Track time minus stamp; None before the first stamp, and while they are of no use.
+        # Track time minus stamp; None before the first stamp, and while the stamps are unusable.
         self._base: int | None = None
         self._begun = self._timed = False
         self._stamp = self._newest = 0
@@ -152,11 +173,11 @@ class SenderClock:
         self._least = _Least(0, 0, 0, 0.0)
 
     def date(self, received: int, stamp: int) -> Dated | None:
-        """When a message was true that arrived at ``received`` (the companion's time) with ``stamp`` (the
-        sender's).
+        """Return when a message was true that arrived at ``received`` with ``stamp``.
 
-        A stamp of 0 is none: the message is dated by its arrival. None for one that cannot be dated: others
-        overtook it by far, or it is one of the first that tell of a step.
+        ``received`` is on the companion's clock, ``stamp`` on the sender's. A stamp of 0 means none: the
+        message is dated by its arrival. Returns None for a message that cannot be dated: others overtook it
+        by far, or it is one of the first that indicate a step of the clock.
         """
         if stamp <= 0:
             return self._by_arrival(received)
@@ -187,21 +208,27 @@ class SenderClock:
         return Dated(stamp + self._base, True)
 
     def reads(self, received: int, stamp: int) -> int:
-        """When another message of this sender was true, on the companion's time; nothing is learnt of it."""
+        """Return when another message of this sender was true, on the companion's clock.
+
+        The estimate of the clock does not change.
+        """
         if stamp <= 0 or self._base is None:
             return received - self._delay
         return min(stamp + self._base + self.skew, received - self._delay)
 
     @property
     def late(self) -> int:
-        """By how much (µs) the quickest of the last few messages was later than the line has it."""
+        """Delay (µs) of the fastest of the last few messages above the line."""
         if self.brief or self._base is None or not self._lately:
             return 0
         return max(0, min(self._lately) - round(self._line))
 
     def answered(self, received: int, asked: int, stamp: int) -> None:
-        """The sender's clock showed ``stamp`` at some time between ``asked`` and ``received`` (ours): an
-        answer to what was asked of it. One that is of another clock than its messages counts for nothing."""
+        """Record that the sender's clock showed ``stamp`` between ``asked`` and ``received``.
+
+        ``asked`` and ``received`` are on the companion's clock; the stamp comes from the answer to a request.
+        An answer from another clock than that of the messages is ignored.
+        """
         if self.brief or self._base is None or not 0 < asked <= received:
             return
         if abs(received - stamp - self._lag) > self._tolerance:
@@ -209,8 +236,8 @@ class SenderClock:
         self._answered = received
         received = max(received, self._received)
         line = self._line + self._rate * (received - self._received)
-        # Dated by that line a message is as old as it would be if the question had taken no time; but the
-        # quickest are no younger than ever.
+        # A message dated by this line gets the age that it would have if the request had taken no time. The
+        # line is not set above the last lags, however: no message is younger than the least delay.
         least = min(asked - stamp + self._delay, *self._lately)
         if least > line:
             self.lost += round(least - line)
@@ -219,19 +246,20 @@ class SenderClock:
             self.skew = least - self._delay - self._base
 
     def _forget(self) -> None:
-        """The lags so far were of another line."""
+        """Discard the lags so far: they belong to another line."""
         self._pieces.clear()
         received, lag = self._received, self._lag
         self._least = _Least(received, received, lag, max(lag - self._line, 0.0))
 
     def _by_arrival(self, received: int) -> Dated:
         if not self._timed:
-            # Not ours: so it is one for many who hear the same after the same time.
+            # Track time starts near 0, not at the companion's time: it is then the same for all companions
+            # that receive the same messages at the same intervals.
             self._timed, self.skew = True, received - self._delay
         return Dated(received - self._delay - self.skew, False)
 
     def _begin(self, last: _Suspect, lag: int, heard: int) -> Dated:
-        """Lay the line through ``lag``. The track's time goes on: its skew stays what it was."""
+        """Set the line through ``lag``; the track's time continues, as its skew stays unchanged."""
         received, stamp = last
         if not self._timed:
             self.skew = lag - self._delay
@@ -251,13 +279,16 @@ class SenderClock:
         return Dated(stamp + self._base, True)
 
     def _suspect(self, new: _Suspect) -> Dated | None:
-        """One off the line: with enough others beside it there is a new line, and where they are all over the
-        place there is none."""
+        """Date a message off the line; return None if it cannot be dated.
+
+        Enough such messages that agree define a new line. If they contradict each other for a second there is
+        no line, and messages are dated by their arrival.
+        """
         suspects = self._suspects
         if not suspects:
             self._suspected = new.received
         elif new.stamp <= suspects[-1].stamp or abs(new.lag - suspects[-1].lag) > self._tolerance:
-            # No clock that runs says the one after the other.
+            # No running clock gives these two stamps in succession.
             suspects.clear()
             if new.received - self._suspected >= _SECOND:
                 self._base = None
@@ -266,7 +297,7 @@ class SenderClock:
         if count > _WITNESSES:
             del suspects[1]
         lasted = new.received - first.received
-        # A lag that is much smaller is no delay, however its messages came.
+        # A lag that is much smaller cannot be a delay, however its messages arrived.
         ahead = self._base is not None and new.lag < self._line - self._tolerance
         live = lasted >= _SECOND and lasted >= _LIVE * (new.stamp - first.stamp)
         if count >= _WITNESSES and (ahead or live):
@@ -274,7 +305,7 @@ class SenderClock:
         return self._by_arrival(new.received) if self._base is None else None
 
     def _follow(self, received: int, lag: int, expected: float) -> None:
-        """Keep the line at or below the lags; with every piece, see whether it may be laid higher."""
+        """Keep the line at or below the lags; at the end of each piece, check whether it may be raised."""
         if self.brief:
             self._received, self._line, self._rate = received, float(min(self._lately)), 0.0
             return
@@ -297,13 +328,13 @@ class SenderClock:
             self._forget()
             return
         if len(pieces) == 1:
-            # Until then the line lay still; it may have risen since.
+            # Until then the line was kept level; it may have risen since.
             self._line += _DRIFT * (received - pieces[0].received)
         recent = list(islice(pieces, max(len(pieces) - _EVIDENCE, 0), None))
         learnt = _steady(recent)
         self._rate = _DRIFT + learnt
         if learnt > 0.0:
-            # What was age already when this began is age still.
+            # What was age above the line at the beginning of this period remains age.
             self._line = max(self._line, _laid(recent, self._rate, received) - recent[0].above)
         if len(pieces) == _MEMORY:
             youngest = _laid(pieces, _DRIFT, received)
@@ -312,12 +343,12 @@ class SenderClock:
 
 
 def _laid(pieces: Sequence[_Least], rate: float, received: int) -> float:
-    """Where at ``received`` a line of that rate is that touches the ``pieces`` from below."""
+    """Return the value at ``received`` of the line of this ``rate`` that touches ``pieces`` from below."""
     return min(piece.lag + rate * (received - piece.received) for piece in pieces)
 
 
 def _steady(pieces: Sequence[_Least]) -> float:
-    """The rate at which lags have changed all the time; 0 where that is not so, or not yet known."""
+    """Return the rate at which the lags have changed steadily; 0 if they have not, or it is not known yet."""
     if len(pieces) < _EVIDENCE:
         return 0.0
     rate = _slope_below(pieces)
@@ -329,8 +360,10 @@ def _steady(pieces: Sequence[_Least]) -> float:
 
 
 def _slope_below(pieces: Sequence[_Least]) -> float:
-    """Slope of the line below all ``pieces`` that is nearest to them: the edge of their lower hull in the
-    middle of their time."""
+    """Return the slope of the highest line below all ``pieces``.
+
+    It is the slope of the edge of their lower hull at the middle of their time.
+    """
     hull: list[_Least] = []
     for point in pieces:
         while len(hull) > 1 and _slope(hull[-2], hull[-1]) >= _slope(hull[-1], point):

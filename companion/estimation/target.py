@@ -1,4 +1,4 @@
-"""The target, by whichever kind of message is configured to tell of it: one speaker at a time, one track."""
+"""Track of the target, fed by the configured kind of message, from one sender at a time."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ _TRACKING = 1
 
 
 class Target:
-    """Hears of the target and says where it is, fleet-local ENU. ``refused``: messages of the right kind that
-    did not count: of others than the speaker, or of a camera that does not track."""
+    """Receives messages about the target and estimates its state, fleet-local ENU.
+
+    ``refused`` counts messages of the right kind that were ignored: from senders other than the accepted one,
+    or from a camera that does not track.
+    """
 
     def __init__(self, config: CompanionConfig, system: int, target_system: int, fleet: FleetFrame) -> None:
         source = config.target_source
@@ -37,7 +40,7 @@ class Target:
         self.refused = 0
 
     def receive(self, now: int, link: str, message: Message) -> bool:
-        """Take a message that arrived by ``link`` at ``now`` (µs); whether it became part of the track."""
+        """Receive a message from ``link`` at ``now`` (µs); return whether it became part of the track."""
         if self._kind is None or not isinstance(message, self._kind) or link not in self._links:
             return False
         if not self._may_speak(now, message.source):
@@ -49,21 +52,23 @@ class Target:
         return True
 
     def at(self, now: int) -> State | None:
-        """The target at ``now`` (µs); None before the first message, and when it is unheard of for too
-        long."""
+        """Return the target's state at ``now`` (µs); None before the first message and when it is stale."""
         return self.fresh(self.last(now))
 
     def last(self, now: int) -> State | None:
-        """The same however long it is unheard of: carried on for a bounded time, it may well be there."""
+        """Return the last known state at ``now`` (µs), however old: extrapolated for a bounded time.
+
+        The target may well still be there. Returns None before the first message.
+        """
         return self._known.at(now) if self._fixed is None else self._fixed
 
     def fresh(self, state: State | None) -> State | None:
-        """``state`` where it is no older than a target may be that is followed."""
+        """Return ``state``, or None if it is older than ``guard.target_stale_us``."""
         old = state is not None and state.age > self._config.guard.target_stale_us
         return None if old else state
 
     def age(self, now: int) -> int | None:
-        """Age (µs) of what is known; None before the first message."""
+        """Return the age (µs) of the last measurement: None before the first, 0 for a fixed target."""
         if self._fixed is not None:
             return 0
         time = self._known.time
@@ -71,12 +76,15 @@ class Target:
 
     @property
     def _known(self) -> Track:
-        """The speaker's track, or the last one's until anything has come of the new one's messages."""
+        """Track of the current sender, or of the previous one until the current one's has a state."""
         return self._before if self._track.time is None else self._track
 
     def _may_speak(self, now: int, source: Source) -> bool:
-        """Two components of one system may both tell of a target, each with its own clock and errors: who has
-        been heard goes on, until silent for as long as a target may be."""
+        """Return whether messages of ``source`` are accepted at ``now`` (µs).
+
+        Two components of one system may both report a target, each with its own clock and errors. The one
+        received first is kept until it has been silent for ``guard.target_stale_us``.
+        """
         if source.system == 0 or (self._believed is not None and source.system != self._believed):
             return False
         if self._believed is None and source.system == self._system:
@@ -86,7 +94,7 @@ class Target:
         if self._speaker is not None:
             if now - self._heard <= self._config.guard.target_stale_us:
                 return False
-            # Another clock, other errors.
+            # The new sender has another clock and other errors.
             self._before, self._track = self._known, Track(self._config.target)
         self._speaker, self._heard = source, now
         return True
@@ -96,7 +104,7 @@ class Target:
         if isinstance(message, GlobalPosition):
             velocity, stamp = ned_to_enu(message.velocity_ned), message.time_boot
         elif isinstance(message, FollowTarget):
-            # Three zeros stand for an unknown velocity too.
+            # Three zeros also stand for an unknown velocity.
             told = message.velocity if message.velocity is not None and any(message.velocity) else None
             velocity, stamp = None if told is None else ned_to_enu(told), message.time_boot
         elif isinstance(message, CameraTrackingGeo) and message.status == _TRACKING:

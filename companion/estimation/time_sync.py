@@ -1,9 +1,9 @@
-"""What the autopilot's clock shows now: asked by TIMESYNC (111) when its messages look late.
+"""Round-trip measurement of the autopilot's clock by TIMESYNC (111) when its messages seem late.
 
-Messages that come later and later tell of a link that becomes slow or of a clock that is slow, and never of
-which. A question and its answer do: what the clock showed in the answer it showed after the question left, so
-its offset is known to the time that the question took, whatever the answer took (``SenderClock.answered``).
-Nothing is asked while messages come as expected.
+Messages with growing delay indicate either a slow link or a slow clock; one-way delays cannot tell which. A
+request and its response can: the autopilot's clock showed the returned time after the request was sent. So
+its offset is known to within the time that the request took, regardless of how long the response took
+(``SenderClock.answered``). No requests are sent while messages arrive as expected.
 """
 
 from __future__ import annotations
@@ -14,15 +14,18 @@ from typing import NamedTuple
 from mavlink_bridge.messages import Source, Timesync
 
 _NS = 1000
-"""In a µs; a question's last three digits are its sender's component id, so that answers find home."""
+"""ns per µs.
+
+The last three digits of a request's time are its sender's component id, so that responses can be assigned.
+"""
 _LATE = 20_000
-"""µs by which the quickest of the last few messages has to be late."""
+"""Delay (µs) of the fastest of the last few messages above which requests are sent."""
 _PERIOD = 200_000
-"""µs between two questions."""
+"""µs between two requests."""
 _OPEN = 32
-"""Questions whose answers are waited for."""
+"""Maximum number of open requests."""
 _PATIENCE = 3_000_000
-"""µs of questions without an answer, after which there will be none."""
+"""µs of requests without a response, after which none is expected any more."""
 
 
 class Answer(NamedTuple):
@@ -33,7 +36,7 @@ class Answer(NamedTuple):
 
 
 class RoundTrips:
-    """Of the companion ``own`` to the autopilot of its system."""
+    """TIMESYNC exchange between the companion ``own`` and the autopilot of its system."""
 
     def __init__(self, own: Source) -> None:
         self._own = own
@@ -42,7 +45,7 @@ class RoundTrips:
         self._since: int | None = None
 
     def due(self, now: int, late: int) -> list[Timesync]:
-        """The question, where one is due at ``now`` (µs); ``late``: by how much (µs) messages are."""
+        """Return the request that is due at ``now`` (µs), if any; ``late``: delay (µs) of the messages."""
         if late <= _LATE:
             self._since = None
             return []
@@ -55,7 +58,7 @@ class RoundTrips:
         return [Timesync(self._own, 0, question)]
 
     def receive(self, message: Timesync) -> Answer | None:
-        """An answer to one of the questions, once; None for anything else on the link."""
+        """Return the answer if ``message`` is the first response to a request, otherwise None."""
         if message.tc1 <= 0 or message.ts1 not in self._asked:
             return None
         self._asked.remove(message.ts1)
@@ -63,5 +66,5 @@ class RoundTrips:
         return Answer(message.ts1 // _NS, message.tc1 // _NS)
 
     def unanswered(self, now: int) -> bool:
-        """Whether messages are late, and nothing tells why."""
+        """Return whether messages are late and the requests have had no response for ``_PATIENCE``."""
         return self._since is not None and now - self._since > _PATIENCE

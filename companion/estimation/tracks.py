@@ -1,7 +1,7 @@
-"""One moving thing as seen through its messages: dated by its sender's clock, filtered, gated, and carried on
-for a bounded time.
+"""Track of one sender: dated by the sender's clock, filtered, gated, and extrapolated for a bounded time.
 
-``timing`` says when a measurement was true, ``rewind`` puts it in its place, ``estimator`` makes the belief.
+``sender_clock`` dates a measurement, ``out_of_sequence`` inserts it in time order, ``estimator`` computes the
+filter state.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ from companion.estimation.turn_rate import Path, carried
 from companion.values.horizon import Array
 
 _FAR, _FAST = 1e5, 100.0
-"""m and m/s; beyond these a state is garbage, soundly framed though it may be."""
+"""m and m/s; a state beyond either limit is rejected as garbage, even if its frame was valid."""
 
 
 class State(NamedTuple):
-    """Position (3,), velocity (3,), fleet-local ENU; ``age`` µs since the last accepted measurement was true.
+    """Position (3,) m and velocity (3,) m/s, fleet-local ENU.
 
-    ``sigma``: standard deviation of the position on each axis, m. It grows with the age without bound, and is
-    infinite where nobody says. ``turn_rate``: how fast its course turns, rad/s, counter-clockwise from above.
+    ``age`` (µs) is the time since the last accepted measurement was true. ``sigma`` (m) is the standard
+    deviation of the position on each axis; it grows with the age without bound and is infinite where it is
+    unknown. ``turn_rate`` (rad/s) is the rate of change of the course, counter-clockwise seen from above.
     """
 
     position: Array
@@ -37,12 +38,12 @@ class State(NamedTuple):
     turn_rate: float = 0.0
 
     def ahead(self, seconds: Array) -> Path:
-        """Where it will be, and how fast, at each of ``seconds`` (n,) from then if it goes on so."""
+        """Return position and velocity ``seconds`` (n,) later, at constant speed and turn rate."""
         return carried(self.position, self.velocity, self.turn_rate, seconds)
 
 
 class Track:
-    """Filters the measurements of one sender. Times are the companion's own µs."""
+    """Filter of the measurements of one sender; times are the companion's own, in µs."""
 
     __slots__ = (
         "_absurd",
@@ -60,7 +61,7 @@ class Track:
 
     @property
     def brief(self) -> bool:
-        """Whether its sender's clock is a simulation's, see ``SenderClock``."""
+        """Whether the sender's clock is a simulation's clock, see ``SenderClock``."""
         return self._clock.brief
 
     @brief.setter
@@ -69,46 +70,46 @@ class Track:
 
     @property
     def time(self) -> int | None:
-        """When the last accepted measurement was true, µs; None before the first."""
+        """Time (µs) at which the last accepted measurement was true; None before the first."""
         belief = self._rewind.belief
         return None if belief is None else belief.time + self._clock.skew
 
     @property
     def rejected(self) -> int:
-        """Measurements that came to nothing: absurd, not to be dated, too late, or refused by the gate."""
+        """Number of discarded measurements: implausible, not datable, too late, or refused by the gate."""
         belief = self._rewind.belief
         refused = 0 if belief is None else belief.refused
         return self._absurd + self._undated + self._rewind.too_late + refused
 
     @property
     def refused(self) -> int:
-        """Measurements that the gate refused."""
+        """Number of measurements that the gate refused."""
         belief = self._rewind.belief
         return 0 if belief is None else belief.refused
 
     @property
     def doubted(self) -> bool:
-        """Whether another story than the one that is believed has been told lately."""
+        """Whether recent measurements contradict the current state (a hypothesis beside it is pending)."""
         belief = self._rewind.belief
         return belief is not None and bool(belief.doubts)
 
     @property
     def clock_steps(self) -> int:
-        """How often the sender's clock was found to be another."""
+        """Number of times that the sender's clock was re-synchronised after the first synchronisation."""
         return max(0, self._clock.laid - 1)
 
     def measure(self, received: int, position: Array, velocity: Array | None, stamp: int = 0) -> bool:
-        """Take a measurement that arrived at ``received`` (µs) and left with ``stamp`` (µs of the sender's
-        clock, 0 for none); whether it was accepted.
+        """Add a measurement that arrived at ``received`` (µs); return whether it was accepted.
 
-        Position (3,) m, velocity (3,) m/s or None, fleet-local ENU as the message has it: the sign of a
-        sender that counts its vertical speed upwards is put right here. A late one is taken in its place as
-        long as ``rewind_us`` reaches; a duplicate changes nothing.
+        ``stamp`` is the sender's clock (µs) at sending, 0 for none. Position (3,) m and velocity (3,) m/s or
+        None are fleet-local ENU as in the message: for senders with a reversed vertical speed
+        (``velocity_up``) the sign is corrected here. A late measurement is inserted at its place in time if
+        ``rewind_us`` reaches back that far. A duplicate changes nothing.
         """
         return self.take(received, measured(position, velocity, upward=self._config.velocity_up), stamp)
 
     def take(self, received: int, z: Measured | None, stamp: int) -> bool:
-        """The same for what ``measured`` makes of position and velocity."""
+        """Add a measurement that ``measured`` has converted; return whether it was accepted."""
         if z is None:
             self._absurd += 1
             return False
@@ -120,28 +121,37 @@ class Track:
 
     @property
     def late(self) -> int:
-        """By how much (µs) the quickest of the last few messages was later than it should be: of a slow link,
-        or of a slow clock."""
+        """Delay (µs) of the fastest of the last few messages beyond the expected one.
+
+        The cause is a slow link or a slow clock.
+        """
         return self._clock.late
 
     @property
     def clock_lost(self) -> int:
-        """What (µs) the sender's clock has lost, by its own ``answered``."""
+        """Time (µs) that the sender's clock has lost, according to its answers (``answered``)."""
         return self._clock.lost
 
     def answered(self, received: int, asked: int, stamp: int) -> None:
-        """The sender's clock showed ``stamp`` between ``asked`` and ``received``, both of ours; µs."""
+        """Record that the sender's clock showed ``stamp`` between ``asked`` and ``received``.
+
+        ``asked`` and ``received`` are on the own clock; all µs.
+        """
         if self._config.stamps:
             self._clock.answered(received, asked, stamp)
 
     def when(self, received: int, stamp: int) -> int:
-        """When another message of the same sender was true, µs: one that arrived at ``received`` and left
-        with ``stamp``."""
+        """Return when another message of the same sender was true, µs.
+
+        The message arrived at ``received`` and was sent with ``stamp``, both µs.
+        """
         return self._clock.reads(received, stamp if self._config.stamps else 0)
 
     def at(self, now: int) -> State | None:
-        """The state carried to ``now``, at most ``extrapolate_us`` far, where it then rests; None before the
-        first measurement."""
+        """Return the state extrapolated to ``now`` (µs), or None before the first measurement.
+
+        Extrapolation ends after ``extrapolate_us``; from then on the state stays there at rest.
+        """
         belief = self._rewind.belief
         if belief is None:
             return None
@@ -161,12 +171,17 @@ class Track:
 
     @property
     def last(self) -> Six:
-        """Position and velocity at the last accepted measurement; ValueError before the first."""
+        """Position (m) and velocity (m/s) at the last accepted measurement.
+
+        Raises ValueError before the first.
+        """
         return self._known().x
 
     def covariance(self, now: int | None = None) -> Array:
-        """Covariance (6, 6) of position and velocity at ``now`` (µs), or at the last measurement; ValueError
-        before the first."""
+        """Return the covariance (6, 6) of position and velocity at ``now`` (µs), or at the last measurement.
+
+        Raises ValueError before the first measurement.
+        """
         belief = self._known()
         P = np.array(belief.P).reshape(2, 2)
         age = 0 if now is None else now - self._clock.skew - belief.time
@@ -188,8 +203,11 @@ class Track:
 
 
 def measured(position: Array, velocity: Array | None, *, upward: bool) -> Measured | None:
-    """A measurement of position (3,) m and velocity (3,) m/s or None, fleet-local ENU; None for an absurd
-    one. ``upward``: its sender counts the vertical speed the wrong way."""
+    """Return the measurement of a position (3,) m and a velocity (3,) m/s or None, fleet-local ENU.
+
+    Returns None for implausible values. ``upward``: the sender reports the vertical speed with the wrong
+    sign.
+    """
     a, b, c = position.tolist()
     if velocity is None:
         return (a, b, c) if a * a + b * b + c * c <= _FAR**2 else None

@@ -1,9 +1,9 @@
-"""How fast a thing turns, learnt from how its velocity did, and where it comes if it goes on turning so.
+"""Turn rate of a vehicle, estimated from the change of its velocity, and the path at that rate.
 
-Who runs round a bend at 4 m/s and 0.33 rad/s is 1.6 m beside the straight line by the end of a horizon of
-1.6 s. The rate is a first-order Gauss–Markov process (Singer's model, of the turn rate instead of the
-acceleration): what is not seen any more is forgotten, and where the velocity is all noise the filter's gain
-is nearly zero and the motion straight, as without it.
+A target that runs round a bend at 4 m/s and 0.33 rad/s is 1.6 m beside the straight line at the end of a
+horizon of 1.6 s. The rate is a first-order Gauss–Markov process (Singer's model, applied to the turn rate
+instead of the acceleration). So the estimate decays without new measurements. Where the velocity is mostly
+noise the filter's gain is nearly zero and the predicted motion is straight, as without the filter.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from companion.values.horizon import Array
 
 _NEAR = 1e-3
-"""m; who has gone less than this has no course."""
+"""m; a displacement below this has no defined course."""
 
 
 class Turn(NamedTuple):
@@ -34,16 +34,21 @@ class Path(NamedTuple):
 
 
 class TurnFilter:
-    """A Kalman filter of one state: ``sigma`` (rad/s) of the rates that occur, forgotten in ``memory`` (s);
-    ``sigma_velocity`` (m/s): how exact the velocities are."""
+    """Kalman filter of one state, the turn rate.
+
+    ``sigma`` (rad/s): standard deviation of the rates that occur; ``memory`` (s): time constant of the
+    process; ``sigma_velocity`` (m/s): standard deviation of the measured velocities.
+    """
 
     def __init__(self, sigma: float, memory: float, sigma_velocity: float) -> None:
         self._variance, self._memory, self._noise = sigma**2, memory, sigma_velocity**2
         self.unknown = Turn(0.0, self._variance)
 
     def after(self, turn: Turn, dt: float, before: tuple[float, float], now: tuple[float, float]) -> Turn:
-        """What is known ``dt`` seconds later, when the horizontal velocity went from ``before`` to
-        ``now``."""
+        """Return the estimate ``dt`` seconds later.
+
+        ``before`` and ``now``: the horizontal velocity (m/s) before and after.
+        """
         if self._variance == 0.0 or dt <= 0.0:
             return turn
         kept = exp(-dt / self._memory)
@@ -57,13 +62,15 @@ class TurnFilter:
 
 
 def carried(position: Array, velocity: Array, rate: float, seconds: Array) -> Path:
-    """The motion (3,), (3,) at each of ``seconds`` (n,) later: its course turns at ``rate`` (rad/s), its
-    speed and its vertical speed stay."""
+    """Return the motion (3,), (3,) extrapolated to each of ``seconds`` (n,) later.
+
+    The course turns at ``rate`` (rad/s); speed and vertical speed stay constant.
+    """
     if rate == 0.0:
         straight = position + np.multiply.outer(seconds, velocity)
         return Path(straight, np.broadcast_to(velocity, straight.shape))
     angle = rate * seconds
-    # sin(ωt)/ω and (1 − cos(ωt))/ω, whole also where ω is nearly 0.
+    # sin(ωt)/ω and (1 − cos(ωt))/ω, in a form that is exact also where ω is nearly 0.
     along = seconds * np.sinc(angle / np.pi)
     aside = 0.5 * angle * seconds * np.sinc(0.5 * angle / np.pi) ** 2
     x, y, z = velocity

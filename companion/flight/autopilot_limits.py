@@ -1,4 +1,4 @@
-"""What the own autopilot can follow, found out before the go: ask → read or time out → lower → say."""
+"""Limits of the own autopilot, determined before the go: request, read or time out, lower, report."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from companion.flight.vehicle import Vehicle
 from mavlink_bridge.messages import Message, ParamValue, Source
 
 UNREAD = "the autopilot's parameters"
-"""What it waits for until they are heard or time is over."""
+"""Value of ``waiting`` until the parameters have been received or the time for it is over."""
 _REMARKS = 16
 
 
 class AutopilotLimits:
-    """Of one ``vehicle``. Without ``limits_from_autopilot`` it asks nothing and all is as configured.
+    """Limits of the autopilot of one ``vehicle``.
 
-    ``lowered`` changes in ``step`` alone, which is not called in flight. ``remarks``: the last of what there
-    is to say; ``said`` counts all of them. ``unread``: the parameters that were not answered in time.
+    Without ``limits_from_autopilot`` nothing is requested and all limits are as configured. ``lowered``
+    changes only in ``step``, which is not called in flight. ``remarks``: the last texts to report; ``said``:
+    number of all of them. ``unread``: the parameters that were not answered in time.
     """
 
     def __init__(self, config: CompanionConfig, vehicle: Vehicle, own: Source) -> None:
@@ -34,30 +35,33 @@ class AutopilotLimits:
         self._found: dict[str, float] | None = None
 
     def receive(self, message: ParamValue) -> None:
-        """A parameter of the autopilot, whoever asked for it."""
+        """Receive a parameter of the autopilot, whether the companion requested it or not."""
         profile = self._vehicle.profile
         if self._on and profile is not None:
             self._parameters.receive(message, profile)
 
     def forget(self) -> None:
-        """Nothing was asked or heard."""
+        """Forget all requests and received parameters."""
         self._parameters.forget()
         self._found = None
 
     @property
     def waiting(self) -> str:
-        """Why no go is taken yet, or what makes it impossible; empty if nothing does."""
+        """Reason why a go is not accepted yet, or is impossible; empty if there is none."""
         if not self._on:
             return ""
         return UNREAD if self._found is None else self.lowered.lacking
 
     @property
     def refuses(self) -> bool:
-        """Whether the vehicle cannot fly an escort as it is set up."""
+        """Whether the autopilot's limits are too low for an escort."""
         return self._on and self._found is not None and bool(self.lowered.lacking)
 
     def step(self, now: int) -> list[Message]:
-        """Requests to send at ``now`` (µs). An autopilot that is not heard may come back with others."""
+        """Return the requests to send at ``now`` (µs).
+
+        If the autopilot is silent all is forgotten, because it may return with other parameters.
+        """
         profile = self._vehicle.profile
         if not self._on or profile is None:
             return []
@@ -72,7 +76,7 @@ class AutopilotLimits:
         return requests
 
     def _remark(self, before: Lowered, unread: tuple[str, ...]) -> None:
-        """Say what is new."""
+        """Report what has changed."""
         if unread and unread != self.unread:
             which = ", ".join(unread) if len(self._found or ()) else "any parameter"
             self._say(f"Autopilot does not tell {which}: stock values assumed")

@@ -1,4 +1,4 @@
-"""Commands to the autopilot, each repeated until it is acknowledged (COMMAND_LONG and COMMAND_ACK)."""
+"""Command protocol (COMMAND_LONG and COMMAND_ACK): repeats each command until it is acknowledged."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ _Call = tuple[int, tuple[float, ...]]
 
 
 class Commands:
-    """What was asked of the autopilot of ``own``'s system, and what it answered; ``refusals``: the last, in
-    words."""
+    """Commands sent to the autopilot of ``own``'s system, and its answers.
+
+    ``refusals``: descriptions of the last refusals.
+    """
 
     def __init__(self, own: Source) -> None:
         self.own = self._own = own
         self.refusals: deque[str] = deque(maxlen=_REFUSALS)
         self.refused = 0
-        """How many refusals there were; one that is but repeated counts once."""
+        """Number of refusals; a repeated one counts once."""
         self._results: dict[_Call, int] = {}
         self._acknowledged: set[_Call] = set()
         self._answered: set[_Call] = set()
@@ -33,8 +35,11 @@ class Commands:
         self._asked: dict[int, _Call] = {}
 
     def receive(self, message: CommandAck) -> None:
-        """An answer, unless it is to somebody else; it names the command alone and is taken for the last one
-        of that kind. MAVLink 1 does not say whom it answers."""
+        """Receive an acknowledgement, unless it is addressed to another component.
+
+        It contains the command id alone and is assigned to the last command with this id. MAVLink 1 does not
+        contain the addressee.
+        """
         own = self._own
         if message.target_system not in (0, own.system) or message.target_component not in (0, own.component):
             return
@@ -50,20 +55,20 @@ class Commands:
         self._results[call] = message.result
 
     def sent_at(self, command: int, params: tuple[float, ...]) -> int:
-        """When (µs) it was last sent, 0 for never."""
+        """Return when (µs) the command was last sent, 0 for never."""
         return self._sent.get(_key(command, params), 0)
 
     def answered(self, command: int, params: tuple[float, ...]) -> bool:
-        """Whether the autopilot has taken or refused it."""
+        """Return whether the autopilot has accepted or refused the command."""
         return _key(command, params) in self._answered
 
     def taken(self, now: int, command: int, params: tuple[float, ...], within: int) -> bool:
-        """Whether the autopilot has taken it, and it was sent no more than ``within`` (µs) ago."""
+        """Return whether the command was accepted, and last sent at most ``within`` µs before ``now``."""
         key = _key(command, params)
         return key in self._acknowledged and now - self._sent.get(key, now) <= within
 
     def forget(self) -> None:
-        """Nothing was asked or answered."""
+        """Forget all commands and answers."""
         self._sent.clear()
         self._asked.clear()
         self._acknowledged.clear()
@@ -71,11 +76,15 @@ class Commands:
         self._results.clear()
 
     def call(self, now: int, command: int, params: tuple[float, ...]) -> list[Message]:
-        """The command, unless it was acknowledged, sent less than half a second ago, or must wait for its
-        turn: COMMAND_ACK names the command alone, so that one of a kind may be open at a time."""
+        """Return the command to send at ``now`` (µs), or an empty list.
+
+        It is not sent if it was acknowledged, was sent less than half a second ago, or must wait for its
+        turn: COMMAND_ACK contains the command id alone, so only one command with the same id may be open at a
+        time.
+        """
         key = _key(command, params)
         if key in self._acknowledged and now - self._sent.get(key, now) > _EXPIRY:
-            # Acknowledged and yet without effect: ask again.
+            # Acknowledged but without effect: send it again.
             self._acknowledged.discard(key)
         if key in self._acknowledged or self._recent(now, key) or self._recent(now, self._asked.get(command)):
             return []
@@ -88,5 +97,5 @@ class Commands:
 
 
 def _key(command: int, params: tuple[float, ...]) -> _Call:
-    # NaN is not itself.
+    # NaN does not equal itself.
     return command, tuple(p for p in params if p == p)

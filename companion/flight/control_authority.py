@@ -1,9 +1,9 @@
-"""Whose the vehicle is when its mode is no longer the one in which set-points steer.
+"""Control authority: the owner of the vehicle when its mode is no longer the guided mode.
 
-A mode that was changed is somebody's will, a pilot's by the switch or a ground station's, and is left alone.
-One thing alone is an accident: set-points were missing for so long that the autopilot's time-out ended the
-mode, and it holds its place. Then the mode may be asked for again. What happened while the autopilot was not
-heard nobody has seen: that may have been a pilot.
+A changed mode is intentional, set by a pilot's switch or by a ground station, and is left unchanged. There is
+one exception: set-points were missing for so long that the autopilot's time-out ended the mode, and the
+vehicle holds its position. Then the mode may be requested again. A change of mode while the autopilot was
+silent counts as intentional, since it may have been a pilot.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from companion.flight.vehicle import Vehicle
 _GAP = 500_000
 """µs between set-points: PX4's shortest useful time-out, COM_OF_LOSS_T."""
 _BLAME = 2_000_000
-"""µs after a gap in which a loss of the mode is its consequence."""
+"""µs after a gap during which a loss of the mode is attributed to it."""
 _PATIENCE = 6_000_000
-"""µs for which the mode is asked for again."""
+"""µs for which the mode is requested again."""
 
 
 class Owner(Enum):
-    """Who has the vehicle."""
+    """Owner of the vehicle."""
 
     OURS = "ours"
     LOST = "lost by accident"
@@ -30,7 +30,10 @@ class Owner(Enum):
 
 
 class ControlAuthority:
-    """To be told of every set-point that leaves, and asked in every step of an escort."""
+    """Determines the owner of the vehicle.
+
+    ``streamed`` must be called for every set-point sent, and ``owner`` in every step of an escort.
+    """
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
@@ -39,17 +42,17 @@ class ControlAuthority:
         self._lost_at: int | None = None
 
     def begin(self) -> None:
-        """It is ours from now on."""
+        """Start with the companion as owner."""
         self._streamed = self._gap_ended = self._lost_at = None
 
     def streamed(self, now: int) -> None:
-        """A set-point leaves at ``now`` (µs)."""
+        """Record that a set-point is sent at ``now`` (µs)."""
         if self._streamed is not None and now - self._streamed > _GAP:
             self._gap_ended = now
         self._streamed = now
 
     def owner(self, now: int) -> Owner:
-        """At ``now`` (µs)."""
+        """Return the owner at ``now`` (µs)."""
         vehicle = self._vehicle
         if not vehicle.alive:
             self._gap_ended, self._lost_at, self._streamed = None, None, now
@@ -74,18 +77,23 @@ class ControlAuthority:
 
 
 class Passage:
-    """The modes through which our own orders lead, up or down; any other is somebody's will. ``first``: the
-    mode, custom_mode of HEARTBEAT, in which the order found the vehicle, which it has until the order
-    tells."""
+    """Checks that the modes during take-off or landing result from the companion's own orders.
+
+    Any other mode was set by another controller. ``first``: custom_mode of HEARTBEAT at the time of the
+    order, which the vehicle keeps until the order takes effect.
+    """
 
     def __init__(self, first: int) -> None:
         self._first = first
         self.entered = False
-        """Whether the order has told."""
+        """Whether the order has taken effect."""
 
     def strays(self, mode: int, ways: frozenset[int], before: frozenset[int] = frozenset()) -> bool:
-        """Whether ``mode`` is none of the ``ways``, nor, until one of those is seen, the first or one of
-        ``before``."""
+        """Return whether ``mode`` does not result from the own order.
+
+        The modes in ``ways`` do; until one of these has been seen, the first mode and those in ``before`` do,
+        too.
+        """
         if mode in ways:
             self.entered = True
             return False

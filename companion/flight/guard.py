@@ -1,5 +1,7 @@
-"""What flies when planning does not: the held plan for a bounded time, then a brake to hover. Nothing is held
-for ever."""
+"""Fallback when planning fails: the old plan for a bounded time, then a brake to a hover.
+
+No plan is kept indefinitely.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,13 @@ from companion.config.planning import LimitsConfig
 from companion.values.horizon import Horizon, Motion, roll_out
 
 _STEP = 0.2
-"""m: no set-point is moved by more at once."""
+"""m: largest displacement of a set-point in one step."""
 _BESIDE = 0.3
-"""m: autopilots are so far beside their set-points all the time."""
+"""m: usual deviation of autopilots from their set-points."""
 
 
 class Holding(Enum):
-    """What the vehicle is flying, and why."""
+    """What the vehicle flies at present."""
 
     FRESH = "fresh plan"
     HELD = "held plan"
@@ -27,8 +29,11 @@ class Holding(Enum):
 
 
 class Guard:
-    """Owns the horizon that is flown. ``held`` counts replans that kept the old one, ``failures`` those by
-    the solver."""
+    """Owner of the horizon that is flown.
+
+    ``held``: number of replans that kept the old horizon; ``failures``: those of them that were caused by the
+    solver.
+    """
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
@@ -41,32 +46,35 @@ class Guard:
         self._lost = False
         self._anchored_at = 0
         self.failing: int | None = None
-        """Since when (µs) the solver finds no plan; None while it does."""
+        """Time (µs) since which the solver finds no plan; None while it does."""
 
     def keep(self, limits: LimitsConfig) -> None:
-        """Brake within other ``limits`` from now on."""
+        """Use these ``limits`` for braking from now on."""
         self._config = self._config.model_copy(update={"limits": limits})
 
     def start(self, now: int, motion: Motion) -> None:
-        """Fly from this state on: a hover there until the first plan."""
+        """Start at this state at ``now`` (µs): brake to a hover there until the first plan."""
         self.failing = None
         self.horizon = brake(now, motion, self._config)
         self._fresh_at = now
         self.state = Holding.FRESH
 
     def rest(self) -> None:
-        """Nothing is flown, for nothing is steered: what failed then is over."""
+        """Clear the flown horizon and the solver's failure, because set-points do not steer the vehicle."""
         self.failing = self.horizon = None
 
     def accept(self, now: int, horizon: Horizon) -> None:
-        """A good plan."""
+        """Accept a new plan at ``now`` (µs)."""
         self.failing = None
         self.horizon = horizon
         self._fresh_at = now
         self.state = Holding.FRESH
 
     def hold(self, now: int, *, solver: bool) -> None:
-        """No good plan: keep the old one while it is young enough, then brake from where it has got to."""
+        """Keep the old plan while it is young enough, then brake from its state at ``now`` (µs).
+
+        ``solver``: whether the solver is the reason that there is no new plan.
+        """
         self.held += 1
         self.failures += solver
         if solver and self.failing is None:
@@ -79,11 +87,13 @@ class Guard:
             self.state = Holding.BRAKING
 
     def anchor(self, now: int, position: Motion) -> Motion:
-        """The state to plan from: the flown horizon's, unless the vehicle has left the tube around it.
+        """Return the state to plan from.
 
-        Planning from the plan keeps the set-point continuous and lets the autopilot reject wind; out of the
-        tube the plan starts anew at the measured state. With ``guard.blend`` it is brought nearer to the
-        vehicle all the time, so slowly that no set-point jumps; out of the tube faster, but no step is longer
+        It is the flown horizon's, unless the vehicle is outside the tube around it.
+
+        Planning from the plan keeps the set-point continuous and lets the autopilot reject wind; outside the
+        tube the plan restarts at the measured state. With ``guard.blend`` the state is moved continuously
+        towards the vehicle, so slowly that no set-point jumps; outside the tube faster, but no step is longer
         than 0.2 m.
         """
         last, self._anchored_at = self._anchored_at, now
@@ -110,9 +120,11 @@ class Guard:
 
 
 def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
-    """Straight to rest within the horizon, at u_max or as hard as that takes; then hover. (N + 1 segments.)
+    """Return a horizon that brakes in a straight line to rest within the horizon's length, then hovers.
 
-    Where even a_total does not stop the vehicle in time the steps get longer: a brake has as many as a plan.
+    It has N + 1 segments. The deceleration is the smallest of u_max, or more where that does not suffice.
+    Where even a_total does not stop the vehicle in time the steps get longer, because a brake has as many
+    steps as a plan.
     """
     n, limits = config.horizon.steps + 1, config.limits
     speed = float(np.sqrt(motion.velocity @ motion.velocity))

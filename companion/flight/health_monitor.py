@@ -1,7 +1,7 @@
-"""What is wrong, for how long, and what follows: one table for all that a flight may have to react to.
+"""Health monitor: detects what is wrong and for how long, and defines the reaction.
 
-Each concern has a limit, an age or a share, in ``GuardConfig``; a reaction, which is never undone by the
-concern's end but by an order; and a sentence for the ground, said when it begins and when it ends.
+Each concern has a limit, an age or a share, in ``GuardConfig``; a reaction, which is undone only by an order
+and never by the end of the concern; and a text for the ground, sent when it begins and when it ends.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from companion.world import View
 
 
 class Reaction(Enum):
-    """What the companion does; the later in this list the graver."""
+    """Reactions of the companion, in order of increasing severity."""
 
     TELL = "tell"
     RETURN = "come back and land"
@@ -28,7 +28,7 @@ class Reaction(Enum):
 
 
 class Concern(NamedTuple):
-    """One thing that is wrong now."""
+    """A present fault."""
 
     name: str
     text: str
@@ -37,13 +37,16 @@ class Concern(NamedTuple):
 
 
 class Situation(NamedTuple):
-    """What concerns are judged by. ``late``: µs by which this step comes after the last one's due time;
-    ``neighbours``: age (µs) by system id; ``holding``: what is flown; ``failing``: since when (µs) no plan
-    could be solved, None while they can; ``clock_steps``: how often the autopilot's clock has been set;
-    ``moves``: how often its origin has moved, the last time with the vehicle by ``displaced`` m;
-    ``clock_lost``: µs that its clock has lost in all; ``unanswered``: its messages come late, and it does
-    not tell whether that is its clock; ``error``: how far (m) the vehicle is from its set-points;
-    ``nearest``: the neighbour that is nearest to it, and how near (m)."""
+    """Inputs from which concerns are determined.
+
+    ``late``: µs from the last step's due time to this step; ``neighbours``: age (µs) by system id;
+    ``holding``: what is flown; ``failing``: since when (µs) no plan could be solved, None while plans are
+    found; ``clock_steps``: how often the autopilot's clock has been set; ``moves``: how often the autopilot's
+    origin has moved, the last time shifting the vehicle by ``displaced`` m; ``clock_lost``: µs that its clock
+    has lost in total; ``unanswered``: the autopilot's messages are late, and it does not answer whether its
+    clock is the reason; ``error``: distance (m) of the vehicle from its set-points; ``nearest``: system id
+    and distance (m) of the nearest neighbour.
+    """
 
     now: int
     view: View
@@ -70,20 +73,20 @@ class Change(NamedTuple):
 
 
 class _Lately:
-    """What happens at one moment stays a concern for a while."""
+    """Extends a momentary event into a concern of ``_REMEMBERED`` µs."""
 
     def __init__(self) -> None:
         self._until = 0
 
     def after(self, now: int, happens: bool) -> bool:
-        """Whether it does, or did lately."""
+        """Return whether the event happens now or happened recently."""
         if happens:
             self._until = now + _REMEMBERED
         return now < self._until
 
 
 class HealthMonitor:
-    """Judges each situation. ``concerns`` are those of now, by name."""
+    """Determines the concerns in each situation; ``concerns`` are the present ones, by name."""
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
@@ -95,7 +98,7 @@ class HealthMonitor:
         self._target_seen = False
 
     def look(self, s: Situation) -> list[Change]:
-        """What has changed since the last look."""
+        """Return the concerns that began or ended since the last call."""
         found = {concern.name: concern for concern in self._judge(s)}
         changes = [Change(concern, True) for name, concern in found.items() if name not in self.concerns]
         changes += [Change(concern, False) for name, concern in self.concerns.items() if name not in found]
@@ -104,11 +107,14 @@ class HealthMonitor:
 
     @property
     def blinkered(self) -> bool:
-        """Whether what it knows of the others, or of itself, may be old, or what it does late."""
+        """Whether a concern about neighbours, position, tracking or missed deadlines calls for caution.
+
+        Information on the others or on the own position may then be old, or the vehicle reacts late.
+        """
         vague = not _VAGUE.isdisjoint(self.concerns)
         return vague or any(name.startswith((_NEIGHBOUR, _CLOSE)) for name in self.concerns)
 
-    # Each: a concern, or nothing
+    # Each of the following returns a concern, or None.
 
     def _judge(self, s: Situation) -> list[Concern]:
         found = [
@@ -223,7 +229,7 @@ class HealthMonitor:
         return Concern("clock", "The autopilot's clock has jumped") if jumped else None
 
     def _slow_clock(self, s: Situation) -> Concern | None:
-        """Over some seconds; what is lost once is but a stall."""
+        """Return a concern if the clock loses time over some seconds; a single loss is only a stall."""
         lost = self._lost
         lost.append((s.now, s.clock_lost))
         while s.now - lost[0][0] > _LOSING:
@@ -259,6 +265,6 @@ _NEIGHBOUR, _CLOSE = "neighbour ", "near "
 _VAGUE = frozenset(("lateness", "positioning", "tracking"))
 _ON_THE_GROUND = (Phase.CONNECT, Phase.DONE)
 _REMEMBERED = 5_000_000
-"""µs."""
+"""µs for which a momentary event remains a concern."""
 _SLOW, _LOSING = 0.01, 10_000_000
-"""Share of the time that a clock loses, over so many µs."""
+"""Share of the time that a clock loses above which it is slow, and the period (µs) of the measurement."""

@@ -1,9 +1,10 @@
-"""The last word to the autopilot when its companion ends: stay where you are.
+"""Hold on exit: the request to the autopilot to hold its position when its companion ends.
 
-An autopilot that was just told positions and velocities flies on along them for its time-out. So whoever
-sees a companion end asks for the mode in which the autopilot holds its place by itself; but only where our
-set-points steered last: whoever else has the vehicle keeps it. What came of it the autopilot's heartbeat
-says: an acknowledgement may be somebody else's, or that of a mode that did not last.
+An autopilot that has received positions and velocities continues along them until its time-out. So the
+process that detects the end of a companion requests the mode in which the autopilot holds its position by
+itself; but only if the companion's set-points steered last: another controller keeps the vehicle. The result
+follows from the autopilot's heartbeat: an acknowledgement may be for another sender, or for a mode that did
+not last.
 """
 
 from __future__ import annotations
@@ -21,16 +22,18 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 
 _AGAIN, _GRANTED = 100_000, 1_500_000
-"""µs between two askings, and after one that was accepted: until then the heartbeat has told of it."""
+"""µs between two requests, and after an accepted one: by then the heartbeat has reported it."""
 _PATIENCE = 3_000_000
-"""µs until it is given up."""
+"""µs until the attempt is given up."""
 _HEARTBEAT, _ACK = 0, 77
 
 
 class LastWord:
-    """A ``Node`` with one link, ``autopilot``; times are of the wall. ``heartbeat``: the last that the
-    companion heard, None for none; ``steered``: whether it had the vehicle. ``over``: nothing more is to be
-    done; ``said``: what came of it; ``failed``: the vehicle may fly on along the last set-points.
+    """A ``Node`` with one link, ``autopilot``; times are wall-clock µs.
+
+    ``heartbeat``: the last that the companion received, None for none; ``steered``: whether the companion
+    controlled the vehicle. ``over``: nothing more is to be done; ``said``: the result; ``failed``: the
+    vehicle may continue along the last set-points.
     """
 
     def __init__(
@@ -65,11 +68,11 @@ class LastWord:
 
     @property
     def over(self) -> bool:
-        """Whether it holds, is somebody else's, or does not answer."""
+        """Whether the attempt is over: the vehicle holds, is controlled by another, or does not answer."""
         return bool(self.said)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Ask for the mode until the autopilot is in it, at most for three seconds."""
+        """Request the mode until the autopilot is in it, for at most three seconds."""
         if self._signing is not None:
             self._signing.present(now)
         if self._until is None:
@@ -91,8 +94,10 @@ class LastWord:
         return [Datagram("autopilot", self._codec.encode(order))]
 
     def _verdict(self, *, late: bool) -> str:
-        """What came of it; empty while that is not known: what the companion heard last may be a moment
-        old."""
+        """Return the result, or an empty string while it is not known.
+
+        The companion's last heartbeat may be outdated, so a newer one is awaited.
+        """
         vehicle, name = self._vehicle, self._profile.hold_name
         if not self._fresh and not late:
             return ""
@@ -111,5 +116,5 @@ class LastWord:
 
     @property
     def _steered(self) -> bool:
-        """Whether our set-points steer it."""
+        """Whether the vehicle is armed and in guided mode."""
         return self._vehicle.armed and self._vehicle.in_guided_mode

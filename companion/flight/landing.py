@@ -1,4 +1,4 @@
-"""Where a vehicle has landed, and where it should have, if it was to come back."""
+"""Landing position of a vehicle, compared with its starting position if it was to return."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from companion.values.horizon import Array
 
 
 class Landing(NamedTuple):
-    """``returning``: it was on its way back. ``off``: how far (m) from where that led it may stand, in the
-    plane, as measured on the ground; None where it was not measured."""
+    """A completed landing.
+
+    ``returning``: the vehicle was returning to its start. ``off``: upper bound (m) of its horizontal distance
+    from the return position, as measured on the ground; None if it was not measured.
+    """
 
     returning: bool
     off: float | None
@@ -23,11 +26,13 @@ class Landing(NamedTuple):
 def landed(
     config: CompanionConfig, start: Array | None, own: State | None, doubt: float, *, returning: bool
 ) -> Landing:
-    """Of a vehicle that began at ``start`` (3,), fleet-local ENU, and has landed where ``own`` says, to
-    within ``doubt`` (m)."""
+    """Return the landing of a vehicle that started at ``start`` (3,), fleet-local ENU.
+
+    ``own``: its state on the ground, uncertain by ``doubt`` (m).
+    """
     if start is None or own is None or own.age > config.guard.own_stale_us:
         return Landing(returning, None)
     limits = config.limits.within(config.field.margin(1))
-    # It comes back as near as the box lets it.
+    # The vehicle returns as near to its start as the box of its limits permits.
     x, y, _ = np.clip(start, limits.box_min, limits.box_max) - own.position
     return Landing(returning, hypot(x, y) + doubt)

@@ -1,8 +1,8 @@
-"""Configured limits, lowered to what the autopilot can follow by its parameters.
+"""Configured limits, lowered to what the autopilot can follow with its parameters.
 
-What is beyond a firmware's limits is followed late: the vehicle is then not where its plan says, and plans
-keep apart in vain. Jerk bounds count where the firmware enforces them on set-points (``Limits.shaped``). A
-bound on a norm is divided between the two horizontal axes.
+A set-point beyond the firmware's limits is followed late: the vehicle is then not where its plan says, and
+the separation of the plans is of no use. Jerk bounds apply where the firmware enforces them on set-points
+(``Limits.shaped``). A bound on a norm is divided between the two horizontal axes.
 """
 
 from __future__ import annotations
@@ -16,24 +16,31 @@ from companion.flight.autopilots import Loop, Profile, Shaping
 from companion.flight.autopilots.limits import STOCK, Limits, deciding, limits_of
 
 _AXIS = 0.7
-"""Share of a norm that an axis may have where both have as much."""
+"""Share of a norm that each axis may use when both use the same."""
 _TILT = 0.9
-"""Share of the acceleration at the largest tilt that plan and compensation may have; gusts have the rest."""
+"""Share of the acceleration at the largest tilt for plan and compensation; the rest is for gusts."""
 _ALIKE = 1e-3
-"""Share by which a limit may be lower and counts as the same: float32 is a little off."""
+"""Relative difference below which a lower limit counts as equal: float32 is slightly inexact."""
 
 _JERK, _ACCELERATION, _TILT_DEG = 1.0, 1.0, 10.0
-"""The least with which an escort is flown: m/s³, m/s² and degrees. With 1 m/s³ a vehicle needs 1.9 m to stop
-from a walker's 1.5 m/s, and 6.6 m from 3.5 m/s."""
+"""The least values with which an escort is flown: m/s³, m/s² and degrees.
+
+With 1 m/s³ a vehicle needs 1.9 m to stop from a walker's 1.5 m/s, and 6.6 m from 3.5 m/s.
+"""
 _SPEED, _VERTICAL, _POSITION_GAIN, _VELOCITY_GAIN = 1.0, 0.3, 0.3, 0.5
-"""The same: m/s, m/s up and down, 1/s and 1/s. With gains that are lower an error of position lasts for more
-than three seconds, and one of velocity for two."""
+"""The least values with which an escort is flown: m/s, m/s up and down, 1/s and 1/s.
+
+With lower gains a position error lasts for more than three seconds, and a velocity error for more than two.
+"""
 
 
 class Lowered(NamedTuple):
-    """``limits``: what plans keep. ``acceleration`` (m/s²): what plan and compensation may come to together,
-    horizontally. ``loop``: the autopilot's gains, None for the stock firmware's. ``changes``: what was
-    lowered, in words; ``lacking``: what no escort can do without, in words, empty if all is there."""
+    """Result of lowering.
+
+    ``limits``: limits for plans. ``acceleration`` (m/s²): bound on the sum of plan and compensation,
+    horizontal. ``loop``: the autopilot's gains, None for the stock firmware's. ``changes``: descriptions of
+    what was lowered; ``lacking``: description of what is too low for any escort, empty if nothing is.
+    """
 
     limits: LimitsConfig
     acceleration: float = inf
@@ -43,8 +50,10 @@ class Lowered(NamedTuple):
 
 
 def lowered(limits: LimitsConfig, profile: Profile, parameters: Mapping[str, float]) -> Lowered:
-    """``limits`` as far as an autopilot with these ``parameters`` can follow; as they are where something is
-    lacking."""
+    """Return ``limits``, lowered to what an autopilot with these ``parameters`` can follow.
+
+    They are returned unchanged if the autopilot cannot fly an escort at all.
+    """
     able = limits_of(profile.autopilot, parameters)
     lacking = "; ".join(_lacking(able, profile.autopilot, parameters))
     if lacking:
@@ -70,7 +79,7 @@ def lowered(limits: LimitsConfig, profile: Profile, parameters: Mapping[str, flo
         for what, limit in _changes(limits, found, able)
         for name, value in (deciding(profile.autopilot, parameters, limit),)
     )
-    # What is lower by rounding alone stays as it is configured.
+    # If the limits are lower only by rounding they stay as configured.
     return Lowered(found if told else limits, room, _loop(profile, able), told)
 
 
@@ -82,7 +91,7 @@ def _jerk(limits: LimitsConfig, able: Limits) -> tuple[float, float, float] | No
 
 
 def _loop(profile: Profile, able: Limits) -> Loop:
-    """How it follows with these parameters. ArduPilot's trajectory corrects at rates that its limits make."""
+    """Return the loop gains with these parameters; ArduPilot's trajectory gains follow from its limits."""
     loop = profile.loop._replace(position=able.position_gain, velocity=able.velocity_gain)
     if not able.shaped:
         return loop
@@ -92,7 +101,7 @@ def _loop(profile: Profile, able: Limits) -> Loop:
 
 
 def _changes(before: LimitsConfig, after: LimitsConfig, able: Limits) -> Iterator[tuple[str, str]]:
-    """What is lower ``after``, and the field of ``able`` that makes it so."""
+    """Yield what is lower in ``after``, and the field of ``able`` that is the reason."""
     push = "acceleration" if able.acceleration < after.a_total else "tilt"
     climb = "climb" if able.climb < able.sink else "sink"
     jerks = before.j_max or (inf, inf, inf), after.j_max or (inf, inf, inf)

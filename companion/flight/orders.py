@@ -1,5 +1,8 @@
-"""What an operator may tell a companion: NAV_TAKEOFF is the go, DO_REPOSITION the goal, NAV_LOITER_UNLIM to
-stay, NAV_RETURN_TO_LAUNCH to come back, NAV_LAND the end."""
+"""Commands of an operator to a companion.
+
+NAV_TAKEOFF is the go, DO_REPOSITION sets the goal, NAV_LOITER_UNLIM holds the position, NAV_RETURN_TO_LAUNCH
+returns and lands, NAV_LAND lands.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,16 @@ from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message
 NAV_LOITER_UNLIM, NAV_RETURN, DO_REPOSITION = 17, 20, 192
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 _GLOBAL = (0, 5)
-"""MAV_FRAME_GLOBAL and its INT twin."""
+"""MAV_FRAME_GLOBAL and MAV_FRAME_GLOBAL_INT."""
 _HIGHEST = 1e5
-"""m; a NaN is not below it either."""
+"""m; the comparison also rejects NaN."""
 
 
 class Orders:
-    """To the companion ``own``; each is answered by a COMMAND_ACK, what is for somebody else is not."""
+    """Executes commands to the companion ``own`` and answers each with a COMMAND_ACK.
+
+    Commands to other addressees are not answered.
+    """
 
     def __init__(
         self, config: CompanionConfig, own: Source, fleet: FleetFrame, pilot: Pilot, goals: Goals
@@ -30,7 +36,7 @@ class Orders:
         self._goals = goals
 
     def obey(self, message: Message) -> list[Message]:
-        """The answers to ``message``."""
+        """Execute ``message`` if it is a command; return the answers."""
         if not isinstance(message, CommandInt | CommandLong):
             return []
         if (message.target_system, message.target_component) != self._own:
@@ -40,7 +46,7 @@ class Orders:
         return [CommandAck(self._own, message.command, result, 0, 0, *message.source)]
 
     def _taken(self, order: CommandInt | CommandLong) -> bool | None:
-        """Whether it is obeyed; None for one that is not known."""
+        """Return whether the command is accepted; None for an unknown one."""
         pilot = self._pilot
         if isinstance(order, CommandInt):
             return self._reposition(order) if order.command == DO_REPOSITION else None
@@ -51,7 +57,11 @@ class Orders:
         return None if obey is None else obey()
 
     def _reposition(self, order: CommandInt) -> bool:
-        """To a place on the globe, its altitude above mean sea level; others are refused."""
+        """Set the goal to a global position, altitude above mean sea level; return whether it is accepted.
+
+        Another frame, an invalid position, a position outside the box, and a task other than "goto" are
+        refused.
+        """
         latitude, longitude = order.x * 1e-7, order.y * 1e-7
         if order.frame not in _GLOBAL or abs(latitude) > 90.0 or abs(longitude) > 180.0:
             return False

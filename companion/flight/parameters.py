@@ -1,5 +1,7 @@
-"""The own autopilot's parameters that say what it can follow, asked for one by one until each is heard
-(PARAM_REQUEST_READ, PARAM_VALUE)."""
+"""Parameters of the own autopilot that determine its limits (PARAM_REQUEST_READ, PARAM_VALUE).
+
+Each is requested by its name until it is received.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +14,15 @@ from mavlink_bridge.messages import Message, ParamRequestRead, ParamValue, Sourc
 from mavlink_bridge.wire.param_value import number_of
 
 PATIENCE = 5_000_000
-"""µs from the first request after which what is not answered counts as stock."""
+"""µs from the first request after which unanswered parameters count as stock."""
 _RETRY = 500_000
-"""µs between two requests for what has not been answered."""
+"""µs between two requests for unanswered parameters."""
 _AGAIN = 10_000_000
-"""µs between two requests for all of it, once that is settled: somebody may change a parameter before the
-go."""
+"""µs between two requests for all parameters once settled: a parameter may be changed before the go."""
 
 
 class Parameters:
-    """Of the autopilot of ``own``'s system. ``values``: finite ones, by name."""
+    """Parameters of the autopilot of ``own``'s system; ``values``: the finite ones, by name."""
 
     def __init__(self, own: Source) -> None:
         self._own = own
@@ -31,28 +32,28 @@ class Parameters:
         self._asked = 0
 
     def forget(self) -> None:
-        """Nothing was asked or heard."""
+        """Forget all requests and received parameters."""
         self._values.clear()
         self._since = None
 
     def receive(self, message: ParamValue, profile: Profile) -> None:
-        """A value, whoever asked for it or set it."""
+        """Receive a value, whether the companion requested it or not."""
         if message.name in stock_parameters(profile.autopilot):
             value = number_of(message, bytewise=profile.bytewise)
             if value is not None:
                 self._values[message.name] = value
 
     def unread(self, profile: Profile) -> tuple[str, ...]:
-        """The names that are still to be heard."""
+        """Return the names of the parameters that have not been received."""
         return tuple(name for name in stock_parameters(profile.autopilot) if name not in self._values)
 
     def settled(self, now: int, profile: Profile) -> bool:
-        """Whether all is heard at ``now`` (µs), or the time for it over."""
+        """Return whether all parameters are received at ``now`` (µs), or the time for it is over."""
         late = self._since is not None and now - self._since >= PATIENCE
         return late or not self.unread(profile)
 
     def requests(self, now: int, profile: Profile) -> list[Message]:
-        """For what is missing; once settled, now and then for all."""
+        """Return requests for missing parameters; once settled, for all of them from time to time."""
         settled = self.settled(now, profile)
         if self._since is None:
             self._since = now

@@ -1,9 +1,9 @@
-"""Whether the own autopilot still knows where it is, by its GPS and its estimator, and how far it may be off.
+"""Position quality of the own autopilot, from its GPS and its estimator, and a bound on the error.
 
-Without GPS an estimator coasts on its accelerometers and says where it believes to be as ever; that it has no
-position it says after 5 s (PX4) or 7 s (ArduPilot), and then its failsafe acts. GPS_RAW_INT (24) tells of the
-loss at once. So do the flags of EKF_STATUS_REPORT (193) and ESTIMATOR_STATUS (230), and a ratio of innovation
-to gate of 1 and more: then GPS is refused, and it coasts as well.
+Without GPS an estimator dead-reckons on its accelerometers and reports its estimated position as before; it
+reports the loss of position after 5 s (PX4) or 7 s (ArduPilot), and then its failsafe acts. GPS_RAW_INT (24)
+shows the loss at once. So do the flags of EKF_STATUS_REPORT (193) and ESTIMATOR_STATUS (230), and a ratio of
+innovation to gate of 1 or more: then GPS is refused, and the estimator dead-reckons as well.
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ _ABSOLUTE = 0x10
 """ESTIMATOR_POS_HORIZ_ABS, the same in both messages."""
 _REFUSES = 1.0
 _COASTING = 0.1
-"""m/s²: two standard deviations of an acceleration that is wrong while nothing corrects it."""
+"""m/s²: two standard deviations of the acceleration error of dead reckoning."""
 _FURTHEST = 10.0
-"""m; beyond, nobody keeps away from it for its own sake any more."""
+"""m; upper bound of the radius: distances are not widened further."""
 _FADES = 2_000_000
-"""µs after which an estimate that has GPS again has come back to it."""
+"""µs from the return of GPS until the estimate has converged to it."""
 
 
 class Positioning:
-    """Of one autopilot; messages are dated by ``tick``. A vehicle that never had GPS, as with cameras, misses
-    none."""
+    """Position quality of one autopilot; messages are dated by ``tick``.
+
+    For a vehicle that never had GPS, such as one with cameras, a missing GPS is no trouble.
+    """
 
     def __init__(self) -> None:
         self._fix: bool | None = None
@@ -38,20 +40,20 @@ class Positioning:
         self._now = 0
 
     def receive(self, message: Message) -> None:
-        """One of its messages."""
+        """Receive a message of the autopilot."""
         if isinstance(message, GpsRaw):
             fix = message.fix_type >= _FIX_3D
             self._fix = fix if fix or self._fix is not None else None
         elif isinstance(message, EkfStatus | EstimatorStatus):
             absolute = bool(message.flags & _ABSOLUTE)
             self._absolute = absolute if absolute or self._absolute is not None else None
-            # NaN: not tested.
+            # NaN means not tested.
             self._refused = absolute and message.horizontal >= _REFUSES
             if isinstance(message, EstimatorStatus):
                 self._accuracy = message.horizontal_accuracy
 
     def tick(self, now: int) -> None:
-        """It is ``now`` (µs)."""
+        """Set the time to ``now`` (µs) and update the radius."""
         self._now = now
         if self.trouble:
             self._since = now if self._since is None else self._since
@@ -66,7 +68,7 @@ class Positioning:
 
     @property
     def trouble(self) -> str:
-        """Why it does not know where it is, empty if it does."""
+        """Reason why the vehicle's position is not reliable, empty if it is."""
         if self._fix is False:
             return "GPS is lost"
         if self._absolute is False:
@@ -75,11 +77,11 @@ class Positioning:
 
     @property
     def radius(self) -> float:
-        """How far (m) it may be from where it says that it is, beyond what is usual."""
+        """How far (m) the vehicle may be from its reported position, beyond the usual error."""
         return min(self._worst, _FURTHEST)
 
     def _estimated(self) -> float:
-        """By time, or by what the estimator says of itself, if that is more."""
+        """Return the error (m) by elapsed time, or by the estimator's own report if that is larger."""
         since = self._now if self._since is None else self._since
         coasted = 0.5 * _COASTING * (1e-6 * (self._now - since)) ** 2
         if self._accuracy is None or self._good is None or not self._accuracy >= self._good:

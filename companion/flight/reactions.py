@@ -1,4 +1,4 @@
-"""What follows when something is wrong, at once or as soon as it can."""
+"""Reactions to concerns, executed at once or as soon as possible."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from companion.values.phase import STEERED
 
 
 class Reactions:
-    """Owed to the concerns that began and are not over; a reaction itself outlives its concern."""
+    """Pending reactions to present concerns; a reaction in progress outlives its concern."""
 
     def __init__(self) -> None:
         self._owed: dict[str, Reaction] = {}
 
     def note(self, change: Change) -> None:
-        """A concern that began or ended."""
+        """Record a concern that began or ended."""
         concern = change.concern
         if not change.begins:
             self._owed.pop(concern.name, None)
@@ -22,8 +22,11 @@ class Reactions:
             self._owed[concern.name] = concern.reaction
 
     def follow(self, pilot: Pilot) -> None:
-        """Tell the ``pilot`` the gravest. What began on the way up, or while somebody else had the vehicle,
-        waits until it is steered."""
+        """Order the most severe pending reaction.
+
+        If the concern began during the take-off, or while another controller had the vehicle, its reaction
+        waits until the companion steers.
+        """
         if not self._owed or pilot.phase not in STEERED:
             return
         if Reaction.LAND in self._owed.values():

@@ -1,4 +1,4 @@
-"""What a companion waits for before it starts, and what it asks the autopilot for so that it comes."""
+"""Conditions for a start, and the requests to the autopilot for the messages that they need."""
 
 from __future__ import annotations
 
@@ -17,17 +17,22 @@ from mavlink_bridge.messages import CommandAck, Message
 
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
 OPERATORS_GO = "the operator's go"
-"""What it waits for when all else is ready."""
+"""Value of ``missing`` when everything else is ready."""
 _BESIDE = 30.0
-"""m from the box, on each axis, from where a vehicle may start."""
+"""m; largest distance outside the box, on each axis, at which a vehicle may start."""
 _FAR = 20_000.0
-"""m between the fleet origin and the autopilot's own: beyond, one of the two is wrong."""
+"""m between the fleet origin and the autopilot's own: beyond this, one of the two is wrong."""
 STREAMS: Mapping[int, int] = MappingProxyType({32: 20_000, 30: 100_000, 1: 1_000_000, 245: 500_000})
-"""Message ids and intervals (µs) asked of the autopilot: LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS,
-EXTENDED_SYS_STATE. The attitude tells only where the nose points when the set-points begin."""
+"""Requested message ids and intervals (µs).
+
+LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS and EXTENDED_SYS_STATE. The attitude is used only for the direction
+of the nose when the set-points begin.
+"""
 GPS_RAW, HEALTH = 24, 500_000
-"""GPS_RAW_INT, and the interval (µs) of that and of the message in which the estimator tells how it is. No
-start waits for them: a vehicle may have neither."""
+"""GPS_RAW_INT, and the interval (µs) of it and of the message with the estimator's status.
+
+A start does not require them: a vehicle may have neither.
+"""
 
 
 def _interval(message: int, interval: int) -> tuple[int, Params]:
@@ -38,7 +43,7 @@ _NEEDED = tuple(_interval(message, interval) for message, interval in STREAMS.it
 
 
 class Readiness:
-    """Of one ``vehicle``, whose autopilot is asked by ``calls``."""
+    """Readiness of one ``vehicle``; ``calls`` sends the commands to its autopilot."""
 
     def __init__(self, config: CompanionConfig, vehicle: Vehicle, calls: Commands) -> None:
         self._config = config
@@ -48,22 +53,24 @@ class Readiness:
         self.limits = AutopilotLimits(config, vehicle, calls.own)
 
     def receive(self, ack: CommandAck) -> None:
-        """An answer of the autopilot."""
+        """Receive an acknowledgement of the autopilot."""
         self._wishes.receive(ack)
 
     def forget(self) -> None:
-        """Nothing was asked or answered."""
+        """Forget all requests and answers."""
         self._wishes.forget()
         self.limits.forget()
 
     @property
     def heard(self) -> bool:
-        """Whether all that is needed was answered."""
+        """Whether the autopilot has answered the requests for all required messages."""
         return all(self._commands.answered(*call) for call in _NEEDED)
 
     def wishes(self, now: int) -> list[Message]:
-        """For messages that tell how well the vehicle knows where it is; later than for those that are
-        needed, as an answer names the command alone."""
+        """Return requests for the messages about the quality of the vehicle's position.
+
+        They follow the required ones, because an acknowledgement contains the command id alone.
+        """
         profile = self._vehicle.profile
         if profile is None or not self._vehicle.alive:
             return []
@@ -72,7 +79,7 @@ class Readiness:
         return self._wishes.call(now, *open_[0]) if open_ else []
 
     def unseen(self, view: View) -> str:
-        """What has not been heard that every plan needs."""
+        """Return the missing input that every plan needs, or an empty string."""
         vehicle = self._vehicle
         if vehicle.heartbeat is None or not vehicle.alive:
             return "a heartbeat of the autopilot"
@@ -89,14 +96,17 @@ class Readiness:
         return "" if view.yaw is not None else "ATTITUDE"
 
     def missing(self, view: View, *, go: bool) -> str:
-        """What is not yet as it has to be before the start; ``go``: whether one was given."""
+        """Return the condition that is missing for a start, or an empty string.
+
+        ``go``: whether the operator's go was given.
+        """
         vehicle = self._vehicle
         if unseen := self.unseen(view):
             return unseen
         if astray := self._astray(view):
             return astray
         if vehicle.armed and vehicle.landed_state == UNDEFINED:
-            # A vehicle that may be flying must not be told to take off.
+            # A vehicle that may be flying must not receive a take-off command.
             return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
         if not vehicle.healthy:
             return f"the autopilot's pre-arm checks{self._starving()}"
@@ -107,15 +117,18 @@ class Readiness:
         return "" if go else OPERATORS_GO
 
     def _starving(self) -> str:
-        """Why they fail, where its mode is the reason."""
+        """Return the reason why the checks fail if it is the mode, otherwise an empty string."""
         profile = self._vehicle.profile
         if profile is None or not self._vehicle.starved:
             return ""
         return f", which fail in {profile.guided_name} without set-points: {profile.hold_name} first"
 
     def _astray(self, view: View) -> str:
-        """Whether it stands where nobody can mean it to start: then the fleet origin is wrong, or the
-        vehicle's."""
+        """Return the reason against a start here, or an empty string.
+
+        A position far from the box cannot be intended: then the fleet origin is wrong, or the vehicle's. A
+        low battery is a reason, too.
+        """
         limits, guard = self._config.limits, self._config.guard
         if view.own is None:
             return ""
@@ -130,17 +143,21 @@ class Readiness:
         return "" if left is None or left >= low else f"a battery above {100 * low:.0f} %"
 
     def requests(self, now: int) -> list[Message]:
-        """For the messages and parameters that are needed, which change nothing of what the vehicle does; and
-        for the mode in which a disarmed vehicle passes its checks."""
+        """Return requests for the required messages and parameters.
+
+        These do not affect the vehicle's behaviour.
+
+        In addition, request the mode in which a disarmed vehicle passes its checks.
+        """
         calls: list[Message] = []
         profile, vehicle = self._vehicle.profile, self._vehicle
         if profile is not None and vehicle.alive and vehicle.starved and not vehicle.healthy:
-            # With set-points that somebody else sends the checks pass, and the mode is theirs.
+            # If another controller sends set-points the checks pass, and the mode is that controller's.
             calls += self._commands.call(now, DO_SET_MODE, profile.hold_call)
         if self._vehicle.heartbeat is not None:
             for command, params in sorted(_NEEDED, key=lambda call: self._commands.sent_at(*call)):
                 calls += self._commands.call(now, command, params)
-            # Again from time to time: an autopilot that began anew elsewhere has another origin.
+            # Repeated from time to time: an autopilot that restarted elsewhere has another origin.
             calls += self._commands.call(
                 now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             )

@@ -1,9 +1,8 @@
-"""What is sent: a consistent position, velocity, acceleration and yaw at a bounded look-ahead of the flown
-horizon.
+"""Set-points: consistent position, velocity, acceleration and yaw at a bounded look-ahead of the horizon.
 
-The paper sends x(N + 1), 1.6 s ahead; a position-first controller that chases a point 8 m ahead overshoots
-its limits. A look-ahead of the link's delay makes the set-point right when it arrives; 1 600 000 µs is the
-paper's choice.
+The paper sends x(N + 1), 1.6 s ahead; a position-first controller that follows a point 8 m ahead overshoots
+its limits. A look-ahead equal to the link's delay makes the set-point correct when it arrives; 1 600 000 µs
+is the paper's choice.
 """
 
 from __future__ import annotations
@@ -38,10 +37,12 @@ def setpoint(
     v_max: Array = UNBOUNDED,
     lead: int = 0,
 ) -> SetpointLocal:
-    """SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame, frame 1: the horizon and ``yaw`` at
-    ``time`` (µs). ``compensation`` (3,), m/s²: what is added to the acceleration, ``bias``
-    (3,), m/s, to the velocity (``tracking``), which ``v_max`` (3,) bounds. The acceleration is that of
-    ``lead`` (µs) later."""
+    """Return SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame (frame 1).
+
+    It contains the ``horizon`` and ``yaw`` at ``time`` (µs). ``compensation`` (3,), m/s², is added to the
+    acceleration and ``bias`` (3,), m/s, to the velocity (``tracking``), which ``v_max`` (3,) bounds. The
+    acceleration is that of ``lead`` µs later.
+    """
     motion = horizon.at(time)
     acceleration = horizon.at(time + lead).acceleration if lead else motion.acceleration
     velocity = motion.velocity
@@ -59,13 +60,13 @@ def setpoint(
         _vector(local.velocity_to_local(velocity)),
         _vector(local.velocity_to_local(acceleration + compensation)),
         local.yaw_to_local(yaw.yaw),
-        # NED yaw turns clockwise: the rate changes sign with the frame.
+        # NED yaw is clockwise: the rate changes sign with the frame.
         -yaw.rate,
     )
 
 
 def is_finite(message: SetpointLocal) -> bool:
-    """Whether nothing in it is a NaN or infinite: one NaN in a used field has crashed an autopilot."""
+    """Return whether no field is NaN or infinite: a single NaN in a used field has crashed an autopilot."""
     return isfinite(
         sum(message.position)
         + sum(message.velocity)

@@ -1,9 +1,10 @@
-"""The way into the air and back: connect → arm → take-off → escort → settle → land, by MAVLink commands, each
-until acknowledged.
+"""Flight state machine: connect → arm → take-off → escort → settle → land, by MAVLink commands.
 
-Nothing starts without an operator's go (a NAV_TAKEOFF addressed to the companion), which does not keep for
-long, and while the autopilot is not in the mode in which our set-points steer, none are sent. Who takes the
-vehicle over by its mode, on the way up and down too, keeps it until a new go is given.
+Each command is repeated until it is acknowledged. Nothing starts without an operator's go (a NAV_TAKEOFF
+addressed to the companion), which expires soon. Set-points are sent only in guided mode, the mode in which
+they steer, or to enter it: at the start where the autopilot requires a stream, and after a time-out has ended
+the mode. Another controller that takes the vehicle over by its mode, also during take-off and landing, keeps
+it until a new go is given.
 """
 
 from __future__ import annotations
@@ -30,17 +31,18 @@ __all__ = ["NAV_LAND", "NAV_TAKEOFF", "Phase", "Pilot"]
 NAV_LAND = 21
 _NAN = float("nan")
 _ARMS = 2_000_000
-"""µs after the last asking to arm in which a heartbeat may still say that it is not."""
+"""µs after the last arm command during which a heartbeat may still report the vehicle as disarmed."""
 _BEATS = 1_500_000
-"""µs from an order of the mode until a heartbeat has to show it."""
+"""µs after a mode command within which a heartbeat must report the mode."""
 _LEAVES = 5_000_000
-"""µs after landing for which another mode is asked for."""
+"""µs after landing for which another mode is requested."""
 
 
 class Pilot:
-    """One vehicle's flight, as a state machine over what has been heard. It sends commands, never set-points.
+    """Flight of one vehicle, as a state machine driven by the received messages.
 
-    ``origin_altitude``: of the fleet frame's zero, m above mean sea level.
+    It sends commands, never set-points. ``origin_altitude``: altitude of the fleet frame's zero, m above mean
+    sea level.
     """
 
     def __init__(self, config: CompanionConfig, own: Source, origin_altitude: float) -> None:
@@ -52,7 +54,7 @@ class Pilot:
         self._landed_at: int | None = None
         self._returning = False
         self.landing: Landing | None = None
-        """Where it has landed; None before."""
+        """The landing position; None before the landing."""
         self._height: float | None = None
         self._go_at: int | None = None
         self._passage = Passage(0)
@@ -65,17 +67,17 @@ class Pilot:
 
     @property
     def profile(self) -> Profile | None:
-        """The autopilot's ways, None for one that is not known."""
+        """Profile of the autopilot, None for an unknown one."""
         return self.vehicle.profile
 
     @property
     def limits(self) -> AutopilotLimits:
-        """What the autopilot can follow."""
+        """Limits of the autopilot."""
         return self._readiness.limits
 
     @property
     def loop(self) -> Loop | None:
-        """Its gains, None for an autopilot that is not known."""
+        """Loop gains of the autopilot, None for an unknown one."""
         profile = self.profile
         return self.limits.lowered.loop or (None if profile is None else profile.loop)
 
@@ -86,22 +88,24 @@ class Pilot:
 
     @property
     def refusals(self) -> list[str]:
-        """Commands that the autopilot refused last, in words."""
+        """Descriptions of the commands that the autopilot refused last."""
         return list(self._commands.refusals)
 
     @property
     def refused(self) -> int:
-        """How many refusals there were."""
+        """Number of refused commands."""
         return self._commands.refused
 
     @property
     def guided(self) -> bool:
-        """Whether the autopilot follows our set-points now."""
+        """Whether the autopilot follows set-points now."""
         return self.vehicle.guided
 
     def steers(self, now: int) -> bool:
-        """Whether the autopilot follows our set-points, or has just taken the mode in which it does: PX4's
-        next heartbeat, up to a second later, says so."""
+        """Return whether the autopilot follows set-points, or has just accepted the guided mode.
+
+        PX4 reports the mode in its next heartbeat, up to a second later.
+        """
         profile = self.profile
         if self.guided or profile is None or self.phase is not Phase.PREPARE or not self.streaming:
             return self.guided
@@ -122,7 +126,7 @@ class Pilot:
         )
 
     def receive(self, message: Message) -> None:
-        """A message of the own autopilot."""
+        """Receive a message of the own autopilot."""
         if isinstance(message, CommandAck):
             self._commands.receive(message)
             self._readiness.receive(message)
@@ -132,24 +136,30 @@ class Pilot:
             self.vehicle.receive(message)
 
     def _floor(self, view: View) -> float:
-        """Above which height (m, fleet-local) an escort may begin on the way up; ∞ without a target, where it
-        would stay there, and where plans are committed, which begin at rest."""
+        """Return the height (m, fleet-local) above which an escort may begin during the climb.
+
+        It is ∞ without a target, because the vehicle would stay there, and in certified mode, because
+        committed plans begin at rest.
+        """
         config = self._config
         if config.task != "escort" or config.avoidance == "certified" or view.target is None:
             return inf
         return config.limits.within(config.field.margin(1)).box_min[2]
 
     def go(self, height: float) -> bool:
-        """The operator's go: climb to ``height`` metres above the start, or take over where it flies already;
-        on the way back, or while it holds, go on with the escort. Whether it is taken: not from the ground by
-        a vehicle that cannot fly an escort as its parameters are."""
+        """Accept the operator's go: climb to ``height`` (m) above the start; return whether it is accepted.
+
+        A vehicle that flies already is taken over where it is; one that returns or holds continues with the
+        escort. The go is refused on the ground if the autopilot's parameters do not permit an escort, and for
+        a height outside 0.5…120 m.
+        """
         if self.phase in (Phase.HOLD, Phase.RETURN, Phase.ESCORT):
             self.phase, self._returning = Phase.ESCORT, False
             return True
         if self.phase not in (Phase.CONNECT, Phase.PREPARE, Phase.YIELDED) or not 0.5 <= height <= 120.0:
             return False
         if self.phase is Phase.PREPARE and self._height not in (None, height):
-            # The autopilot may have been told the other height already.
+            # The autopilot may have received the other height already.
             return False
         if self.phase is Phase.CONNECT and self.limits.refuses:
             return False
@@ -159,38 +169,41 @@ class Pilot:
         return True
 
     def take_back(self) -> None:
-        """A go that waits for something is none; one that has begun goes on."""
+        """Cancel a go that still waits; a take-off that has begun continues."""
         if self.phase is Phase.CONNECT:
             self._height = None
 
     def hold(self) -> bool:
-        """The operator's order to stay where it is. Whether it is taken."""
+        """Hold the position, by order of the operator; return whether the order is accepted."""
         if self.phase in (Phase.ESCORT, Phase.RETURN):
             self.phase, self._returning = Phase.HOLD, False
         return self.phase is Phase.HOLD
 
     def come_back(self) -> bool:
-        """The operator's order to fly to where it started, and to land there. Whether it is taken."""
+        """Return to the start and land there, by order of the operator; return whether it is accepted."""
         if self.phase in (Phase.ESCORT, Phase.HOLD):
             self.phase, self._returning = Phase.RETURN, True
         return self.phase in (Phase.RETURN, Phase.SETTLE, Phase.LAND)
 
     def streamed(self, now: int) -> None:
-        """A set-point leaves at ``now`` (µs)."""
+        """Record that a set-point is sent at ``now`` (µs)."""
         self._authority.streamed(now)
 
     @property
     def start(self) -> Array | None:
-        """Where it was at the last go, (3,) m, fleet-local ENU; on the ground, or where it was taken over."""
+        """Position (3,) m, fleet-local ENU, at the last go: on the ground, or where it was taken over."""
         return self._takeoff.start
 
     def land(self) -> bool:
-        """The operator's order to land. A vehicle under way first comes to a hover clear of the others,
-        because an autopilot that lands looks out for nobody. Whether it is taken: not for a vehicle that
-        somebody else has, nor for one in the air that is not as we would leave it, nor for one that is not
-        heard, but that a go is taken back."""
+        """Land, by order of the operator; return whether the order is accepted.
+
+        A vehicle under way first comes to a hover clear of the others, because an autopilot that lands does
+        not avoid other vehicles. The order is refused if another controller has the vehicle, or if, before a
+        go, the vehicle flies in a mode that is neither the guided nor the hold mode. If the autopilot is
+        silent then, the order only cancels a waiting go.
+        """
         if self.phase in STEERED:
-            # Where it is, from now on, if it was still on its way.
+            # A vehicle that is still on its way back lands where it is.
             self._returning = self._returning and self.phase is not Phase.RETURN
             self.phase = Phase.SETTLE
         elif self.phase is Phase.PREPARE:
@@ -199,7 +212,7 @@ class Pilot:
             waited = self._height is not None
             self.take_back()
             if not self.vehicle.alive:
-                # Whether it flies, and whose it is, is not known.
+                # It is unknown whether it flies, and which controller has it.
                 return waited
             if self.vehicle.flies:
                 if not self.vehicle.left_by_us:
@@ -208,23 +221,25 @@ class Pilot:
         return self.phase is not Phase.YIELDED
 
     def alight(self) -> None:
-        """Something is so wrong that it has to land, by settling if that can be; whoever has taken the
-        vehicle over keeps it."""
+        """Land because of a severe fault, by settling first if possible.
+
+        If another controller has taken the vehicle over this has no effect.
+        """
         if self.phase in STEERED:
             self.phase = Phase.SETTLE
 
     @property
     def planned_limits(self) -> LimitsConfig:
-        """Limits that plans keep: as configured, lowered to what the autopilot can follow."""
+        """Limits for plans: the configured ones, lowered to what the autopilot can follow."""
         return self.limits.lowered.limits
 
     def returned(self) -> None:
-        """It is where it started: settle and land."""
+        """Settle and land: the vehicle is where it started."""
         if self.phase is Phase.RETURN:
             self.phase = Phase.SETTLE
 
     def settled(self) -> None:
-        """The vehicle hovers clear of the others: land now."""
+        """Land now: the vehicle hovers clear of the others."""
         if self.phase is Phase.SETTLE:
             self._alight()
 
@@ -235,7 +250,7 @@ class Pilot:
         self._passage = Passage(self.vehicle.mode)
 
     def step(self, now: int, view: View) -> list[Message]:
-        """Commands to send now."""
+        """Return the commands to send at ``now`` (µs)."""
         self.vehicle.tick(now)
         commands = self._act(now, view)
         connected = self.phase is not Phase.CONNECT or self._readiness.heard
@@ -247,12 +262,13 @@ class Pilot:
         if self.phase is Phase.SETTLE:
             self._settle(now, view)
         if self.phase not in STEERED:
-            # What is not wanted any more is not asked for, or who was thrown out of its mode never lands.
+            # The guided mode is not requested any more; otherwise a vehicle that has lost it would never
+            # land.
             self._owner = Owner.OURS
         if self._owner is Owner.LOST:
             return self._ask_back(now)
         if self.phase is Phase.YIELDED and self.vehicle.alive and not self.vehicle.armed:
-            # Who disarms it ends the flight.
+            # Disarming by another controller ends the flight.
             self._start_anew()
         if self.phase is Phase.CONNECT:
             return self._connect(now, view)
@@ -261,15 +277,18 @@ class Pilot:
         return self._land(now, view) if self.phase is Phase.LAND else []
 
     def _land(self, now: int, view: View) -> list[Message]:
-        """Told once: an autopilot that lands and then does something else was told so by somebody. And not
-        unheard: a pilot may have it."""
+        """Return the landing command until it takes effect.
+
+        It is not repeated after that: if the autopilot then leaves its landing mode, another controller has
+        ordered it. It is not sent while the autopilot is silent, because a pilot may have the vehicle.
+        """
         vehicle, profile = self.vehicle, self.profile
         if vehicle.heartbeat is not None and not vehicle.armed:
             return self._leave(now, view) if vehicle.beat_at - self._arming > _ARMS else []
         if not vehicle.alive:
             return []
         if profile is not None and vehicle.flies:
-            # Without set-points it may hold until it is told.
+            # Without set-points the autopilot may hold its position until the command arrives.
             before = profile.loss_modes | {profile.guided_custom_mode}
             if self._passage.strays(vehicle.mode, profile.land_modes, before):
                 self._yield()
@@ -279,8 +298,11 @@ class Pilot:
         return self._commands.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
 
     def _leave(self, now: int, view: View) -> list[Message]:
-        """Disarmed. PX4 is then in the mode in which it was steered, where its checks before the next flight
-        fail: it is asked for another one, unless somebody has chosen one already."""
+        """Return the mode command after disarming, and end the flight.
+
+        PX4 remains in guided mode, where its checks before the next flight fail: another mode is requested,
+        unless another one has been set already.
+        """
         vehicle, profile = self.vehicle, self.profile
         if self._landed_at is None:
             self._landed_at = now
@@ -296,12 +318,15 @@ class Pilot:
         return []
 
     def _yield(self) -> None:
-        """Somebody has it."""
+        """Yield the vehicle to another controller."""
         self._owner, self.phase = Owner.OURS, Phase.YIELDED
         self._commands.forget()
 
     def _keep(self, now: int) -> None:
-        """See whose the vehicle is. Somebody who took it over keeps it: nothing is ordered against them."""
+        """Update the owner; if another controller has taken the vehicle over, yield to it.
+
+        No commands are sent against that controller.
+        """
         before, self._owner = self._owner, self._authority.owner(now)
         if self._owner is Owner.TAKEN:
             self._yield()
@@ -309,13 +334,13 @@ class Pilot:
             self._commands.forget()
 
     def _ask_back(self, now: int) -> list[Message]:
-        """For the mode that nobody but the time-out has ended."""
+        """Request the guided mode again, after only the time-out has ended it."""
         if self.profile is None:
             return []
         return self._commands.call(now, DO_SET_MODE, self.profile.mode_call)
 
     def _start_anew(self) -> None:
-        """As at the beginning: a new go is needed."""
+        """Restart from the beginning: a new go is needed."""
         self.phase, self._owner, self._settling_since = Phase.CONNECT, Owner.OURS, None
         self._returning = False
         self._height = None
@@ -323,7 +348,7 @@ class Pilot:
         self._readiness.forget()
 
     def _settle(self, now: int, view: View) -> None:
-        """Land without settling when that cannot go on: blind, or too long."""
+        """Land without settling if that cannot continue: own position stale, or time limit exceeded."""
         since = self._settling_since = now if self._settling_since is None else self._settling_since
         blind = view.own is None or view.own.age > self._config.guard.own_stale_us
         if blind or now - since > self._config.guard.settle_us:
@@ -340,7 +365,7 @@ class Pilot:
         return calls
 
     def _expire(self, now: int) -> None:
-        """A go that has not armed the vehicle yet does not keep for ever."""
+        """Cancel a go that has not armed the vehicle within ``guard.go_keeps_us``."""
         if self._height is None:
             return
         self._go_at = now if self._go_at is None else self._go_at
@@ -357,7 +382,7 @@ class Pilot:
         if not self.vehicle.armed:
             self._expire(now)
         if not self.vehicle.alive:
-            # Who has it nobody knows: the next heartbeat says, before anything is asked of it.
+            # The owner is unknown until the next heartbeat; no commands are sent before it.
             return []
         ways = profile.takeoff_modes | {profile.guided_custom_mode}
         if view.own is not None and takeoff.risen(view.own, height):
@@ -367,7 +392,7 @@ class Pilot:
             if not self.vehicle.armed:
                 self._start_anew()
         elif self.vehicle.flies and view.own_age > self._config.guard.own_lost_us:
-            # It would never be seen to have arrived.
+            # Without an own position the arrival would never be detected.
             self._alight()
         if self.phase is not Phase.PREPARE or view.own is None:
             return []

@@ -1,4 +1,4 @@
-"""From the ground to where the escort begins: mode, arm, take-off, in the order of the autopilot."""
+"""Take-off, from the ground to where the escort begins: mode, arm, climb, in the autopilot's order."""
 
 from __future__ import annotations
 
@@ -13,22 +13,24 @@ from mavlink_bridge.messages import Message
 
 ARM_DISARM, NAV_TAKEOFF = 400, 22
 _STILL, _CALM = 0.3, 2_000_000
-"""m/s and µs: slower than this for so long in the air, a take-off is over."""
+"""m/s and µs: a vehicle slower than this in the air for so long has finished its take-off."""
 _NEARLY = 0.7
-"""Share of the height asked for."""
+"""Share of the requested height."""
 _ENOUGH, _ROOM = 0.6, 0.2
-"""An escort may begin on the way up above this share of the height asked for, and so many m above the floor
-of plans: the autopilot takes the rest slowly, in up to 3 s."""
+"""Share of the requested height, and distance (m) above the floor of plans.
+
+An escort may begin during the climb above both: the autopilot takes up to 3 s for the slow rest.
+"""
 _THERE, _FAST = 0.3, 3.0
-"""It may not begin more than so many m above that height, or at more than so many m/s."""
+"""m above the requested height, and m/s, beyond which the escort may not begin during the climb."""
 _NAN = float("nan")
 
 
 class Takeoff:
-    """The steps of one way up. ``start``: where the last of them began, (3,) m, fleet-local ENU."""
+    """The steps of one take-off; ``start``: where the last one began, (3,) m, fleet-local ENU."""
 
     def __init__(self, vehicle: Vehicle, calls: Commands, origin_altitude: float) -> None:
-        """``origin_altitude``: of the fleet frame's zero, m above mean sea level."""
+        """Take ``origin_altitude``: altitude of the fleet frame's zero, m above mean sea level."""
         self._vehicle = vehicle
         self._commands = calls
         self._origin_altitude = origin_altitude
@@ -38,10 +40,10 @@ class Takeoff:
         self._calm_since: int | None = None
         self._step = 0
         self.asked_to_arm = 0
-        """When (µs) it was last told to arm, 0 before the first time."""
+        """When (µs) the last arm command was sent, 0 before the first."""
 
     def begin(self, own: State) -> None:
-        """From here, on the ground or where it flies already."""
+        """Begin at the state ``own``, on the ground or in flight."""
         self.start = own.position.copy()
         self._ground = float(own.position[2])
         self._flying_already = self._vehicle.armed and self._vehicle.landed_state != ON_GROUND
@@ -49,23 +51,32 @@ class Takeoff:
         self._step = 0
 
     def step(self, profile: Profile) -> Step | None:
-        """What is being done; None when all is."""
+        """Return the present step; None when all are done."""
         return profile.steps[self._step] if self._step < len(profile.steps) else None
 
     def disarmed(self, profile: Profile) -> bool:
-        """Whether it is disarmed again, by itself or by somebody, who will not expect it to arm."""
+        """Return whether the vehicle is disarmed again, after it was armed.
+
+        It was disarmed by itself or by another controller, which does not expect it to arm again.
+        """
         return Step.ARM in profile.steps[: self._step] and not self._vehicle.armed
 
     def risen(self, own: State, height: float) -> bool:
-        """Whether it is so near ``height`` (m above the ground) that the way up may have ended."""
+        """Return whether the climb to ``height`` (m above the ground) may be over.
+
+        That is so above ``_NEARLY`` of it, unless the vehicle was in flight when the take-off began.
+        """
         climbed = float(own.position[2]) - self._ground
         return not self._flying_already and climbed > _NEARLY * height
 
     def advance(
         self, now: int, profile: Profile, own: State, height: float, floor: float = inf
     ) -> list[Message]:
-        """Commands to send now on the way to ``height`` (m above the ground). ``floor``: the lowest height
-        (m, fleet-local) of plans that can go on with the way up; ∞ where they cannot."""
+        """Return the commands to send at ``now`` (µs) on the way to ``height`` (m above the ground).
+
+        ``floor``: the lowest height (m, fleet-local) of plans that can take over during the climb; ∞ where
+        they cannot.
+        """
         vehicle = self._vehicle
         step = profile.steps[self._step]
         if step is Step.MODE:
@@ -94,9 +105,13 @@ class Takeoff:
         return call
 
     def _is_up(self, now: int, own: State, climbed: float, height: float, floor: float) -> bool:
-        """High enough for plans to go on from there; still at the height asked for; or still for a while in
-        the air, for an estimate of height that drifts by more than one may ask: the autopilot measures its
-        height from its own origin."""
+        """Return whether the take-off is over.
+
+        It is over if the vehicle is high enough for plans to take over, if it is still at the requested
+        height, or if it has been still in the air for a while. The last condition is needed because the
+        estimated height may have drifted by more than the tolerance: the autopilot measures its height from
+        its own origin.
+        """
         speed = float(abs(own.velocity).max())
         still = speed < _STILL
         if self._vehicle.landed_state == ON_GROUND:

@@ -1,25 +1,25 @@
-"""How the vehicle follows its set-points: the error, and what the autopilot lacks to make it vanish.
+"""Tracking of set-points by the vehicle: the error, and a compensation for what the autopilot lacks.
 
-An autopilot's position loop knows nothing of drag and wind but what its integral learns, within seconds.
-Meanwhile the vehicle is beside its plan: 1.8 m at 3 m/s for a PX4 whose simulated airframe has a drag of
-1 N per m/s and kg. A disturbance observer sees that error come: it predicts the velocity from what the
-autopilot is known to ask for,
+An autopilot's position loop compensates drag and wind only by its integral, which takes seconds. Meanwhile
+the vehicle is beside its plan: 1.8 m at 3 m/s for a PX4 whose simulated airframe has a drag of 1 N per m/s
+and kg. A disturbance observer detects the cause of that error early: it predicts the velocity from the
+acceleration that the autopilot is known to ask for,
 
     a_model = a_r + c + k_v (ė + k_p e),   e = p_r − p,
 
 with the reference (p_r, v_r, a_r), the compensation c that was sent and the gains k_p, k_v of the firmware's
-own loops, delayed by the lag of its attitude loop. ArduPilot does not chase the set-point but a trajectory
-that itself chases the set-point with bounded jerk: there (p_r, v_r, a_r + c) are that trajectory's, which is
-predicted as well. What the measured velocity lacks is the disturbance d = κ v + w. κ, the drag per speed, is
-learnt from how d changes with the velocity (a Kalman filter of one state); w is the rest. The compensation
-κ v_r + ρ w is added to the set-point's acceleration. ρ < 1 lets what a vehicle does not answer to decay;
-κ v_r is no feedback and needs none.
+own loops, delayed by the lag of its attitude loop. ArduPilot does not follow the set-point itself but a
+trajectory that follows the set-point with bounded jerk: there (p_r, v_r, a_r + c) are that trajectory's,
+which is predicted as well. The difference of the measured velocity is caused by the disturbance d = κ v + w.
+κ, the drag per speed, is learnt from how d changes with the velocity (a Kalman filter of one state); w is the
+rest. The compensation κ v_r + ρ w is added to the set-point's acceleration. ρ < 1 lets the part decay to
+which the vehicle does not respond; κ v_r is no feedback and needs no such factor.
 
-PX4's position loop is proportional. An estimated velocity that is off by b, as GNSS makes it for seconds,
-leaves the vehicle b/k_p beside its set-point for as long. b is how much faster the estimated velocity is than
-the estimated position moves; it is added to the velocity set-point. That loop is slow: ``pull`` times e is
-added, too. Its attitude is late: a_r is the plan's of ``lead_us`` later. (An integral of the error was tried:
-b changes within three seconds, and an integral so fast is not stable.)
+PX4's position loop is proportional. An offset b of the estimated velocity, as GNSS causes for seconds, leaves
+the vehicle b/k_p beside its set-point for as long. b is the estimated velocity minus the rate of change of
+the estimated position; it is added to the velocity set-point. That loop is slow, so ``pull`` times e is
+added, too. The attitude is late, so a_r is the plan's acceleration ``lead_us`` later. (An integral of the
+error was tried: b changes within three seconds, and an integral as fast as that is not stable.)
 """
 
 from __future__ import annotations
@@ -33,40 +33,42 @@ from companion.flight.autopilots import Loop, Shaping
 from companion.values.horizon import Array, Motion
 
 _SHARE = 0.9
-"""ρ."""
+"""ρ, the share of the rest w that is compensated."""
 _SLOW = 3.0
-"""s: time constant of the means that velocity and disturbance are compared with to learn κ."""
+"""s: time constant of the means with which velocity and disturbance are compared to learn κ."""
 _DOUBT, _DRIFT, _NOISE = 1.0, 0.002, 0.2
-"""Of κ: variance at first (1/s²), its growth (1/s³), spectral density of the disturbance's noise (m²/s³)."""
+"""For κ: initial variance (1/s²), its growth (1/s³), spectral density of the noise of d (m²/s³)."""
 _MOST_BIAS, _MOST_SURPRISE = 1.0, 2.0
-"""m/s: of the velocity's offset, and of what one observation may say of it: a position that jumps is no
-velocity."""
+"""m/s: largest velocity offset, and largest contribution of one observation to it.
+
+The second bound is for positions that jump, which are no velocity.
+"""
 _MOST_PULL = 0.5
-"""m/s, of what corrects the position."""
+"""m/s: largest correction of the position."""
 _MOST_DRAG = 2.0
-"""1/s."""
+"""1/s: largest drag κ."""
 _LONGEST = 0.1
-"""s between two observations; after a longer pause it begins anew."""
+"""s between two observations; after a longer pause the observer restarts."""
 _CELL, _CELLS = 0.01, 501
-"""m, and how many cells there are; the last holds what is larger."""
+"""Width (m) and number of the cells; the last cell holds all larger errors."""
 _FORGET = 10.0
-"""s, in which the envelope of the error falls to 1/e."""
+"""s in which the envelope of the error decays to 1/e."""
 
 
 class Errors:
-    """How large errors were, in little memory: cells of 1 cm up to 5 m."""
+    """Distribution of errors in little memory: cells of 1 cm up to 5 m."""
 
     def __init__(self) -> None:
         self._cells = np.zeros(_CELLS, dtype=np.int64)
         self.worst = 0.0
 
     def add(self, error: float) -> None:
-        """One more (m)."""
+        """Add an ``error`` (m)."""
         self._cells[min(int(error / _CELL), _CELLS - 1)] += 1
         self.worst = max(self.worst, error)
 
     def percentile(self, share: float) -> float | None:
-        """What ``share`` (0…1) of them do not exceed, m; None without any."""
+        """Return the error (m) that ``share`` (0…1) of them do not exceed; None without any."""
         count = int(self._cells.sum())
         if not count:
             return None
@@ -75,19 +77,22 @@ class Errors:
 
 
 class Tracking:
-    """Of one vehicle. ``error`` (3,): measured less reference position, m; ``envelope``: its largest norm
-    lately, m; ``compensation`` (3,) m/s², horizontal, and ``bias`` (3,) m/s: what is added to the
-    acceleration and to the velocity of set-points, fleet-local ENU."""
+    """Tracking of one vehicle.
+
+    ``error`` (3,), m: measured minus reference position; ``envelope``, m: its largest recent norm;
+    ``compensation`` (3,), m/s², horizontal, and ``bias`` (3,), m/s: additions to the acceleration and to the
+    velocity of set-points, fleet-local ENU.
+    """
 
     def __init__(self, config: TrackingConfig) -> None:
         self._config = config
         self._drag, self._doubt, self._room = 0.0, _DOUBT, inf
         self.errors = Errors()
-        """Of all that was followed."""
+        """Errors of all observed set-points."""
         self.reset()
 
     def reset(self) -> None:
-        """Nothing is followed. The drag stays known: it is the vehicle's."""
+        """Reset the observer when nothing is followed; the drag is kept, because it is the vehicle's."""
         self._last: int | None = None
         self.error: Array = np.zeros(3)
         self.envelope = 0.0
@@ -98,37 +103,40 @@ class Tracking:
         self._place: Array = np.zeros(3)
         self._rest: Array = np.zeros(2)
         self._asked: Array = np.zeros(2)
-        # The autopilot's own trajectory: how far it is ahead of the reference, and its acceleration.
+        # The autopilot's own trajectory: position and velocity relative to the reference, and its
+        # acceleration.
         self._ahead: Array = np.zeros((2, 2))
         self._fed: Array = np.zeros(2)
         self._means: Array = np.zeros((2, 2))
 
     def forget(self) -> None:
-        """How far estimates disagree, and what the position lacked, is not known any more."""
+        """Forget the estimated velocity offset and the position correction."""
         self.bias, self._found = np.zeros(3), np.zeros(3)
 
     def keep(self, acceleration: float) -> None:
-        """Reference and compensation together ask for no more ``acceleration`` (m/s²) from now on."""
+        """Limit the sum of reference and compensation to ``acceleration`` (m/s²) from now on."""
         self._room = acceleration
 
     def lead(self, loop: Loop | None) -> int:
-        """How far (µs) the acceleration of set-points is ahead of their position and velocity."""
+        """Return how far (µs) the acceleration of set-points is ahead of their position and velocity."""
         return loop.lead_us if loop is not None and self._config.compensate else 0
 
     @property
     def excess(self) -> float:
-        """By how much (m) the error has lately been larger than usual."""
+        """Excess (m) of the recent error over the usual one."""
         usual = self._config.usual
         return 0.0 if usual is None else max(self.envelope - usual, 0.0)
 
     @property
     def drag(self) -> float:
-        """κ, 1/s."""
+        """κ, the drag per speed, 1/s."""
         return self._drag
 
     def observe(self, now: int, reference: Motion, measured: Motion, loop: Loop) -> None:
-        """At ``now`` (µs) the set-points say ``reference``, and the vehicle is ``measured``; ``loop``: gains
-        of its autopilot."""
+        """Update with the ``reference`` and ``measured`` motion at ``now`` (µs).
+
+        ``loop``: gains of the vehicle's autopilot.
+        """
         self.error = measured.position - reference.position
         size = float(np.sqrt(self.error @ self.error))
         last, self._last = self._last, now
@@ -151,7 +159,7 @@ class Tracking:
         self._compensate(dt, reference, loop.slew)
 
     def _offset(self, dt: float, measured: Motion, seconds: float) -> None:
-        """By how much the estimated velocity is off, of the last ``seconds``."""
+        """Update the estimated velocity offset, with a time constant of ``seconds``."""
         moved, self._place = measured.position - self._place, measured.position.copy()
         surprise = _limited(measured.velocity - moved / dt, _MOST_SURPRISE)
         found = self._found + (1.0 - exp(-dt / seconds)) * (surprise - self._found)
@@ -162,7 +170,7 @@ class Tracking:
         return total
 
     def _predict(self, dt: float, reference: Motion, measured: Motion, loop: Loop) -> None:
-        """One step of the observer: two poles at the bandwidth."""
+        """Advance the observer by one step; it has two poles at the bandwidth."""
         config, velocity = self._config, measured.velocity[:2]
         self._shape(dt, reference, loop.shaping)
         place, speed = self._ahead
@@ -178,7 +186,7 @@ class Tracking:
         self._rest = self._rest - dt * pole**2 * surprise
 
     def _shape(self, dt: float, reference: Motion, shaping: Shaping | None) -> None:
-        """One step of the autopilot's own trajectory."""
+        """Advance the prediction of the autopilot's own trajectory by one step."""
         told = reference.acceleration[:2] + self.compensation[:2]
         if shaping is None:
             self._fed = told
@@ -190,7 +198,7 @@ class Tracking:
         self._ahead = np.stack([place + dt * speed, speed])
 
     def _learn(self, dt: float, velocity: Array) -> None:
-        """κ, from how disturbance and velocity differ from their means of the last seconds."""
+        """Update κ from the deviations of disturbance and velocity from their means of the last seconds."""
         now = np.stack([velocity, self._disturbance(velocity)])
         self._means = self._means + dt / _SLOW * (now - self._means)
         moved, pushed = now - self._means
@@ -200,13 +208,13 @@ class Tracking:
         drag = self._drag + gain * float(moved @ pushed - self._drag * square)
         self._doubt *= 1.0 - gain * square
         drag = min(max(drag, 0.0), _MOST_DRAG)
-        # What is ascribed to drag from now on is not in the rest any more.
+        # The part that is attributed to drag from now on is removed from the rest.
         self._rest = self._rest + (self._drag - drag) * velocity
         self._drag = drag
 
     def _compensate(self, dt: float, reference: Motion, slew: float) -> None:
         config = self._config
-        # So fast the autopilot is asked to be, and the drag is of that speed.
+        # The autopilot is asked for this speed, and the drag is that at this speed.
         speed = reference.velocity + self.bias
         ahead = speed[:2] + config.lag * reference.acceleration[:2]
         wanted = _limited(self._drag * ahead + _SHARE * self._rest, config.most)
@@ -216,8 +224,10 @@ class Tracking:
 
 
 def _beside(asked: Array, added: Array, most: float) -> Array:
-    """As much of ``added`` (2,) as makes both together no larger than ``most``; nothing where ``asked`` (2,)
-    alone is larger."""
+    """Return ``added`` (2,), scaled so that its sum with ``asked`` (2,) is no larger than ``most``.
+
+    Returns zero if ``asked`` alone is larger.
+    """
     together = asked + added
     if float(together @ together) <= most * most:
         return added

@@ -1,4 +1,4 @@
-"""What the own autopilot has said of itself: mode, armed, on the ground, checks, warnings."""
+"""State of the own autopilot as it reports it: mode, armed, on the ground, checks, warnings."""
 
 from __future__ import annotations
 
@@ -19,27 +19,30 @@ from mavlink_bridge.messages import (
 )
 
 WARNING = 4
-"""MAV_SEVERITY."""
+"""MAV_SEVERITY_WARNING."""
 ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
 UNDEFINED, ON_GROUND, IN_AIR = 0, 1, 2
-"""MAV_LANDED_STATE; others are on the way up or down."""
+"""MAV_LANDED_STATE; other values mean taking off or landing."""
 CRITICAL = 5
-"""MAV_STATE; it and what follows tell of a failsafe."""
+"""MAV_STATE_CRITICAL; this and higher values indicate a failsafe."""
 HEARTBEAT_LOST = 3_000_000
-"""µs without a heartbeat after which the autopilot's mode is not known."""
+"""µs without a heartbeat after which the autopilot's mode is unknown."""
 _TEXTS = 16
 
 
 class Vehicle:
-    """One autopilot, as heard. Messages are dated by ``tick``: one that has come since the last came then."""
+    """State of one autopilot, from its messages.
+
+    Messages are dated by ``tick``: a message received since the last tick is dated at the next.
+    """
 
     def __init__(self) -> None:
         self.heartbeat: Heartbeat | None = None
         self.profile: Profile | None = None
         self.said = ""
-        """The last warning: usually why it refuses."""
+        """Text of the last warning; usually the reason for a refusal."""
         self.texts: deque[StatusText] = deque(maxlen=_TEXTS)
-        """What it said last, of any severity; ``told`` counts all of it."""
+        """The last texts of any severity; ``told`` counts all of them."""
         self.told = 0
         self.status: SysStatus | None = None
         self.positioning = Positioning()
@@ -49,7 +52,7 @@ class Vehicle:
         self.now = self._beat_at = self._extended_at = 0
 
     def receive(self, message: Message) -> None:
-        """One of its messages."""
+        """Receive a message of the autopilot."""
         if isinstance(message, Heartbeat):
             if message.autopilot != INVALID:
                 self.heartbeat = message
@@ -67,7 +70,7 @@ class Vehicle:
                 self.said = message.text
 
     def tick(self, now: int) -> None:
-        """It is ``now`` (µs)."""
+        """Set the time to ``now`` (µs) and date the messages received since the last call."""
         self.now = now
         self.positioning.tick(now)
         if self.heartbeat is not self._beaten:
@@ -77,59 +80,59 @@ class Vehicle:
 
     @property
     def beat_at(self) -> int:
-        """When (µs) the last heartbeat came, 0 before the first."""
+        """When (µs) the last heartbeat arrived, 0 before the first."""
         return self._beat_at
 
     @property
     def alive(self) -> bool:
-        """Whether its heart beats: whether what it said of its mode still counts."""
+        """Whether heartbeats arrive, so that the last reported mode is valid."""
         return self.heartbeat is not None and self.now - self._beat_at <= HEARTBEAT_LOST
 
     @property
     def armed(self) -> bool:
-        """As last heard."""
+        """Whether the motors are armed, according to the last heartbeat."""
         return self.heartbeat is not None and bool(self.heartbeat.base_mode & ARMED)
 
     @property
     def guided(self) -> bool:
-        """Whether it follows our set-points now."""
+        """Whether the vehicle follows set-points now."""
         return self.alive and self.armed and self.in_guided_mode
 
     @property
     def in_guided_mode(self) -> bool:
-        """Whether its mode, as last heard, is the one in which set-points steer."""
+        """Whether the last reported mode is the one in which the vehicle follows set-points."""
         beat, profile = self.heartbeat, self.profile
         return beat is not None and profile is not None and is_guided(profile, beat)
 
     @property
     def mode(self) -> int:
-        """Its custom_mode, as last heard; 0 before."""
+        """Last reported custom_mode; 0 before the first heartbeat."""
         return 0 if self.heartbeat is None else self.heartbeat.custom_mode
 
     @property
     def flies(self) -> bool:
-        """Whether it may be in the air."""
+        """Whether the vehicle may be in the air."""
         return self.armed and self.landed_state != ON_GROUND
 
     @property
     def left_by_us(self) -> bool:
-        """Whether it is in the mode in which our set-points steer, or in the one in which we leave it."""
+        """Whether it is in guided mode, or in the mode in which the companion leaves it."""
         return self.in_guided_mode or (self.profile is not None and self.mode == self.profile.hold_mode)
 
     @property
     def starved(self) -> bool:
-        """Whether it is disarmed in the mode in which its checks before arming fail without set-points."""
+        """Whether it is disarmed in a mode in which its pre-arm checks fail without set-points."""
         profile = self.profile
         return profile is not None and profile.streams_first and self.in_guided_mode and not self.armed
 
     @property
     def healthy(self) -> bool:
-        """Whether its checks before arming have passed."""
+        """Whether its pre-arm checks have passed."""
         return self.status is not None and bool(self.status.health & PREARM_OK)
 
     @property
     def landed_state(self) -> int:
-        """MAV_LANDED_STATE as last heard, UNDEFINED if that is too long ago."""
+        """Last reported MAV_LANDED_STATE, UNDEFINED if the report is too old."""
         if self._extended is None or self.now - self._extended_at > HEARTBEAT_LOST:
             return UNDEFINED
         return self._extended.landed_state

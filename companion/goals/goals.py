@@ -1,4 +1,4 @@
-"""Where to: the surface around the target, an own goal, or where to stay, to land, or to come back to."""
+"""Destination of a plan: the surface around the target, a goal, or a place to hold, land or return to."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from companion.values.phase import Phase
 from companion.world import View
 
 _BACK, _STILL = 0.5, 0.5
-"""m and m/s: so near to where it started, and so slow, it is back."""
+"""Distance (m) to the start and speed (m/s) below which the vehicle is back."""
 _BESIDE, _PATIENCE = 5.0, 10_000_000
-"""m and µs: who is so near and has come no nearer for so long is back too."""
+"""Distance (m) and time (µs): a vehicle this near that has come no nearer for so long is back, too."""
 
 
 _NOBODY = np.empty((0, 3))
@@ -58,8 +58,11 @@ class Flight(Protocol):
 
 
 class Goals:
-    """Of the vehicle of ``system``. The ``pilot`` is asked for its phase, and told when the vehicle is back,
-    and when it has settled. ``seconds``: how far ahead a plan ends."""
+    """Destinations of the vehicle of ``system``.
+
+    ``pilot`` gives the phase, and receives a report when the vehicle is back and when it has settled.
+    ``seconds``: how far ahead a plan ends, s.
+    """
 
     def __init__(self, config: CompanionConfig, system: int, pilot: Flight, seconds: float) -> None:
         self._config = config
@@ -75,16 +78,16 @@ class Goals:
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self.spacing = inf
-        """How far (m) from each other those that share the surface are to be; ∞ where it is not shared."""
+        """Distance (m) that vehicles that share the surface shall keep; ∞ where it is not shared."""
         self.goal: Array | None = None
-        """(3,) m, fleet-local ENU: as ordered, of the task ``goto``; None for where it began to steer."""
+        """Ordered goal (3,) of the task ``goto``, m, fleet-local ENU; None for where steering began."""
 
     def begin(self, place: Array) -> None:
-        """It steers from ``place`` (3,) on, the first time or again."""
+        """Start to steer from ``place`` (3,), m, for the first time or again."""
         self._began = place
 
     def forget(self, view: View) -> None:
-        """What was for another phase, or for a target that was lost before, counts no more."""
+        """Discard what belongs to an earlier phase, or to a target that was lost before."""
         phase = self._pilot.phase
         if phase is not self._phase:
             self._phase, self._held = phase, None
@@ -105,10 +108,13 @@ class Goals:
         *,
         cautious: bool,
     ) -> Aim:
-        """For a plan at ``now`` (µs) from ``measured`` on, ``cautious`` no further than that speed goes;
-        ``obstacles``: of which it settles clear; ``mates`` (M, 3): where the others are that share the
-        surface; ``below``: how many of the others have a smaller id. SurfaceError where the surface has no
-        nearest point."""
+        """Return the aim of a plan at ``now`` (µs) from ``measured`` on.
+
+        ``cautious`` limits the way within a horizon to what ``guard.cautious_speed`` covers. ``obstacles``:
+        what settling keeps clear of. ``mates`` (M, 3), m: positions of the others that share the surface.
+        ``below``: how many of the others have a smaller id. Raises SurfaceError where the surface has no
+        nearest point.
+        """
         self._lane = self._config.guard.return_step * below
         self.spacing = inf
         aim = self._destination(now, view, measured, obstacles, mates)
@@ -116,7 +122,7 @@ class Goals:
         return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
 
     def _shortened(self, aim: Aim, measured: Motion, speed: float) -> Aim:
-        """The same way, but no further in a horizon than ``speed`` goes."""
+        """Return the aim in the same direction, but no further than ``speed`` (m/s) goes in a horizon."""
         drift = aim.target_end - aim.target
         way = aim.destination - drift - measured.position
         far = float(np.linalg.norm(way))
@@ -139,12 +145,12 @@ class Goals:
         elif phase is not Phase.HOLD and target is not None:
             return self._around(target, measured, mates)
         else:
-            # Told to, or because nobody is there to be stood around: where it is, clear of the others.
+            # Ordered to hold, or there is no target: hold the position, clear of the others.
             place = self._place_to_hold(measured)
         return standing(place, None if target is None else target.position)
 
     def _around(self, target: State, measured: Motion, mates: Array) -> Aim:
-        """The surface around the target where that will be at the end of the horizon."""
+        """Return the aim on the surface around the target's position at the end of the horizon."""
         ahead, rate, surface = self._seconds, self._config.turn_rate, self._surface
         (end,), (velocity,) = target.ahead(np.array([ahead]))
         here = measured.position - target.position
@@ -158,8 +164,10 @@ class Goals:
         return Aim(end + offset, velocity, target.position, end, surface)
 
     def _turn(self, offset: Array, mates: Array) -> float:
-        """By how much (rad) the vehicle goes round, from its ``offset`` (3,) from the target towards its
-        place among ``mates`` (M, 3)."""
+        """Return the angle (rad) by which to go round, from ``offset`` (3,) to the place among ``mates`` (M, 3).
+
+        Both are offsets from the target, m.
+        """
         formation = self._config.formation
         if not isinstance(formation, Spread) or not len(mates):
             return 0.0
@@ -171,14 +179,17 @@ class Goals:
         return max(-formation.turn, min(formation.turn, turn))
 
     def _place_to_hold(self, measured: Motion) -> Array:
-        """Where it was when it was told to stay or to come back, or when the target was lost."""
+        """Return the position (3,) at the order to hold or to return, or at the loss of the target."""
         if self._held is None:
             self._held = measured.position.copy()
         return self._held
 
     def _way_back(self, now: int, measured: Motion) -> Array:
-        """Above where it started, as high as it flies now and its lane is above that, or as near to that as
-        it is allowed; told to the pilot when it is there, or beside it and comes no nearer."""
+        """Return the place (3,) above the start, at the height of the order to return plus the vehicle's lane.
+
+        It is clipped to the box. The pilot receives a report when the vehicle is there, or when it is beside
+        the place and comes no nearer.
+        """
         start = self._pilot.start
         if start is None:
             return measured.position
@@ -189,7 +200,7 @@ class Goals:
         if far >= _BESIDE or far < self._nearest - _BACK:
             self._nearest, self._nearer_at = far, now
         there = far < _BACK and float(measured.velocity @ measured.velocity) < _STILL**2
-        # Who finds the place taken may go round it for ever.
+        # A vehicle whose place is taken may go round it for ever.
         if there or (far < _BESIDE and now - self._nearer_at > _PATIENCE):
             self._pilot.returned()
         return above

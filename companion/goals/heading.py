@@ -1,9 +1,9 @@
-"""The yaw that faces the target, planned over the horizon like a fourth axis.
+"""Yaw that faces the target, planned over the horizon like a fourth axis.
 
-The paper sends the bearing of the target (Algorithm 1, line 4). Close by, that bearing turns faster than a
-multirotor can: its yaw torque is weak. Knowing the planned path, the yaw starts to turn beforehand: the QP
-keeps the yaw nearest to the bearings ahead, in the sense of least squares, within the vehicle's yaw rate and
-acceleration.
+The paper sends the bearing of the target (Algorithm 1, line 4). Close to the target that bearing turns faster
+than a multirotor can: its yaw torque is weak. As the path is planned, the yaw starts to turn beforehand: the
+QP keeps the yaw nearest to the bearings ahead, in the sense of least squares, within the vehicle's yaw rate
+and acceleration.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class Yaw(NamedTuple):
 
 
 class Heading:
-    """Plans the yaw of one vehicle; each plan starts from the last one's state."""
+    """Yaw planner of one vehicle; each plan starts from the state of the last one."""
 
     def __init__(self, config: HeadingConfig, horizon: HorizonConfig) -> None:
-        # Half as many steps of twice the length as the path has: yaw is slow.
+        # Half as many steps as the path has, of twice the length: yaw is slow.
         n, dt = (horizon.steps + 1) // _EVERY, _EVERY * horizon.dt_us * 1e-6
         self._config, self._dt, self._n = config, dt, n
         self._S_v, self._S_x, self._ahead = prediction(n, dt)
@@ -47,15 +47,14 @@ class Heading:
         self._accelerations: Array = np.zeros(n)
 
     def reset(self, measured: float) -> None:
-        """Forget the plan and stand at the ``measured`` yaw."""
+        """Discard the plan and keep the ``measured`` yaw (rad, ENU)."""
         self._start = None
         self._state = Yaw(measured, 0.0, 0.0)
 
     def plan(self, now: int, positions: Array, targets: Array) -> None:
-        """Plan from ``now`` (µs) along own ``positions`` (N + 1, 3) at n = 1…N + 1 facing ``targets`` (N + 1,
-        3).
+        """Plan from ``now`` (µs) along the own ``positions`` (N + 1, 3), facing ``targets`` (N + 1, 3), m.
 
-        Without a solution the yaw planned before is kept.
+        Both are those at n = 1…N + 1. Without a solution the last yaw plan is kept.
         """
         state = self.at(now)
         last = _EVERY * self._n
@@ -74,7 +73,7 @@ class Heading:
         self._start, self._state = now, state
 
     def at(self, time: int) -> Yaw:
-        """The planned yaw at ``time`` (µs); after the horizon it stands."""
+        """Return the planned yaw at ``time`` (µs); it is constant after the horizon."""
         if self._start is None:
             return self._state
         elapsed = max(time - self._start, 0) * 1e-6
@@ -91,7 +90,7 @@ class Heading:
         return Yaw(yaw + s * rate + 0.5 * s * s * acceleration, rate + s * acceleration, acceleration)
 
     def _solve(self, c: Array, rate: float) -> Array:
-        """The free minimiser if it keeps all bounds, or else by PIQP."""
+        """Return the free minimiser (n,) if it keeps all bounds, otherwise PIQP's solution."""
         limit, bound = self._limit, self._config.rate_max
         a: Array = self._minimiser @ c
         largest = float(np.abs(a).max())
@@ -99,13 +98,13 @@ class Heading:
             return a
         if abs(rate) + self._swing <= bound:
             return self._bounded.solve(c, -limit, limit)
-        # A rate that is too high already must be allowed, or there is no solution.
+        # A rate that already exceeds the bound must be allowed, or there is no solution.
         rows = np.full(self._n, max(bound, abs(rate)))
         return self._limited.solve(c, -limit, limit, -rows - rate, rows - rate)
 
 
 def _unwrapped(start: float, angles: Array) -> Array:
-    """The angles (n,) without jumps of 2π, beginning with the turn nearest to ``start``."""
+    """Return the angles (n,) without jumps of 2π, beginning with the turn nearest to ``start``."""
     steps = np.empty_like(angles)
     steps[0] = angles[0] - start
     np.subtract(angles[1:], angles[:-1], out=steps[1:])

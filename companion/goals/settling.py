@@ -1,4 +1,4 @@
-"""Coming to a hover from which one may land: stop, still avoiding, and move aside of whoever is below."""
+"""Coming to a hover before landing: stop while avoiding obstacles, and move aside of one that is below."""
 
 from __future__ import annotations
 
@@ -9,16 +9,19 @@ from companion.values.horizon import Array, Motion
 from companion.values.obstacles import Obstacles
 
 _ASIDE = 0.5
-"""m further than the clearance, when moving aside to land."""
+"""Distance (m) beyond the clearance when moving aside to land."""
 _PASSES, _WAITS = 1.0, 5_000_000
-"""m in a horizon: what moves further is passing, and for so long (µs) it is waited for."""
+"""Motion (m in a horizon) above which an obstacle is passing, and how long (µs) to wait for it."""
 _NEAR = 1e-3
 _EAST = np.array([1.0, 0.0])
 
 
 class Settling:
-    """Where to come to rest; ``clear`` once the vehicle is slow there and nobody is near horizontally,
-    because landing is straight down."""
+    """Place to come to rest before landing.
+
+    ``clear`` is set once the vehicle is slow there and no obstacle is near horizontally, because landing is
+    straight down.
+    """
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
@@ -27,8 +30,10 @@ class Settling:
         self.clear = False
 
     def rest(self, now: int, measured: Motion, obstacles: Obstacles) -> Array:
-        """The place (3,) to go to at ``now`` (µs): where braking from the first call on ends, or beside an
-        obstacle that is in the way, since a landed vehicle will not go away. One that passes is waited for.
+        """Return the place (3,), m, to go to at ``now`` (µs).
+
+        It is where braking from the first call on ends, or beside an obstacle that is in the way, since a
+        landed vehicle will not go away. The vehicle waits for an obstacle that passes.
         """
         config, here = self._config, measured.position
         speed = float(np.linalg.norm(measured.velocity))
@@ -47,14 +52,14 @@ class Settling:
         return self._rest
 
     def _in_the_way(self, here: Array, obstacles: Obstacles) -> int | None:
-        """Which obstacle is nearest; None if it is far enough."""
+        """Return the index of the nearest obstacle; None if it is far enough away."""
         distance = np.linalg.norm(here[:2] - obstacles.positions[:, 0, :2], axis=1) - obstacles.radius
         if distance.min(initial=np.inf) > self._config.guard.landing_clearance:
             return None
         return int(np.argmin(distance))
 
     def _waits(self, now: int, positions: Array) -> bool:
-        """Whether an obstacle at ``positions`` (N + 1, 3) passes, and not for too long."""
+        """Return whether an obstacle at ``positions`` (N + 1, 3) passes, and has not been waited for too long."""
         way = positions[-1, :2] - positions[0, :2]
         if float(np.hypot(way[0], way[1])) < _PASSES:
             self._waiting_since = None
@@ -63,7 +68,7 @@ class Settling:
         return now - self._waiting_since < _WAITS
 
     def _beside(self, here: Array, centre: Array, radius: float) -> Array:
-        """A place (3,) clear of an obstacle at ``centre`` (3,)."""
+        """Return a place (3,), m, clear of an obstacle at ``centre`` (3,)."""
         apart = here[:2] - centre[:2]
         size = float(np.hypot(apart[0], apart[1]))
         away = apart / size if size > _NEAR else _EAST

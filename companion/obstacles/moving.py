@@ -1,9 +1,8 @@
-"""Obstacles that move: spheres and posts that say on the swarm link where they are, each with a system id of
-its own.
+"""Moving obstacles: spheres and posts that report their positions on the swarm link.
 
-Where they are, and will be, is heard as of a neighbour: a track, and a horizon if they share one. How large
-they are stands in the settings. Where one says that it is counts as exact, as the place of a fixed one does,
-so that one at rest acts as a fixed one of its size does.
+Each has a system id of its own. Its position and prediction are received like a neighbour's: a track, and a
+horizon if it shares one. Its size is configured. Its reported position counts as exact, like the position of
+a fixed obstacle, so that a moving obstacle at rest has the same effect as a fixed one of its size.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ from companion.values.obstacles import Obstacles
 
 
 class MovingObstacles:
-    """The sizes of M moving obstacles: which of them are balls (M,), radii (M,) and tops of the posts (M,),
-    m."""
+    """Sizes of M moving obstacles: whether sphere or post (M,), radii (M,) and tops of the posts (M,), m."""
 
     def __init__(self, moving: tuple[MovingSphere | MovingPost, ...]) -> None:
         self._rows = {one.system: k for k, one in enumerate(moving)}
@@ -38,10 +36,13 @@ class MovingObstacles:
         margin: float,
         vehicles: float,
     ) -> Obstacles:
-        """``others`` with the sizes of those that are no vehicles: ``d_min``, ``d_safe`` (m, of a point) grow
-        by radius and ``margin``, and a post is at the point of its axis nearest to the own ``prediction`` (N
-        + 1, 3). By what the radius of one is more than the margin of ``vehicles`` (m) nobody knows where it
-        is: as much larger is it here."""
+        """Return ``others`` with the sizes of those that are moving obstacles.
+
+        ``d_min`` and ``d_safe`` (m, for a point) grow by the radius and ``margin``. A post is placed at the
+        point of its axis nearest to the own ``prediction`` (N + 1, 3). Where the radius in ``others`` exceeds
+        the margin of ``vehicles`` (m), the excess is the uncertainty of the position, and the obstacle is
+        enlarged by that.
+        """
         found = [(j, self._rows[name]) for j, name in enumerate(others.ids) if name in self._rows]
         if not found:
             return others
@@ -56,8 +57,10 @@ class MovingObstacles:
         return Obstacles(others.ids, positions, least, safe, radius)
 
     def distance(self, points: Array, places: Array) -> Array:
-        """From ``points`` (…, K, 3) to the surfaces of obstacles at ``places`` (…, M, 3), (…, K, M) m:
-        negative inside."""
+        """Return the distances (…, K, M), m, from ``points`` (…, K, 3) to obstacles at ``places`` (…, M, 3).
+
+        They are measured to the surfaces and are negative inside.
+        """
         off = points[..., :, None, :2] - places[..., None, :, :2]
         top = np.where(self._ball, places[..., 2], self._top)
         above = points[..., :, None, 2] - top[..., None, :]

@@ -1,8 +1,8 @@
-"""The other vehicles, and obstacles that move, as the swarm link tells of them: a track each, and the horizon
-each has shared.
+"""Other vehicles, and moving obstacles, received on the swarm link: tracks and shared horizons.
 
-A neighbour that shares no horizon, or whose horizon is old or no longer where the neighbour is, is taken at
-its n = 0 position for the whole horizon (Sec. IV-A), or carried on at constant velocity if so configured.
+A neighbour that shares no horizon, or whose horizon is stale or no longer agrees with its position, is taken
+at its n = 0 position for the whole horizon (Sec. IV-A), or extrapolated at constant velocity if so
+configured.
 """
 
 from __future__ import annotations
@@ -34,18 +34,22 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 
 _MOST = 255
-"""System ids that there are."""
+"""Number of system ids."""
 _VOICE = 1_000_000
-"""µs for which a vehicle's autopilot is not listened to where its companion speaks, too."""
+"""µs after a companion's position during which positions from the same vehicle's autopilot are ignored."""
 _STRAYED = 1.0
-"""A neighbour further than this (m) from its own plan is not where it says: its track counts. With
-``guard.astray_us`` it is ``guard.tube``."""
+"""m; a neighbour further than this from its own plan is not following it: its track is used instead.
+
+With ``guard.astray_us`` the limit is ``guard.tube``.
+"""
 
 
 @lru_cache(maxsize=1024)
 def _read(payload: bytes) -> tuple[int, Horizon]:
-    """Fingerprint and horizon of a plan on the wire. Where many companions share a process each plan is read
-    once. Raises PlanWireError."""
+    """Return fingerprint and horizon of a plan on the wire; raises PlanWireError.
+
+    If many companions share a process, each plan is decoded once.
+    """
     plan = unpack(payload)
     horizon = roll_out(plan.epoch, plan.dt, plan.position_m, plan.velocity_m_s, plan.accelerations_m_s2)
     horizon.knots.flags.writeable = False
@@ -54,14 +58,16 @@ def _read(payload: bytes) -> tuple[int, Horizon]:
 
 @lru_cache(maxsize=1024)
 def _placed(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measured | None:
-    """What a message measures, as ``measured`` has it; each worked out once in a process."""
+    """Return what a message measures, as ``measured`` does; each message is converted once per process."""
     position = fleet.to_enu(message.latitude, message.longitude, message.altitude)
     return measured(position, ned_to_enu(message.velocity_ned), upward=upward)
 
 
 def fading(config: CompanionConfig) -> Array | None:
-    """How much (N + 1, 1) is left, at n = 0…N, of what a vehicle is beside its plan now; None where that does
-    not count."""
+    """Return the share (N + 1, 1) of a vehicle's present deviation from its plan that is left at n = 0…N.
+
+    Returns None if ``guard.astray_us`` is off.
+    """
     if not config.guard.astray_us:
         return None
     ahead = config.horizon.dt_us * np.arange(config.horizon.steps + 1.0)
@@ -69,21 +75,21 @@ def fading(config: CompanionConfig) -> Array | None:
 
 
 class Neighbours:
-    """Everything heard on the swarm link, by system id."""
+    """Everything received on the swarm link, by system id."""
 
     def __init__(self, config: CompanionConfig, system: int, fleet: FleetFrame) -> None:
         self._config = config
         self._system = system
         self._fleet = fleet
         self._tracks: dict[int, Track] = {}
-        # The tracks' last states as rows, in the order of the tracks: sampled together at every plan, where
-        # those of the fresh ones are put down first.
+        # The tracks' last states as rows, in the order of the tracks. They are sampled together at every
+        # plan, after the rows of the tracks that received messages have been updated.
         self._ids: tuple[int, ...] = ()
         self._rows: dict[int, int] = {}
         self._fresh: set[int] = set()
         self._states: Array = np.zeros((0, 6))
         self._times = np.zeros(0, dtype=np.int64)
-        # When (µs) they came, whatever they are dated.
+        # Arrival times (µs), independent of the times at which the measurements are dated.
         self._came: dict[int, int] = {}
         self._arrivals = np.zeros(0, dtype=np.int64)
         self._clocks: dict[int, PlanClock] = {}
@@ -96,12 +102,13 @@ class Neighbours:
         self._d_safe: Array = np.full(_MOST, config.field.d_safe + margin)
         self.refused_plans = 0
         self.closest = inf
-        """m: how near a neighbour has been, by what was heard of it; looked at where ``guard.near`` is."""
-        # When (µs) a vehicle's companion last said where it is; whether its track is of its autopilot's word.
+        """m: least distance to a neighbour so far, by its messages; updated if ``guard.near`` is set."""
+        # When (µs) a vehicle's companion last reported its position; whether its track uses its autopilot's
+        # messages.
         self._spoken: dict[int, int] = {}
         self._by_autopilot: dict[int, bool] = {}
         self._brief = False
-        # What is larger than a vehicle, and flies by no limits.
+        # Moving obstacles: they may be larger than a vehicle and are not bound by its limits.
         self._things = {one.system for one in config.moving}
         self.relevance = RelevanceFilter(config)
         self._trusted = TrustedPeers()
@@ -109,7 +116,7 @@ class Neighbours:
 
     @property
     def brief(self) -> bool:
-        """Whether their clocks are a simulation's, see ``SenderClock``."""
+        """Whether the neighbours' clocks are a simulation's clock, see ``SenderClock``."""
         return self._brief
 
     @brief.setter
@@ -122,13 +129,13 @@ class Neighbours:
                 clock.brief = value
 
     def receive_position(self, now: int, message: GlobalPosition) -> None:
-        """A neighbour's GLOBAL_POSITION_INT; the own echo is ignored."""
+        """Receive a neighbour's GLOBAL_POSITION_INT; the own echo is ignored."""
         system, component = message.source
         if system == self._system:
             return
         by_autopilot = component == AUTOPILOT
         if by_autopilot and now - self._spoken.get(system, now - _VOICE) < _VOICE:
-            # Its companion says it already, by another clock.
+            # Its companion reports the position already, dated by another clock.
             return
         track = self._tracks.get(system)
         if track is None or self._by_autopilot[system] != by_autopilot:
@@ -138,7 +145,8 @@ class Neighbours:
         refused, before = track.refused, track.time
         told = track.take(now, placed, message.time_boot) or track.refused > refused
         if told and not by_autopilot:
-            # What is of no use, as of a receiver without a fix, keeps nobody's word out.
+            # Unusable positions, such as those of a receiver without a fix, do not suppress the autopilot's
+            # messages.
             self._spoken[system] = now
         if track.time is None:
             return
@@ -155,9 +163,11 @@ class Neighbours:
         self._trusted.note(now, self._rows[system], track)
 
     def receive_plan(self, now: int, message: Tunnel) -> None:
-        """What a neighbour tells in a TUNNEL: its horizon, or how far it may be from where it says that it
-        is. A horizon in another fleet frame, from the future or from long ago is refused, unless it is the
-        sender's clock that is wrong."""
+        """Receive a neighbour's TUNNEL message: its horizon, or the uncertainty of its position.
+
+        A horizon in another fleet frame, from the future or from long ago is refused, unless the reason is
+        that the sender's clock is wrong.
+        """
         system = message.source.system
         if system == self._system or message.payload_type not in (PAYLOAD_TYPE, DOUBT):
             return
@@ -186,21 +196,21 @@ class Neighbours:
         self._table.put(system, horizon)
 
     def listen(self, now: int, own: State | None) -> None:
-        """Find out whom to ignore for a while, the ``own`` state being what it is at ``now`` (µs)."""
+        """Determine the neighbours to ignore for a while; ``own`` is the own state at ``now`` (µs)."""
         self._put_down()
         self.relevance.look(own, self._ids, self._states, now - self._times, self._familiar)
 
     def ignores(self, system: int, component: int) -> bool:
-        """Whether what this sender says of where it is and will be need not be decoded now."""
+        """Return whether position and plan messages of this sender need not be decoded now."""
         if not self.relevance.ignores(system):
             return False
         if component != AUTOPILOT and not self._by_autopilot.get(system, True):
-            # It goes on being its vehicle's voice.
+            # The companion's ignored messages still have priority over its autopilot's.
             self._spoken[system] = self.relevance.now
         return True
 
     def _familiar(self) -> NDArray[np.bool_]:
-        """Whose word counts for a while, as of vehicles that fly by plans and limits like ours."""
+        """Return which rows (M,) are trusted for a while: vehicles with plans and limits like the own."""
         plans = self._table.at(self._ids, self._times)
         trusted = self._trusted.trusted(self.relevance.now, self._states, plans)
         for system in self._things | self._uncertainty.systems(self.relevance.now):
@@ -209,14 +219,16 @@ class Neighbours:
         return trusted
 
     def obstacles(self, now: int, places: Array | None = None) -> Obstacles:
-        """All neighbours aligned with ``now + n·dt``, n = 0…N; only those that may act on a plan that begins
-        at one of ``places`` (P, 3), if those are said.
+        """Return all neighbours aligned with ``now + n·dt``, n = 0…N.
 
-        One that falls silent stays an obstacle where it was last, carried on for a bounded time: it may well
-        be there. With ``guard.flown_on_us`` it may have stopped, or its autopilot flown on: it is an obstacle
-        that holds all of that way (``flown_on``). What is dated long ago and came only now has been delayed,
-        or it is a clock that is not understood yet, of one that began anew: both where it says that it is and
-        where that has been carried to are held, and a plan that passes one of them counts.
+        With ``places`` (P, 3) only those are returned that may affect a plan that begins at one of them.
+
+        A neighbour that falls silent remains an obstacle at its last position, extrapolated for a bounded
+        time: it may well be there. With ``guard.flown_on_us`` its vehicle may have stopped, or its autopilot
+        may have flown on: the obstacle then covers that whole path (``flown_on``). A measurement with an old
+        date that arrived only now was delayed, or is dated by a clock that has restarted and is not
+        synchronised yet: then both its reported and its extrapolated position are covered, and a plan that
+        passes one of them is accepted.
         """
         config, stale = self._config, self._config.guard.plan_stale_us
         steps = config.horizon.steps + 1
@@ -240,7 +252,8 @@ class Neighbours:
         positions, trusted = self._table.positions(ids, now, now - stale)
         begins, silent = positions[:, 0], age > stale
         if silent.any():
-            # By more than every message is: who has just fallen silent is not late.
+            # Late means delayed by more than every message is: a neighbour that has just fallen silent is not
+            # late.
             late = silent & (since <= stale - config.neighbour.delay_us)
             beside = late & (
                 _beside(begins, states[:, 0:3], self._strayed) | _beside(begins, here, self._strayed)
@@ -255,7 +268,7 @@ class Neighbours:
         else:
             trusted &= _beside(begins, here, self._strayed)
         if self._fading is not None:
-            # Beside its plan, and on the way back to it.
+            # The vehicle is beside its plan, and returns to it.
             positions += np.where(trusted & ~silent, 1.0, 0.0)[:, None, None] * (
                 self._fading * (here - begins)[:, None, :]
             )
@@ -263,7 +276,8 @@ class Neighbours:
             lost = ~trusted
             positions[lost] = here[lost][:, None]
             if config.neighbour_prediction == "velocity":
-                # One that has been silent for longer than it is carried on rests where that ended.
+                # A neighbour that is silent for longer than it is extrapolated rests where the extrapolation
+                # ended.
                 moving = lost & (age <= config.neighbour.extrapolate_us)
                 ahead = 1e-6 * config.horizon.dt_us * np.arange(steps)
                 positions[moving] += ahead[:, None] * states[moving, None, 3:6]
@@ -271,7 +285,7 @@ class Neighbours:
         found = Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count], self._margin[:count])
         further[trusted] = 0.0
         if doubtful:
-            # Plans, too, lead from where it believes to be.
+            # Plans, too, begin at the neighbour's own estimate of its position.
             further += self._uncertainty.radii(ids)
         if not further.any():
             return found
@@ -282,8 +296,11 @@ class Neighbours:
     def _held(
         self, ids: Sequence[int], states: Array, times: Ages, ages: Ages, late: NDArray[np.bool_]
     ) -> Ball:
-        """Between where those with last ``states`` (M, 6) were when it could still be known, of ``late`` ones
-        where that was said, and where they may be by now; ``times``, ``ages`` (M,) µs."""
+        """Return balls that contain all places where the vehicles with last ``states`` (M, 6) may be by now.
+
+        They reach from the last certain position (for ``late`` ones: from the reported one) to where the
+        vehicle may have flown. ``times``, ``ages`` (M,) in µs.
+        """
         guard = self._config.guard
         most = 1e-6 * np.minimum(ages, guard.flown_on_us or self._config.neighbour.extrapolate_us)
         meant = np.zeros((len(ids), 3))
@@ -292,8 +309,11 @@ class Neighbours:
         return flown_on(states, meant, most, np.where(late, 0.0, 1e-6 * guard.plan_stale_us))
 
     def nearest(self, now: int, own: State | None) -> tuple[int, float] | None:
-        """The neighbour that is nearest to the ``own`` place by what was heard of it, and how near (m); None
-        without any in the air. What stands on the ground is nobody's concern."""
+        """Return system id and distance (m) of the neighbour nearest to the ``own`` position.
+
+        The distance follows from the received messages. Returns None without an own state, without
+        ``guard.near`` and without neighbours.
+        """
         if own is None or self._config.guard.near is None or not self._ids:
             return None
         self._put_down()
@@ -307,11 +327,14 @@ class Neighbours:
 
     @property
     def below(self) -> int:
-        """How many of those heard so far have a smaller system id than the own."""
+        """Number of vehicles received so far whose system id is smaller than the own."""
         return sum(system < self._system for system in self._ids if system not in self._things)
 
     def mates(self, now: int) -> Array:
-        """Where the vehicles are (M, 3) that fly by plans of their own: whose plan is fresh."""
+        """Return the positions (M, 3), m, of the vehicles that fly by plans of their own.
+
+        These are the ones with a fresh plan.
+        """
         self._put_down()
         if not self._ids:
             return np.empty((0, 3))
@@ -321,19 +344,19 @@ class Neighbours:
         return np.asarray(states[:, 0:3] + 1e-6 * age[:, None] * states[:, 3:6])
 
     def mate_ids(self, now: int) -> frozenset[int]:
-        """Their system ids."""
+        """Return the system ids of the vehicles that fly by plans of their own."""
         self._put_down()
         return frozenset(compress(self._ids, self._planning(now).tolist())) if self._ids else frozenset()
 
     def _planning(self, now: int) -> NDArray[np.bool_]:
-        """Of each neighbour, whether it flies by plans of its own."""
+        """Return, for each neighbour, whether it flies by plans of its own."""
         _, fresh = self._table.positions(self._ids, now, now - self._config.guard.plan_stale_us)
         for system in self._things & self._rows.keys():
             fresh[self._rows[system]] = False
         return fresh
 
     def last_heard(self) -> list[tuple[int, int, Array, Array]]:
-        """System id, time (µs), position (3,) and velocity (3,) of everybody's last known state."""
+        """Return system id, time (µs), position (3,) and velocity (3,) of each neighbour's last state."""
         self._put_down()
         return [
             (system, int(time), state[0:3], state[3:6])
@@ -341,12 +364,12 @@ class Neighbours:
         ]
 
     def ages(self, now: int) -> dict[int, int]:
-        """Age (µs) of every neighbour's track."""
+        """Return the age (µs) of each neighbour's track, by system id."""
         self._put_down()
         return dict(zip(self._ids, (now - self._times).tolist(), strict=True))
 
     def _put_down(self) -> None:
-        """The states of those who were heard since."""
+        """Update the rows of the neighbours received since the last update."""
         if not self._fresh:
             return
         rows = [self._rows[system] for system in self._fresh]
@@ -358,7 +381,9 @@ class Neighbours:
 
 
 def _beside(planned: Array, places: Array, strayed: float) -> NDArray[np.bool_]:
-    """Which (M,) of the ``planned`` places (M, 3) are within ``strayed`` (m) of those, so that the plan
-    counts."""
+    """Return which (M,) of the ``planned`` places (M, 3) are within ``strayed`` (m) of ``places``.
+
+    The plans of those neighbours are trusted.
+    """
     off = planned - places
     return np.asarray(np.vecdot(off, off) <= strayed**2)

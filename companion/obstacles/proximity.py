@@ -1,9 +1,10 @@
-"""What the own vehicle's distance sensors see (OBSTACLE_DISTANCE): posts that stand for a short while.
+"""Obstacles seen by the own distance sensors (OBSTACLE_DISTANCE): posts with a short lifetime.
 
-A return says that something is at its range, somewhere in its sector. It becomes a post that holds the arc of
-the sector at that range, at every height, for nothing is known of heights. Returns that lie close together
-are one post, which is that much larger. So every return of the last ``age_us`` lies inside a post; behind it,
-and where nothing looks, nothing is known. A sensor that tilts with the vehicle is taken as if it were level.
+A return means that there is something at its range, somewhere in its sector. It becomes a post that covers
+the arc of the sector at that range, at every height, because heights are unknown. Returns that lie close
+together become one post, which is enlarged accordingly. So every return of the last ``age_us`` lies inside a
+post; behind it, and outside the sensors' fields of view, nothing is known. A sensor that tilts with the
+vehicle is treated as level.
 """
 
 from __future__ import annotations
@@ -21,27 +22,29 @@ from mavlink_bridge.messages import ObstacleDistance, Source
 FIRST_ID = 10_000
 """Ids of posts begin here: above those of fixed obstacles."""
 BODY = 12
-"""MAV_FRAME_BODY_FRD: the angles count from the nose."""
+"""MAV_FRAME_BODY_FRD: angles are relative to the nose."""
 _NORTH = (0, 1)
-"""MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED: from north."""
+"""MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED: angles are relative to north."""
 _SENSORS = 8
-"""So many are listened to, and as many messages within ``_OFTEN``."""
+"""Maximum number of sensors, and of messages within ``_OFTEN``."""
 _OFTEN = 20_000
-"""µs; what one sensor says sooner after its last, of the same sectors, is passed over."""
+"""µs; least interval between two messages of one sensor about the same sectors; others are skipped."""
 _LEAST_SECTOR = 1e-3
-"""rad."""
+"""rad; least width of a sector."""
 
 
 class Returns(NamedTuple):
-    """Directions (k,), rad clockwise from where the angles of a message begin, and ranges (k,), m, of what is
-    there, nearest first."""
+    """Directions (k,), rad, and ranges (k,), m, of the returns, nearest first.
+
+    Directions are clockwise from the zero direction of the message's angles.
+    """
 
     angles: Array
     ranges: Array
 
 
 class _Look(NamedTuple):
-    """Who says it, and of which sectors: a component may have several sensors of one type."""
+    """Sender and sectors of a message: a component may have several sensors of one type."""
 
     source: Source
     sensor: int
@@ -51,7 +54,7 @@ class _Look(NamedTuple):
 
 
 class _Post(NamedTuple):
-    """Its id, its place (m, fleet-local ENU) and radius (m), and when it was seen last, µs."""
+    """A post: id, position (m, fleet-local ENU), radius (m), and the time when it was last seen, µs."""
 
     id: int
     x: float
@@ -60,15 +63,15 @@ class _Post(NamedTuple):
     time: int
 
     def off(self, x: float, y: float) -> float:
-        """Square of the distance from there, m²."""
+        """Return the square of the distance (m²) to the point (``x``, ``y``)."""
         return (self.x - x) ** 2 + (self.y - y) ** 2
 
 
 def returns(scan: ObstacleDistance, reach: float) -> Returns | None:
-    """What is nearer than ``reach`` (m) and the sensor's own; None for a message that makes no sense.
+    """Return the returns nearer than ``reach`` (m) and the sensor's range; None for an invalid message.
 
-    What is nearer than the sensor measures counts as at its least distance. Sectors beyond a full circle
-    count for nothing.
+    Returns below the sensor's least distance are set to that distance. Sectors beyond a full circle are
+    ignored.
     """
     width = abs(scan.increment)
     if not width >= _LEAST_SECTOR or not 0.0 <= scan.min_distance <= scan.max_distance > 0.0:
@@ -85,8 +88,11 @@ def returns(scan: ObstacleDistance, reach: float) -> Returns | None:
 
 
 class Proximity:
-    """Of one vehicle. ``refused``: messages that made no sense, came from one sensor too many, or were more
-    than eight within 20 ms."""
+    """Posts from the distance sensors of one vehicle.
+
+    ``refused`` counts messages that were invalid, came from one sensor too many, or exceeded eight within 20
+    ms.
+    """
 
     def __init__(self, config: ProximityConfig) -> None:
         self._config = config
@@ -99,9 +105,11 @@ class Proximity:
     def receive(
         self, now: int, when: int, scan: ObstacleDistance, place: Array, zero: float, known: Array
     ) -> None:
-        """A message that arrived at ``now`` and was true at ``when`` (µs), with the vehicle at ``place`` (3,)
-        then, and its angles counting clockwise from ``zero`` (rad, ENU); ``known`` (K, 3): where neighbours
-        are."""
+        """Receive a message that arrived at ``now`` and was true at ``when`` (µs).
+
+        ``place`` (3,): the vehicle's position then; ``zero`` (rad, ENU): the direction from which its angles
+        count clockwise; ``known`` (K, 3): positions of neighbours, whose returns are ignored.
+        """
         sensor = scan.source, scan.sensor
         look = _Look(*sensor, scan.frame, scan.offset, scan.increment)
         self._lately = {one: heard for one, heard in self._lately.items() if now - heard < _OFTEN}
@@ -125,8 +133,10 @@ class Proximity:
         del self._posts[self._config.most :]
 
     def around(self, now: int, prediction: Array, reach: float) -> Axes:
-        """Those with their surface within ``reach`` (m) of some predicted position (n, 3), as high as
-        that."""
+        """Return the posts whose surface is within ``reach`` (m) of some predicted position (n, 3).
+
+        The posts' points are at the height of the prediction.
+        """
         self._forget(now)
         places = np.array([(post.x, post.y) for post in self._posts]).reshape(-1, 2)
         radii = np.array([post.radius for post in self._posts])
@@ -138,11 +148,15 @@ class Proximity:
         return Axes(tuple(self._posts[row].id for row in near), positions, radii[near])
 
     def silent(self, now: int) -> bool:
-        """Whether a sensor has been heard once, and none within ``age_us``."""
+        """Return whether any sensor has been received, but none within the last ``age_us``."""
         return bool(self._heard) and now - max(self._heard.values()) > self._config.age_us
 
     def _room(self, now: int) -> bool:
-        """For a sensor more: those that were last heard long ago make it."""
+        """Return whether another sensor can be accepted.
+
+        If there is no room, the sensor that has been silent longest is removed, provided that it has been
+        silent for ``age_us``.
+        """
         if len(self._heard) >= _SENSORS:
             oldest = min(self._heard, key=self._heard.__getitem__)
             if now - self._heard[oldest] <= self._config.age_us:
@@ -154,8 +168,11 @@ class Proximity:
         self._posts = [post for post in self._posts if now - post.time <= self._config.age_us]
 
     def _take(self, when: int, points: Array, radii: Array) -> None:
-        """Posts that are seen again go on with their ids, for methods remember on which side they pass one.
-        Returns near one that this message has told of already are that one."""
+        """Merge new returns into the posts.
+
+        A post that is seen again keeps its id, because avoidance methods remember on which side they pass it.
+        A return near a post of the same message becomes part of that post.
+        """
         old, new, near = self._posts, list[_Post](), self._config.spacing**2
         for (x, y), radius in zip(points.tolist(), radii.tolist(), strict=True):
             best = min(range(len(new)), key=lambda row: new[row].off(x, y), default=-1)

@@ -1,10 +1,10 @@
-"""Where a vehicle may be of which nothing has been heard for a while.
+"""Ball that contains a vehicle from which nothing has been received for a while.
 
-Its companion may have ended. Then the autopilot flies on by the last set-point until its time-out: at the
-velocity, and for a second with the acceleration, that this had. (ArduCopter 4.6.3 was measured to follow
-set-points that come once a second as well as those that come 50 times: so long it extrapolates both. For how
-much longer is not known; GUID_TIMEOUT is 3 s.) One that was about to turn flies on into somebody. Or it has
-stopped, as PX4 does after COM_OF_LOSS_T. So it is anywhere between: a ball that holds all of these places.
+Its companion may have ended. Then the autopilot continues on the last set-point until its time-out: at that
+set-point's velocity, and for one second with its acceleration. (Measured: ArduCopter 4.6.3 follows set-points
+at 1 Hz as well as at 50 Hz, so it extrapolates both for at least a second. How much longer is not known;
+GUID_TIMEOUT is 3 s.) A vehicle that was about to turn may then fly into another one. Or it has stopped, as
+PX4 does after COM_OF_LOSS_T. So it may be anywhere in between: the ball contains all of these places.
 """
 
 from __future__ import annotations
@@ -27,9 +27,12 @@ class Ball(NamedTuple):
 
 
 def flown_on(states: Array, accelerations: Array, seconds: Array, known: Array) -> Ball:
-    """Of vehicles with last ``states`` (M, 6), that meant to accelerate so (M, 3) then, ``seconds`` (M,) ago:
-    between where they were when they could still be ``known`` (M,), s, and where they may have been flown on
-    to."""
+    """Return balls that contain vehicles with last ``states`` (M, 6), ``seconds`` (M,) ago.
+
+    ``accelerations`` (M, 3), m/s²: planned at that time. Each ball reaches from the vehicle's position
+    ``known`` (M,) seconds after its last state, the last certain one, to where its autopilot may have flown
+    since.
+    """
     place, velocity = states[:, 0:3], states[:, 3:6]
     stopped = place + known[:, None] * velocity
     coasted = place + seconds[:, None] * velocity
@@ -39,11 +42,14 @@ def flown_on(states: Array, accelerations: Array, seconds: Array, known: Array) 
 
 
 def further(seconds: Array) -> Array:
-    """m for each m/s² by which who accelerated as long as that lasts is further after ``seconds`` (M,)."""
+    """Return the extra distance per unit of acceleration (s²) after ``seconds`` (M,).
+
+    The acceleration acts for ``_THRUSTING`` at most.
+    """
     burn = np.minimum(seconds, _THRUSTING)
     return np.asarray(burn * (seconds - 0.5 * burn), dtype=np.float64)
 
 
 def norms(vectors: Array) -> Array:
-    """Of vectors (…, 3)."""
+    """Return the norms (…) of ``vectors`` (…, 3)."""
     return np.asarray(np.sqrt(np.vecdot(vectors, vectors)), dtype=np.float64)

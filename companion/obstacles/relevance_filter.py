@@ -1,20 +1,22 @@
-"""Whom not to listen to for a moment: who is so far off that nothing it may say meanwhile could matter.
+"""Relevance filter: skips messages of neighbours too distant to affect the plan for a while.
 
-The bound. A vehicle acts on a plan where, at some time within the horizon H, it is nearer than ``reach``:
-what the field, the band and the angles reach when closing at c, the sum of both speeds. Neither is faster
-than the norm of ``limits.v_max``, or than it is measured to be. A neighbour whose last state is ``age`` old,
-at a distance d from here, is nearer by c·(S + P + H) and its own speed times ``age`` at most when plans that
-are made until S from now, and for P after that, end. So it is ignored for no longer than
+The bound: a neighbour affects a vehicle's plan if, at some time within the horizon H, it is nearer than
+``reach``: the distance at which the field, the band and the angles act when closing at c, the sum of both
+speeds. Neither vehicle is faster than the norm of ``limits.v_max``, or than its measured speed. Consider a
+neighbour at a distance d whose last state is ``age`` old, with a speed v. Until the end of the plans that are
+made within S + P from now, it approaches by at most c·(S + P + H) + v·``age``. So it is ignored for at most
 
     S = (d − reach(c) − v·age) / c − P − H
 
-P are two periods of messages like our own: one may be lost, and still it is heard in time. Nobody is ignored
-for longer than ``_LONGEST`` after it was heard: ages that are shown stay those of a neighbour that is there.
+P is two message periods of the own vehicle: one message may be lost, and the next one is still received in
+time. No neighbour is ignored for longer than ``_LONGEST`` after its last message: the displayed ages remain
+those of a neighbour that is present.
 
-Only those are ignored whose word counts (``familiars``) and who were not measured to be faster than the
-limits, and nobody where the own place is not known. Who is level with the own place in the plane is laid
-before the planner from any height, as landing is straight down. The certified mode hears and sees all, since
-there what somebody promised counts, not where it is; so does the swivel, which weighs all bearings.
+Only trusted peers (``trusted_peers``) that were not measured to be faster than the limits are ignored, and
+none while the own position is unknown. Neighbours above or below the own position are passed to the planner
+from any height, because vehicles land straight down. The certified mode receives and uses all messages, since
+there the commitments of a neighbour count and not its position; so does the swivel method, which uses all
+bearings.
 """
 
 from __future__ import annotations
@@ -33,13 +35,16 @@ from companion.values.horizon import Array
 
 Ages = NDArray[np.int64]
 _LONGEST = 700_000
-"""µs of age; an autopilot is taken for its vehicle's only voice after a second without its companion's."""
+"""µs of age; after a second without its companion an autopilot counts as its vehicle's only sender."""
 _OFF_PLAN = 1.0
-"""m by which a plan that counts may begin beside its sender's track."""
+"""m by which a trusted plan may begin beside its sender's track."""
 
 
 class RelevanceFilter:
-    """Of one companion. All times µs on its clock; ``now`` has to be set before headers are asked about."""
+    """Relevance filter of one companion.
+
+    All times are µs on its clock; ``now`` must be set before headers are checked.
+    """
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
@@ -50,7 +55,7 @@ class RelevanceFilter:
             _LONGEST, config.neighbour.extrapolate_us, config.guard.neighbour_lost_us // 4
         )
         self._shown = max(config.neighbour.extrapolate_us, config.guard.flown_on_us)
-        # By so much (m) may who has fallen silent have been driven off its course.
+        # Distance (m) by which a silent vehicle may have been accelerated off its course.
         self._driven = config.limits.a_total * float(further(np.array(1e-6 * config.guard.flown_on_us)))
         self._stale = config.guard.plan_stale_us
         self._closing = 2.0 * self._fastest
@@ -62,12 +67,12 @@ class RelevanceFilter:
         self.use(config.methods)
 
     def use(self, methods: Sequence[MethodName]) -> None:
-        """The planner goes by these ``methods`` now."""
+        """Adapt to the ``methods`` that the planner uses from now on."""
         self._all = self._config.avoidance == "certified" or "swivel" in methods
         self._until.clear()
 
     def ignores(self, sender: int) -> bool:
-        """Whether what this system says of where it is and will be need not be decoded now."""
+        """Return whether position and plan messages of this system need not be decoded now."""
         return self._until.get(sender, 0) > self.now
 
     def look(
@@ -78,9 +83,12 @@ class RelevanceFilter:
         ages: Ages,
         familiar: Callable[[], NDArray[np.bool_]],
     ) -> None:
-        """Find out whom to ignore from ``now`` on. ``states`` (M, 6) are the others' last positions and
-        velocities, fleet-local ENU, ``ages`` (M,) µs. ``familiar`` is asked whose word counts (M,), if there
-        is anybody to be ignored."""
+        """Determine the systems to ignore from ``now`` on.
+
+        ``states`` (M, 6) are the others' last positions (m) and velocities (m/s), fleet-local ENU; ``ages``
+        (M,) in µs. ``familiar`` returns which of them (M,) are trusted; it is called only if there is a
+        candidate.
+        """
         self._until.clear()
         if self._all or own is None or own.age > self._config.guard.own_stale_us or not len(states):
             return
@@ -90,7 +98,7 @@ class RelevanceFilter:
         if apart.max() <= self._certainly:
             return
         age = 1e-6 * np.maximum(ages, 0)
-        # What is known of the own place may be old as well.
+        # The own state may be old as well.
         spare = apart - self._certainly - self._fastest * (age + 1e-6 * max(own.age, 0)) - _OFF_PLAN
         silence = np.minimum(spare / self._closing - self._silence, self._longest - age)
         silence[norms(states[:, 3:6]) > self._fastest] = 0.0
@@ -102,9 +110,11 @@ class RelevanceFilter:
             self._until[ids[row]] = int(until[row])
 
     def near(self, places: Array, states: Array, ages: Ages) -> NDArray[np.bool_]:
-        """Which (M,) of the others can act on a plan that is made at one of ``places`` (P, 3) now: all whose
-        states (M, 6) of ``ages`` (M,) µs are within the bound for S = P = 0 of one, and whom a vehicle that
-        lands there would come down on."""
+        """Return which (M,) of the others can affect a plan that is made now at one of ``places`` (P, 3).
+
+        These are all whose ``states`` (M, 6) of ``ages`` (M,) µs are within the bound with S = P = 0 of one
+        of the places, and those onto which a vehicle that lands there would descend.
+        """
         off = states[:, None, 0:3] - places
         apart = norms(off).min(axis=1)
         near: NDArray[np.bool_] = (apart <= self._certainly) | self._all
@@ -118,8 +128,10 @@ class RelevanceFilter:
         return np.asarray(near | below)
 
     def _reach(self, closing: Array | float) -> Array:
-        """How near (m, between centres) two have to come before one acts on the other when they close at
-        ``closing`` m/s."""
+        """Return the distance (m, between centres) at which two vehicles act on each other.
+
+        ``closing`` (m/s): their closing speed.
+        """
         config = self._config
         field, band = config.field, config.tangential
         braking = np.zeros_like(closing)

@@ -1,5 +1,7 @@
-"""Obstacles from messages, beside those of the configuration and those that speak for themselves: what the
-own sensors see, and traffic."""
+"""Obstacles from the own sensors and from traffic reports.
+
+They supplement the configured obstacles and the moving ones that report their own positions.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,10 @@ _NEAR = 1e-6
 
 
 class Stance(NamedTuple):
-    """How the vehicle was at ``time`` (µs): its place (3,) m; where its nose pointed and where its north is,
-    rad, counter-clockwise from the fleet's east. ``yaw`` is None where nobody knows."""
+    """Pose of the vehicle at ``time`` (µs): position (3,) m, and directions of nose and north, rad.
+
+    The directions are counter-clockwise from the fleet's east. ``yaw`` is None where it is unknown.
+    """
 
     time: int
     place: Array
@@ -31,7 +35,7 @@ class Stance(NamedTuple):
 
 
 class Sensed:
-    """Of one vehicle. Without settings for a kind its messages are ignored."""
+    """Sensed obstacles of one vehicle; messages of a kind without settings are ignored."""
 
     def __init__(self, config: CompanionConfig, fleet: FleetFrame) -> None:
         self._config, self._fleet = config, fleet
@@ -39,21 +43,26 @@ class Sensed:
         self.traffic = None if config.traffic is None else Traffic(config.traffic)
 
     def receive_distances(self, now: int, message: ObstacleDistance, stance: Stance, known: Array) -> None:
-        """OBSTACLE_DISTANCE of an own sensor, with the vehicle as it was when that was true; ``known`` (K,
-        3): where neighbours are."""
+        """Receive OBSTACLE_DISTANCE from an own sensor.
+
+        ``stance``: the vehicle's pose when the message was true; ``known`` (K, 3): positions of neighbours.
+        """
         zero = stance.yaw if message.frame == BODY else stance.north
         if self.proximity is not None and zero is not None:
             self.proximity.receive(now, stance.time, message, stance.place, zero, known)
 
     def receive_traffic(self, now: int, message: AdsbVehicle, here: Array) -> None:
-        """ADSB_VEHICLE, while the own vehicle is ``here`` (3,)."""
+        """Receive ADSB_VEHICLE, with the own vehicle at ``here`` (3,)."""
         if self.traffic is not None:
             height = self._fleet.altitude if message.altitude is None else message.altitude
             place = self._fleet.to_enu(message.latitude, message.longitude, height)
             self.traffic.receive(now, message, place, here)
 
     def around(self, now: int, prediction: Array, reach: float) -> Axes:
-        """All of them within ``reach`` (m) of some predicted position (n, 3): the points nearest to these."""
+        """Return all sensed obstacles within ``reach`` (m) of some predicted position (n, 3).
+
+        Each is given by its points nearest to these.
+        """
         parts = [
             part.around(now, prediction, reach) for part in (self.proximity, self.traffic) if part is not None
         ]
@@ -63,10 +72,11 @@ class Sensed:
         return Axes(sum(ids, ()), np.concatenate(positions), np.concatenate(radii))
 
     def obstacles(self, now: int, prediction: Array, reach: float) -> Obstacles:
-        """The same as the field sees them, (n, 3) the own prediction.
+        """Return the same obstacles for the field; ``prediction`` (n, 3) is the own one.
 
-        Deep in the room of traffic the field would push with all that the vehicle has, over any limit of
-        speed. So that room ends, for the field, where it pushes gently; ``aside`` leads out of it.
+        Deep inside the keep-out volume of traffic the field would push with the full acceleration of the
+        vehicle, beyond any speed limit. So for the field that volume ends where the push is gentle; ``aside``
+        leads out of it.
         """
         ids, positions, radius = self.around(now, prediction, reach)
         field = self._config.field
@@ -81,8 +91,10 @@ class Sensed:
         return Obstacles(ids, positions, field.d_min + radius, field.d_safe + radius, radius)
 
     def aside(self, now: int, goal: Array, here: Array) -> Array:
-        """The ``goal`` (3,), or a place nearby where the vehicle, which is ``here`` (3,), is in the way of no
-        traffic."""
+        """Return the ``goal`` (3,), or a place nearby that is clear of all traffic.
+
+        ``here`` (3,) is the position of the vehicle.
+        """
         if self.traffic is None or not len(self.traffic):
             return goal
         field = self._config.field

@@ -1,8 +1,8 @@
-"""Fixed obstacles that every companion knows: spheres, and posts that stand on the ground.
+"""Fixed obstacles that every companion is configured with: spheres, and posts on the ground.
 
-For the field and its methods each is a point at its axis (a sphere: its centre) that is ``radius`` larger:
-the point of the axis nearest to where the vehicle will be, so that the force is horizontal beside a post and
-points up above it.
+For the field and its methods each is a point on its axis (for a sphere: its centre) that is enlarged by
+``radius``. It is the point of the axis nearest to the predicted position, so that the force is horizontal
+beside a post and points up above it.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ FIRST_ID = 1000
 
 
 class Axes(NamedTuple):
-    """Obstacles near a vehicle: ids (M,), the nearest points of their axes (M, N + 1, 3) and radii (M,),
-    m."""
+    """Obstacles near a vehicle: ids (M,), nearest points of their axes (M, N + 1, 3) and radii (M,), m."""
 
     ids: tuple[int, ...]
     positions: Array
@@ -29,7 +28,7 @@ class Axes(NamedTuple):
 
 
 class FixedObstacles:
-    """All fixed obstacles as arrays: x, y of the axis (M, 2), the z that it spans (M,), radius (M,)."""
+    """All fixed obstacles as arrays: x, y of the axis (M, 2), its range of z (M,), radius (M,); m."""
 
     def __init__(self, obstacles: tuple[Sphere | Post, ...]) -> None:
         self._ids = np.arange(FIRST_ID, FIRST_ID + len(obstacles))
@@ -43,8 +42,11 @@ class FixedObstacles:
         return len(self._radius)
 
     def around(self, prediction: Array, reach: float) -> Axes:
-        """Those with their surface within ``reach`` (m, horizontally) of some predicted position (N + 1,
-        3)."""
+        """Return the obstacles near the predicted positions (N + 1, 3).
+
+        These are all whose surface, seen from above, reaches the bounding rectangle of the predicted
+        positions, extended by ``reach`` (m).
+        """
         low, high = prediction[:, :2].min(axis=0) - reach, prediction[:, :2].max(axis=0) + reach
         off = np.maximum(np.maximum(low - self._xy, self._xy - high), 0.0)
         near = np.flatnonzero((off * off).sum(axis=1) <= self._radius**2)
@@ -54,18 +56,17 @@ class FixedObstacles:
         return Axes(tuple(self._ids[near].tolist()), positions, self._radius[near])
 
     def distance(self, positions: Array) -> Array:
-        """From points (…, 3) to every surface (…, M), m; negative inside."""
+        """Return the distances (…, M), m, from points (…, 3) to every surface; negative inside."""
         off = positions[..., None, :2] - self._xy
         above = positions[..., 2, None] - self._high
         return to_surface(np.sqrt(np.vecdot(off, off)), above, self._ball, self._radius)
 
 
 def to_surface(across: Array, above: Array, ball: NDArray[np.bool_], radius: Array) -> Array:
-    """Distances (…, M) of points from the surfaces of spheres (where ``ball`` (M,)) and posts of ``radius``
-    (M,), m; negative inside.
+    """Return the distances (…, M), m, of points from the surfaces of spheres and posts; negative inside.
 
-    The points are ``across`` (…, M) from the axes and ``above`` (…, M) a sphere's centre or a post's top,
-    which is flat.
+    ``ball`` (M,): which are spheres; ``radius`` (M,), m. The points are ``across`` (…, M) from the axes and
+    ``above`` (…, M) a sphere's centre or a post's top, which is flat.
     """
     beside = across - radius
     outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(above, 0.0) ** 2)

@@ -1,9 +1,10 @@
-"""Other traffic, as an ADS-B receiver tells of it (ADSB_VEHICLE): balls that fly straight on.
+"""Other traffic reported by an ADS-B receiver (ADSB_VEHICLE): spheres that fly straight on.
 
-It gives way to nobody, and is much faster than those who see it. So it is not the ball of now that is kept
-away from but all the way that it flies in the next ``ahead_us``: who is near that goes aside, not along. What
-it does beyond flying straight on is seen with its next message. Its height is known only within
-``height_error``, by pressure or by another geoid than ours; it counts as at the nearest height within that.
+Traffic does not give way, and is much faster than the vehicles here. So the vehicle keeps away not from the
+present sphere but from the whole path of the next ``ahead_us``, and a vehicle near that path moves to the
+side of it, not along it. A deviation from the straight line shows only in the next message. The height is
+known only within ``height_error``, because it is a pressure altitude or refers to another geoid; the nearest
+height within that range is used.
 """
 
 from __future__ import annotations
@@ -19,20 +20,23 @@ from companion.values.horizon import Array
 from mavlink_bridge.messages import AdsbVehicle
 
 FIRST_ID = 1 << 32
-"""Ids of traffic: above all others."""
+"""Ids of traffic begin here: above all others."""
 _FASTEST, _CLIMBS = 350.0, 60.0
-"""m/s; beyond these, and beyond ``_HIGHEST`` (m), it is garbage."""
+"""m/s; reports beyond these, or beyond ``_HIGHEST`` (m), are rejected as garbage."""
 _HIGHEST = 30_000.0
 _STRAYS = 300.0
-"""m; one address that is further off than flying explains is two, and the first one counts."""
+"""m; tolerance on the distance between positions of one address beyond what flying explains.
+
+Beyond it they belong to two aircraft, and the first one is kept.
+"""
 _HEAD_ON = 1.0
-"""m; so near to its way it does not say to which side to go, and one goes to its right."""
+"""m; nearer to the path than this, the side is undefined: the vehicle evades to the aircraft's right."""
 _NEAR = 1e-6
 _EAST = np.array([1.0, 0.0])
 
 
 class _Aircraft(NamedTuple):
-    """It was at ``place`` (3,) m with ``velocity`` (3,) m/s at ``when`` (µs), ± ``half`` (m) in height."""
+    """State at ``when`` (µs): ``place`` (3,) m, its height ± ``half`` (m), and ``velocity`` (3,) m/s."""
 
     when: int
     place: Array
@@ -41,7 +45,7 @@ class _Aircraft(NamedTuple):
 
 
 class Traffic:
-    """All that is heard, by address. ``refused``: messages that made no sense, or were beyond what counts."""
+    """All received aircraft, by address; ``refused`` counts messages that were invalid or out of range."""
 
     def __init__(self, config: TrafficConfig) -> None:
         self._config = config
@@ -52,16 +56,20 @@ class Traffic:
         return len(self._heard)
 
     def receive(self, now: int, message: AdsbVehicle, place: Array, here: Array) -> bool:
-        """A message that arrived at ``now`` (µs), of traffic at ``place`` (3,) m, fleet-local ENU, while the
-        own vehicle is ``here`` (3,); whether it counts."""
+        """Receive a message that arrived at ``now`` (µs); return whether it was accepted.
+
+        The aircraft is at ``place`` (3,) m, the own vehicle at ``here`` (3,) m, both fleet-local ENU.
+        """
         self._forget(now)
         taken = message.address not in self._config.ignore and self._take(now, message, place, here)
         self.refused += not taken
         return taken
 
     def around(self, now: int, prediction: Array, reach: float) -> Axes:
-        """The nearest points of the ways of those whose room begins within ``reach`` (m) of some predicted
-        position (n, 3)."""
+        """Return the nearest path points of all aircraft near the predicted positions (n, 3).
+
+        Near means that the keep-out volume begins within ``reach`` (m) of some predicted position.
+        """
         self._forget(now)
         ids, positions = [], []
         for address, one in self._heard.items():
@@ -74,13 +82,16 @@ class Traffic:
         return Axes(tuple(ids), places, np.full(len(ids), self._config.radius))
 
     def outside(self, now: int, goal: Array, here: Array, clearance: float) -> Array:
-        """The ``goal`` (3,), or a place as high beside the ways that it lies on, ``clearance`` (m) beyond
-        their room and on the side where the vehicle is: it flies there, and is not pushed."""
+        """Return the ``goal`` (3,), or a place of the same height beside the paths that it lies on.
+
+        That place is ``clearance`` (m) outside their keep-out volumes, on the side where the vehicle is: the
+        vehicle flies there, and is not pushed by the field.
+        """
         room = self._config.radius + clearance
         for there, beside in self.around(now, np.stack([goal, here]), clearance).positions:
             off, own = goal - there, here - beside
             if off @ off < room**2:
-                # Never up or down: below it may be the ground.
+                # Never up or down: there may be ground below.
                 ways = (own, off) if own @ own < room**2 else (off, own)
                 way = next((way[:2] for way in ways if hypot(way[0], way[1]) > _NEAR), _EAST)
                 goal = np.append(there[:2] + way * (room / hypot(way[0], way[1])), goal[2])
@@ -111,7 +122,10 @@ class Traffic:
         return True
 
     def _make_room(self, off: Array, here: Array) -> bool:
-        """Whether the furthest of all goes for one that is ``off`` (2,) from ``here``."""
+        """Remove the aircraft furthest from ``here`` for a nearer one; return whether that was done.
+
+        ``off`` (2,), m: position of the new one relative to ``here``.
+        """
         far = {address: float(np.hypot(*(one.place - here)[:2])) for address, one in self._heard.items()}
         furthest = max(far, key=far.__getitem__)
         if far[furthest] <= float(np.hypot(*off)):
@@ -120,7 +134,7 @@ class Traffic:
         return True
 
     def _nearest(self, now: int, one: _Aircraft, prediction: Array) -> Array:
-        """The points (n, 3) of its way that are nearest to ``prediction`` (n, 3), seen from above."""
+        """Return the path points (n, 3) that are nearest to ``prediction`` (n, 3), seen from above."""
         begin = one.place + 1e-6 * (now - one.when) * one.velocity
         way = 1e-6 * self._config.ahead_us * one.velocity
         off = prediction - begin

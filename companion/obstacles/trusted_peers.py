@@ -1,8 +1,8 @@
-"""Whose word of where it is may be taken for a moment: who shares a plan, is where that says, and has said
-nothing else for a while.
+"""Neighbours whose reported position is trusted for a moment.
 
-A vehicle of which two things are said, by a receiver that jumps or by somebody who speaks in its name, may
-be at either place; and one that shares no plan flies by no limits that are known.
+A trusted neighbour shares a plan, is where the plan says, and has not contradicted itself for a while. A
+vehicle with contradictory reports, caused by a receiver that jumps or by another sender with its id, may be
+at either place; and one that shares no plan is not bound by any known limits.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from companion.estimation.tracks import Track
 from companion.values.horizon import Array, Located
 
 _STEADY = 3_000_000
-"""µs for which a track has to have taken all that was said."""
+"""µs for which a track must have accepted all measurements."""
 _FRESH = 2_000_000
-"""µs that a plan may be older than its sender's last state."""
+"""µs by which a plan may be older than its sender's last state."""
 _BESIDE = 1.0
-"""m by which the plan may pass beside it."""
+"""m by which the plan may pass beside that state."""
 
 
 class _Story(NamedTuple):
@@ -29,15 +29,18 @@ class _Story(NamedTuple):
 
 
 class TrustedPeers:
-    """Those of one companion, row by row as it keeps their last states."""
+    """Trust of one companion in its neighbours, in the order of the rows of their last states."""
 
     def __init__(self) -> None:
         self._stories: list[_Story] = []
         self._since = np.zeros(0, dtype=np.int64)
 
     def note(self, now: int, row: int, track: Track) -> None:
-        """The vehicle of ``row``, which is one of those there are or the next, was heard at ``now`` (µs). To
-        be told of every message that its track was given, or one that was refused or doubted is missed."""
+        """Record that a message of the vehicle of ``row`` was received at ``now`` (µs).
+
+        ``row`` is an existing one or the next one. It must be called for every message that was given to the
+        track; otherwise a refused or doubted measurement is missed.
+        """
         story = _Story(track, track.refused)
         if row == len(self._stories):
             self._stories.append(story)
@@ -49,8 +52,11 @@ class TrustedPeers:
             self._since[row] = now
 
     def trusted(self, now: int, states: Array, plans: Located) -> NDArray[np.bool_]:
-        """Which of them are (M,) at ``now`` (µs). ``states`` (M, 6): their last; ``plans``: where each one's
-        plan was when that was true."""
+        """Return which neighbours (M,) are trusted at ``now`` (µs).
+
+        ``states`` (M, 6): their last states; ``plans``: each one's planned position at the time of that
+        state.
+        """
         off = plans.positions - states[:, 0:3]
         there = (plans.after >= -plans.dt) & (plans.after <= _FRESH) & (np.vecdot(off, off) <= _BESIDE**2)
         return np.asarray(there & (now - self._since >= _STEADY))

@@ -1,4 +1,4 @@
-"""How far the others may be from where they say that they are, as they tell it beside their positions."""
+"""Position uncertainty of neighbours, as they report it in addition to their positions."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from companion.values.horizon import Array
 from mavlink_bridge.wire.uncertainty import unpack
 
 _LASTS = 3_000_000
-"""µs for which what was told counts; it is told with every position while there is something to tell."""
+"""µs for which a report is valid; it is sent with every position while the uncertainty lasts."""
 _MOST = 10.0
-"""m; nobody keeps further away because somebody says so."""
+"""m; upper bound of a reported uncertainty: distances do not grow by more."""
 
 
 class ReportedUncertainty:
-    """By system id."""
+    """Reported uncertainties, by system id."""
 
     def __init__(self) -> None:
         self._told: dict[int, tuple[int, float]] = {}
 
     def receive(self, now: int, system: int, payload: bytes) -> None:
-        """What came in a TUNNEL at ``now`` (µs). Raises PlanWireError for what is none."""
+        """Receive a TUNNEL payload at ``now`` (µs); raises PlanWireError if it is not valid."""
         radius = min(unpack(payload), _MOST)
         if radius > 0.0:
             self._told[system] = now, radius
@@ -30,7 +30,7 @@ class ReportedUncertainty:
             self._told.pop(system, None)
 
     def systems(self, now: int) -> frozenset[int]:
-        """Who may be elsewhere at ``now`` (µs)."""
+        """Return the systems with a valid report at ``now`` (µs)."""
         if self._told:
             gone = [system for system, (time, _) in self._told.items() if now - time > _LASTS]
             for system in gone:
@@ -38,5 +38,5 @@ class ReportedUncertainty:
         return frozenset(self._told)
 
     def radii(self, ids: Iterable[int]) -> Array:
-        """How far (m) each of ``ids`` may be off, (M,)."""
+        """Return the uncertainty (m) of each of ``ids``, (M,); 0 without a report."""
         return np.array([self._told[system][1] if system in self._told else 0.0 for system in ids])

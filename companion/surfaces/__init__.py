@@ -1,9 +1,9 @@
-"""Destination surfaces around a target (Sec. III-A: "our approach can attain any desired 3D destination
-surface").
+"""Destination surfaces around a target: takes offsets from the target, gives the surface's nearest points.
 
-A surface is a set of offsets from the target, fleet-local ENU, m. The destination is its point nearest to the
-vehicle, x̌ = x_P + nearest(x_R − x_P): of the paper's circle that is the paper's formula. Which kind it is and
-how large stands in the configuration, for each vehicle if need be.
+The paper allows any of them (Sec. IV-A: "our approach can attain any desired 3D destination surface"). A
+surface is a set of offsets from the target, fleet-local ENU, m. The destination is its point nearest to the
+vehicle, x̌ = x_P + nearest(x_R − x_P); for the paper's circle that is the paper's formula (Sec. III-B). The
+configuration sets kind and size, for each vehicle if needed.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ __all__ = ["Circle", "Cylinder", "Ellipsoid", "Parametric", "Sphere", "Surface",
 
 
 class Surface(Protocol):
-    """Where vehicles are to be around a target."""
+    """Surface around a target on which vehicles have their destinations."""
 
     def nearest(self, offset: Array) -> Array:
-        """The points (…, 3) of the surface that are nearest to offsets (…, 3) from the target, m."""
+        """Return the points (…, 3) of the surface nearest to offsets (…, 3) from the target, m."""
         ...
 
     def outline(self) -> Array:
-        """Points (n, 3) of a closed line on it, m: what is drawn of it from above."""
+        """Return points (n, 3) of a closed line on the surface, m, for drawing it from above."""
         ...
 
 
 def _kind(value: Any) -> str:
-    """Where no kind is said it is the paper's circle."""
+    """Return the kind of a surface; without one it is the paper's circle."""
     kind = value.get("kind", "circle") if isinstance(value, dict) else getattr(value, "kind", "circle")
     return str(kind)
 

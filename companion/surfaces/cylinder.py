@@ -1,4 +1,4 @@
-"""A vertical cylinder around the target."""
+"""Vertical cylinder around the target."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from companion.values.settings import Settings
 
 
 class Cylinder(Settings):
-    """All that is ``radius`` from the vertical through the target, between two heights."""
+    """All points at ``radius`` from the vertical through the target, between two heights."""
 
     kind: Literal["cylinder"]
     radius: float = Field(4.0, ge=0.0, le=100.0, description="m")
@@ -27,12 +27,12 @@ class Cylinder(Settings):
         return self
 
     def nearest(self, offset: Array) -> Array:
-        """Straight out at the same height, as far as the cylinder reaches."""
+        """Return the points straight outward at the same height, clipped to the cylinder's heights."""
         result = np.empty(offset.shape)
         result[..., 0], result[..., 1] = outward(offset, self.radius)
         result[..., 2] = np.clip(offset[..., 2], self.low, self.high)
         return result
 
     def outline(self) -> Array:
-        """The circle halfway up."""
+        """Return the circle halfway up."""
         return ring(self.radius, 0.5 * (self.low + self.high))

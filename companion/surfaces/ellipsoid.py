@@ -1,4 +1,4 @@
-"""An ellipsoid around a point above the target."""
+"""Ellipsoid around a point above the target."""
 
 from __future__ import annotations
 
@@ -13,27 +13,28 @@ from companion.values.settings import Settings
 
 _Axis = Annotated[float, Field(ge=0.1, le=100.0)]
 _HALVINGS = 80
-"""Bisections; the bracket then is narrower than a float can tell."""
+"""Number of bisections; the bracket is then narrower than a float can resolve."""
 
 
 class Ellipsoid(Settings):
-    """Semi-axes east, north, up about a centre ``height`` above the target."""
+    """Ellipsoid with semi-axes east, north, up about a centre ``height`` above the target."""
 
     kind: Literal["ellipsoid"]
     semi_axes: tuple[_Axis, _Axis, _Axis] = Field((6.0, 4.0, 2.0), description="m, east, north, up")
     height: float = Field(6.0, ge=-50.0, le=200.0, description="of the centre, m above the target")
 
     def nearest(self, offset: Array) -> Array:
-        """The foot of the perpendicular, inside or outside.
+        """Return the foot of the perpendicular, from inside or outside.
 
         With y the point from the centre and e the semi-axes, the foot is x_i = e_i² y_i/(t + e_i²), where t
-        is the largest root of Σ (e_i y_i/(t + e_i²))² = 1: it lies above −min e² and the sum falls there, so
-        that bisection finds it (D. Eberly, Distance from a Point to an Ellipse, an Ellipsoid, or a
+        is the largest root of Σ (e_i y_i/(t + e_i²))² = 1. The root lies above −min e² and the sum decreases
+        there, so that bisection finds it (D. Eberly, Distance from a Point to an Ellipse, an Ellipsoid, or a
         Hyperellipsoid).
         """
         e = np.asarray(self.semi_axes)
         y = offset - (0.0, 0.0, self.height)
-        # In a plane of symmetry inside, the foot may leave the plane: a nudge decides to which side.
+        # For a point inside, in a plane of symmetry, the foot may leave the plane: a small offset selects the
+        # side.
         y = np.where(np.abs(y) < 1e-9 * e, 1e-9 * e, y)
         low = np.max(e * np.abs(y) - e**2, axis=-1)
         high = np.linalg.norm(e * y, axis=-1) - float(np.min(e)) ** 2
@@ -47,6 +48,6 @@ class Ellipsoid(Settings):
         return foot
 
     def outline(self) -> Array:
-        """Its widest horizontal section."""
+        """Return the widest horizontal section."""
         a, b, _ = self.semi_axes
         return np.column_stack([a * np.cos(TURNS), b * np.sin(TURNS), np.full(len(TURNS), self.height)])

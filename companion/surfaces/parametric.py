@@ -1,9 +1,9 @@
-"""A user's own surface, as a Python function of two parameters.
+"""Surface of a user, as a Python function of two parameters.
 
 A package that is installed beside this one offers the function as an entry point of the group
-``outrider.surfaces``; a configuration can name no other code. It is called with arrays u and v (n,) in 0…1
-and the ``parameters`` of the configuration as keywords, and returns offsets (n, 3) from the target,
-fleet-local ENU, m; it must be continuous.
+``outrider.surfaces``; a configuration can name no other code. The function takes arrays u and v (n,) in 0…1,
+and the ``parameters`` of the configuration as keywords. It returns offsets (n, 3) from the target,
+fleet-local ENU, m, and must be continuous.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ GROUP = "outrider.surfaces"
 _GRID = 48
 _AROUND = np.linspace(-1.0, 1.0, 7)
 _ROUNDS = 9
-"""Each narrows the search to a third: the last step is 2e-6 of the parameters' range."""
+"""Number of search rounds; each narrows the step to a third, to 1e-6 of the parameters' range at the end."""
 
 Function = Callable[..., Any]
 
 
 class Parametric(Settings):
-    """The points of a function of u and v."""
+    """Surface of the points of a function of u and v."""
 
     kind: Literal["parametric"]
     function: str = Field(min_length=1, max_length=200, description=f"an entry point of {GROUP}")
@@ -45,12 +45,12 @@ class Parametric(Settings):
         return self
 
     def nearest(self, offset: Array) -> Array:
-        """By search: the nearest of a grid, and then of finer and finer ones around it."""
+        """Return the nearest points by search: on a grid, and then on finer and finer grids around its best point."""
         flat = offset.reshape(-1, 3)
         return np.array([self._nearest(one) for one in flat]).reshape(offset.shape)
 
     def outline(self) -> Array:
-        """Where v is halfway."""
+        """Return the line at v = 0.5."""
         u = np.linspace(0.0, 1.0, 73)
         return _points(self._name, u, np.full(len(u), 0.5))
 
@@ -92,11 +92,11 @@ def _function(name: str) -> Function:
 
 
 def _points(name: _Name, u: Array, v: Array) -> Array:
-    """Points (n, 3) of the function. Raises SurfaceError if it does not give them."""
+    """Return points (n, 3) of the function; raises SurfaceError if it does not give them."""
     function, parameters = _function(name[0]), dict(name[1])
     try:
         points = np.asarray(function(u, v, **parameters), dtype=np.float64)
-    except Exception as error:  # a user's code may raise anything; who uses it is told what
+    except Exception as error:  # a user's code may raise anything; the error tells what
         raise SurfaceError(f"{name[0]} failed: {type(error).__name__}: {error}") from error
     if points.shape != (len(u), 3):
         raise SurfaceError(f"{name[0]} gives an array {points.shape}; allowed is ({len(u)}, 3)")
@@ -107,7 +107,7 @@ def _points(name: _Name, u: Array, v: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _grid(name: _Name) -> tuple[Array, Array]:
-    """Parameters (n, 2) and points (n, 3) to begin a search from."""
+    """Return parameters (n, 2) and points (n, 3) from which a search starts."""
     line = np.linspace(0.0, 1.0, _GRID + 1)
     uv = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
     return uv, _points(name, uv[:, 0], uv[:, 1])

@@ -1,4 +1,4 @@
-"""A sphere around a point above the target, or the part of it above a height."""
+"""Sphere around a point above the target, or its part above a height."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NEAR = 1e-9
 
 
 class Sphere(Settings):
-    """All that is ``radius`` from the centre and not below ``lowest``."""
+    """All points at ``radius`` from the centre and not below ``lowest``."""
 
     kind: Literal["sphere"]
     radius: float = Field(4.0, gt=0.0, le=100.0, description="m")
@@ -29,10 +29,10 @@ class Sphere(Settings):
         return self
 
     def nearest(self, offset: Array) -> Array:
-        """In the direction from the centre; from below ``lowest``, on the circle there."""
+        """Return the points in the direction from the centre; where they are below ``lowest``, those on its circle."""
         away = offset - (0.0, 0.0, self.height)
         distance = np.linalg.norm(away, axis=-1, keepdims=True)
-        # From the centre all are equally near; straight up nobody is in the way.
+        # From the centre all points are equally near; straight up is free of other vehicles.
         away = np.where(distance < _NEAR, (0.0, 0.0, 1.0), away / np.maximum(distance, _NEAR))
         result: Array = self.radius * away
         result[..., 2] += self.height
@@ -48,7 +48,7 @@ class Sphere(Settings):
         return result
 
     def outline(self) -> Array:
-        """Its widest circle."""
+        """Return the widest circle."""
         low = max(self.lowest, self.height)
         return ring(float(np.sqrt(self.radius**2 - (low - self.height) ** 2)), low)
 

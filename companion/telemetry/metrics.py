@@ -1,4 +1,4 @@
-"""Figures that a ground station can plot: NAMED_VALUE_FLOAT, once a second."""
+"""Metrics for ground stations: NAMED_VALUE_FLOAT, once a second."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ _SECOND = 1_000_000
 
 
 class Metrics:
-    """Of the companion ``own``. ``plan_ms``: the longest plan since the last time; ``misses``: plans so far
-    that took longer than their period; ``held``: times that an old plan was kept; ``target_s``: age of what
-    is known of the target, absent before it is heard."""
+    """Metrics of the companion ``own``.
+
+    ``plan_ms``: the longest planning time since the last report; ``misses``: total number of plans that took
+    longer than their period; ``held``: total number of times that an old plan was kept; ``target_s``: age of
+    the last measurement of the target, absent before the first.
+    """
 
     def __init__(self, config: CompanionConfig, own: Source) -> None:
         certified = config.avoidance == "certified"
@@ -24,13 +27,16 @@ class Metrics:
         self._longest: int | None = None
 
     def note(self, plan_ns: int) -> None:
-        """A plan took so long (ns)."""
+        """Record the time ``plan_ns`` (ns) that a plan took."""
         self._longest = max(self._longest or 0, plan_ns)
         self._misses += plan_ns > self._period_ns
 
     def due(self, now: int, held: int, target_age: int | None) -> list[NamedValue]:
-        """The figures, if it is time (µs): of the plans noted, the old plans ``held`` so far, and the
-        target's age (µs)."""
+        """Return the metrics if they are due at ``now`` (µs), otherwise an empty list.
+
+        ``held``: number of times that an old plan was kept so far; ``target_age``: age (µs) of the target's
+        state, None before the first.
+        """
         if not self._on or now < self._next:
             return []
         if self._boot is None:

@@ -1,4 +1,4 @@
-"""What a companion listens to, by link: asked of each frame's header before anything is decoded."""
+"""Header filters of a companion's links, applied to each frame before anything is decoded."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from companion.config.target_source import CameraSource, message_of, speaker_of
 from companion.values.components import AUTOPILOT
 
 _DISTANCES, _TRAFFIC = 330, 246
-"""Sensors of the own system may be on both links; traffic may be told by anybody on the swarm's."""
+"""Message ids of distance sensors and of traffic.
+
+Sensors of the own system may send on both links; traffic may come from any sender on the swarm link.
+"""
 _PARAMETER = 22
 _WHERE = {33, 385}
-"""What a neighbour says of where it is and will be: not decoded while it is out of earshot."""
+"""Messages with a neighbour's position and plan: not decoded while the relevance filter ignores it."""
 _WANTED = {
     "autopilot": {0, 1, 24, 30, 32, 49, 77, 111, 193, 230, 245, 253},
     "swarm": {33, 111, 385},
@@ -29,9 +32,12 @@ def accepts(
     config: CompanionConfig,
     ignores: Callable[[int, int], bool] = lambda _sender, _component: False,
 ) -> Callable[[int, int, int], bool]:
-    """Header filter of a link of the companion of ``system``, whose target has the system id ``target``: the
-    messages wanted there, from whom they may come. ``ignores``: what sender and component on the swarm link
-    are out of earshot."""
+    """Return the header filter of a link of the companion of ``system``.
+
+    It takes message id, sender and component, and returns whether the message is wanted there and may come
+    from that sender. ``target`` is the system id of the target. ``ignores`` takes sender and component on the
+    swarm link and returns whether their positions and plans are to be ignored.
+    """
     wanted = _WANTED.get(link, set())
     if link == "autopilot" and config.limits_from_autopilot:
         wanted = wanted | {_PARAMETER}

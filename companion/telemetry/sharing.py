@@ -1,7 +1,7 @@
-"""What the others need to know: own GLOBAL_POSITION_INT and horizon on the swarm link, a heartbeat on both
-links.
+"""Messages to the others: position and horizon on the swarm link, a heartbeat on both links.
 
-The position is always sent besides the horizon: any MAVLink listener understands it.
+The position (GLOBAL_POSITION_INT) is always sent in addition to the horizon, because every MAVLink receiver
+understands it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mavlink_bridge.wire.uncertainty import pack as pack_doubt
 ONBOARD_CONTROLLER, AUTOPILOT_INVALID, ACTIVE = 18, 8, 4
 _SECOND = 1_000_000
 _TAKES_BACK = 3_000_000
-"""µs for which it is said that there is no doubt any more."""
+"""µs after the last position uncertainty during which an uncertainty of 0 is sent."""
 
 
 class Shared(NamedTuple):
@@ -32,7 +32,7 @@ class Shared(NamedTuple):
 
 
 class Sharing:
-    """Sends each kind at its own period, on its own schedule."""
+    """Sends each kind of message at its own period."""
 
     def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
         self._config = config
@@ -44,12 +44,15 @@ class Sharing:
 
     @property
     def next_due(self) -> int:
-        """When (µs) there is something to share again."""
+        """Time (µs) at which the next message is due."""
         return min(self._next)
 
     def due(self, now: int, view: View, horizon: Horizon | None, doubt: float = 0.0) -> Shared:
-        """What is due at ``now`` (µs). Without a flown ``horizon`` none is shared. ``doubt``: how far (m) the
-        vehicle may be from where it says that it is."""
+        """Return the messages that are due at ``now`` (µs).
+
+        ``horizon`` is the flown one; without it none is sent. ``doubt``: how far (m) the vehicle may be from
+        its reported position.
+        """
         if self._boot is None:
             self._boot = now
             self._next = [now, now, now]
@@ -65,7 +68,7 @@ class Sharing:
             if doubt > 0.0:
                 self._doubted = now
             if self._doubted is not None and now - self._doubted <= _TAKES_BACK:
-                # GLOBAL_POSITION_INT has no field for it.
+                # GLOBAL_POSITION_INT has no field for the uncertainty.
                 shared.swarm.append(Tunnel(self._own, 0, 0, DOUBT, pack_doubt(doubt)))
         if self._passes(2, now, rates.plan_us) and horizon is not None and self._config.shares_plan:
             plan = plan_message(horizon, self._own, self._fleet)
@@ -89,8 +92,10 @@ class Sharing:
 def position_message(
     source: Source, since_boot: int, fleet: FleetFrame, position: Array, velocity: Array, yaw: float | None
 ) -> GlobalPosition:
-    """Where ``source`` is, as it tells it: position (3,), velocity (3,), fleet-local ENU; NED yaw; µs since
-    boot."""
+    """Return the GLOBAL_POSITION_INT of ``source``.
+
+    Position (3,) m and velocity (3,) m/s are fleet-local ENU; ``yaw`` is NED (rad); ``since_boot`` is in µs.
+    """
     latitude, longitude, altitude = fleet.to_geodetic(position)
     north, east, down = enu_to_ned(velocity).tolist()
     return GlobalPosition(
@@ -99,8 +104,10 @@ def position_message(
 
 
 def plan_message(horizon: Horizon, source: Source, fleet: FleetFrame) -> Tunnel | None:
-    """A horizon as ``source`` tells it; None for one that does not fit the wire: neighbours then see the
-    position alone."""
+    """Return the TUNNEL message of ``source`` with this horizon.
+
+    Returns None for a horizon that does not fit the wire format; neighbours then receive the position alone.
+    """
     knots = horizon.knots
     try:
         plan = quantise(

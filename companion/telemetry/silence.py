@@ -1,4 +1,4 @@
-"""Events for the ground: a source of messages falls silent, or is heard again."""
+"""Events for the ground: a source of messages has become silent, or has returned."""
 
 from __future__ import annotations
 

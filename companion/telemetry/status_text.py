@@ -1,4 +1,4 @@
-"""What a companion says to the ground: STATUSTEXT, each event once, never many at a time."""
+"""Status texts for the ground (STATUSTEXT): each event once, at a bounded rate."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from companion.config.flight import VoiceConfig
 from mavlink_bridge.messages import Source, StatusText
 
 _EVERY, _AT_ONCE = 1_000_000, 5
-"""µs for a text; so many may come at once after a silence."""
+"""µs per text, and the number of texts that may be sent at once after a pause."""
 _WAITING = 16
-"""Texts that wait; beyond that the least severe is dropped."""
+"""Maximum number of waiting texts; beyond that the least severe is dropped."""
 
 
 class Severity(IntEnum):
-    """MAV_SEVERITY, those that are used."""
+    """Used values of MAV_SEVERITY."""
 
     CRITICAL = 2
     ERROR = 3
@@ -24,7 +24,10 @@ class Severity(IntEnum):
 
 
 class StatusReporter:
-    """Of the companion ``own``. Texts wait here until ``due``; without ``texts`` in ``config`` none does."""
+    """Queue of status texts of the companion ``own``.
+
+    Texts wait here until ``due`` returns them. If ``config.texts`` is off all texts are discarded.
+    """
 
     def __init__(self, config: VoiceConfig, own: Source) -> None:
         self._on = config.texts
@@ -34,18 +37,20 @@ class StatusReporter:
         self._next = 0
 
     def say(self, severity: Severity, text: str) -> None:
-        """An event; one that waits already is not said twice."""
+        """Queue an event, unless the same text is waiting already."""
         if not self._on or any(text == one for _, one in self._waiting):
             return
         self._waiting.append((severity, text))
         if len(self._waiting) > _WAITING:
-            # Of the least severe the youngest.
+            # The youngest of the least severe.
             worst = max(range(len(self._waiting)), key=lambda row: (self._waiting[row][0], row))
             del self._waiting[worst]
 
     def watch(self, wrong: bool, lost: str, back: str, severity: Severity = Severity.WARNING) -> None:
-        """Something that may be ``wrong``: its beginning is said as ``lost``, its end as ``back``. Call it
-        as often as you like; ``lost`` is its name."""
+        """Report the beginning (``lost``) and the end (``back``) of a condition that may be ``wrong``.
+
+        ``lost`` identifies the condition. Repeated calls with the same state have no effect.
+        """
         if wrong == (lost in self._wrong):
             return
         if wrong:
@@ -56,14 +61,14 @@ class StatusReporter:
             self.say(Severity.NOTICE, back)
 
     def report(self, severity: Severity, text: str, *, begins: bool) -> None:
-        """Something that began, or that is over: of an end, what comes before the colon."""
+        """Report an event that begins, or its end: "Over:" and the text before its colon."""
         if begins:
             self.say(severity, text)
         else:
             self.say(Severity.NOTICE, f"Over: {text.split(':')[0]}")
 
     def due(self, now: int) -> list[StatusText]:
-        """What may be said at ``now`` (µs), the most severe first."""
+        """Return the texts that may be sent at ``now`` (µs), the most severe first."""
         said = []
         while self._waiting and self._next - now <= (_AT_ONCE - 1) * _EVERY:
             self._next = max(self._next, now) + _EVERY

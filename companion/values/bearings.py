@@ -10,21 +10,21 @@ from companion.values.horizon import Array
 
 
 def bearing(origin: Array, point: Array) -> float:
-    """Horizontal bearing of ``point`` seen from ``origin``.
+    """Return the horizontal bearing (rad) of ``point`` seen from ``origin``; 0 if they coincide.
 
-    Two arguments, not the paper's quotient, which loses the half plane. Zero if the points coincide.
+    It uses two arguments, not the paper's quotient (Sec. III-B), which loses the half plane.
     """
     return atan2(point[1] - origin[1], point[0] - origin[0])
 
 
 def wrapped(angles: Array) -> Array:
-    """The same angles in [−π, π)."""
+    """Return the same angles in [−π, π)."""
     result: Array = (angles + pi) % (2.0 * pi) - pi
     return result
 
 
 def turned(vector: Array, angle: float) -> Array:
-    """A vector (3,) turned about the vertical, counter-clockwise from above."""
+    """Return ``vector`` (3,) rotated about the vertical by ``angle`` (rad), counter-clockwise from above."""
     c, s = cos(angle), sin(angle)
     x, y, z = vector
     return np.array([c * x - s * y, s * x + c * y, z])

@@ -7,4 +7,4 @@ COMPONENT = 195
 
 
 AUTOPILOT = 1
-"""MAV_COMP_ID_AUTOPILOT1: other components of the vehicle have no say in where it is."""
+"""MAV_COMP_ID_AUTOPILOT1; the vehicle's position is accepted from no other of its components."""

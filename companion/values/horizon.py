@@ -1,9 +1,7 @@
-"""A trajectory on equidistant knots with piecewise constant acceleration: what a plan is, own or a
-neighbour's.
+"""Trajectory on equidistant knots with piecewise constant acceleration: a plan, own or a neighbour's.
 
-Time is integer µs on the companion's clock, positions are fleet-local ENU in metres. Before the first knot
-and after the last one the motion goes on at constant velocity, so that a horizon of 1.6 s that is 0.1 s old
-still covers 1.6 s.
+Time is integer µs on the companion's clock; positions are fleet-local ENU, m. Before the first knot and after
+the last one the velocity is constant, so that a horizon of 1.6 s that is 0.1 s old still covers 1.6 s.
 """
 
 from __future__ import annotations
@@ -28,10 +26,10 @@ class Motion(NamedTuple):
 
 
 class Horizon(NamedTuple):
-    """Knots 0…n of a trajectory, ``knots`` (n + 1, 9): position, velocity, acceleration of the segment that
-    follows.
+    """Knots 0…n of a trajectory from ``epoch`` (µs) on, ``dt`` (µs) apart.
 
-    The acceleration of the last knot is zero: beyond the end the velocity is kept.
+    ``knots`` (n + 1, 9): position, velocity, and acceleration of the segment that follows. The acceleration
+    of the last knot is zero: beyond the end the velocity is kept.
     """
 
     epoch: int
@@ -44,7 +42,7 @@ class Horizon(NamedTuple):
         return self.epoch + self.dt * (len(self.knots) - 1)
 
     def at(self, time: int) -> Motion:
-        """The motion at ``time``; the exact quadratic of the segment, not an interpolation."""
+        """Return the motion at ``time`` (µs): the exact quadratic of the segment, not an interpolation."""
         last = len(self.knots) - 1
         index = min(max((time - self.epoch) // self.dt, 0), last)
         s = (time - self.epoch - index * self.dt) * 1e-6
@@ -55,7 +53,10 @@ class Horizon(NamedTuple):
         return Motion(p + s * (v + (0.5 * s) * a), v + s * a, a)
 
     def positions(self, start: int, steps: int, dt: int) -> Array:
-        """Positions (steps, 3) at ``start + n·dt``, n = 0…steps − 1, from the first knot on."""
+        """Return positions (steps, 3), m, at ``start + n·dt``, n = 0…steps − 1.
+
+        ``start`` (µs) must not lie before the first knot.
+        """
         elapsed = (start - self.epoch) + dt * _COUNT[:steps]
         index = np.minimum(elapsed // self.dt, len(self.knots) - 1)
         s = ((elapsed - index * self.dt) * 1e-6)[:, None]
@@ -71,7 +72,7 @@ _NEVER = 1 << 62
 
 
 def roll_out(epoch: int, dt: int, position: Array, velocity: Array, accelerations: Array) -> Horizon:
-    """The horizon that follows from a state and accelerations (n, 3): the A and B of the paper, eq. (5)."""
+    """Return the horizon from a state and accelerations (n, 3): the A and B of the paper, eq. (8)."""
     n = len(accelerations)
     S_v, S_x, time = prediction(n, dt * 1e-6)
     knots = np.zeros((n + 1, 9))
@@ -83,8 +84,11 @@ def roll_out(epoch: int, dt: int, position: Array, velocity: Array, acceleration
 
 
 class Located(NamedTuple):
-    """Where each of M plans is at a time of its own: ``positions`` (M, 3) m; ``after`` (M,): how long after
-    its epoch that is, µs, and more than any plan's age where there is none; ``dt`` (M,): its step, µs."""
+    """Positions of M plans, each at a time of its own.
+
+    ``positions`` (M, 3), m. ``after`` (M,): that time minus the plan's epoch, µs; larger than any plan's age
+    where there is no plan. ``dt`` (M,): the plan's step, µs.
+    """
 
     positions: Array
     after: NDArray[np.int64]
@@ -92,11 +96,11 @@ class Located(NamedTuple):
 
 
 class HorizonTable:
-    """The latest horizon of each of many senders, sampled together: ``steps`` positions at ``dt`` (µs) from
-    any time, or each at a time of its own.
+    """Latest horizon of each of many senders, sampled together.
 
-    Aligned by time, not by index: the original implementation shared horizons without time stamps and never
-    noticed their age.
+    It gives ``steps`` positions at ``dt`` (µs) from any time, or one position of each at a time of its own.
+    Horizons are aligned by time, not by index: the original implementation shared horizons without time
+    stamps and never detected their age.
     """
 
     def __init__(self, steps: int, dt: int) -> None:
@@ -112,14 +116,14 @@ class HorizonTable:
         self._ahead = dt * np.arange(steps)
 
     def put(self, sender: int, horizon: Horizon) -> None:
-        """Take a horizon unless a later one of the same sender is known."""
+        """Store ``horizon`` unless a later one of the same sender is known."""
         last = self._latest.get(sender)
         if last is None or horizon.epoch >= last.epoch:
             self._latest[sender] = horizon
             self._fresh.add(sender)
 
     def _put_down(self) -> None:
-        """The fresh ones, row by row."""
+        """Write the horizons stored since the last call into the table, row by row."""
         new = [sender for sender in self._fresh if sender not in self._rows]
         if new:
             self._rows.update(zip(new, range(len(self._rows), len(self._latest)), strict=True))
@@ -142,8 +146,10 @@ class HorizonTable:
         self._fresh.clear()
 
     def positions(self, senders: Sequence[int], start: int, oldest: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Positions (M, steps, 3) of ``senders`` at ``start + n·dt``, and which of them are not made before
-        ``oldest`` (µs); the rows of the others mean nothing."""
+        """Return positions (M, steps, 3), m, of ``senders`` at ``start + n·dt``, and which of them are valid (M,).
+
+        A position is valid if its horizon was not made before ``oldest`` (µs); the other rows mean nothing.
+        """
         rows = self._rows_of(senders)
         if not self._rows:
             return np.zeros((len(senders), self._steps, 3)), np.zeros(len(senders), dtype=np.bool_)
@@ -152,7 +158,7 @@ class HorizonTable:
         return self._sampled(rows, (start - epochs)[:, None] + self._ahead), known
 
     def at(self, senders: Sequence[int], times: NDArray[np.int64]) -> Located:
-        """Where each of ``senders`` (M,) is by its plan at its own one of ``times`` (M,), µs."""
+        """Return the positions of ``senders`` (M,) by their plans, each at its own one of ``times`` (M,), µs."""
         rows = self._rows_of(senders)
         if not self._rows:
             none = np.full(len(senders), _NEVER)
@@ -162,9 +168,11 @@ class HorizonTable:
         return Located(positions, np.where(rows >= 0, after, _NEVER), self._dts[rows])
 
     def accelerations(self, senders: Sequence[int], times: NDArray[np.int64]) -> Array:
-        """What each of ``senders`` (M,) means to accelerate (M, 3), m/s², by its plan at its own one of
-        ``times`` (M,), µs; zero after the plan and without one. Before it, what it begins with: a plan comes
-        with the state that it begins at, and that may be dated a little earlier."""
+        """Return the planned accelerations (M, 3), m/s², of ``senders``, each at its own one of ``times`` (M,), µs.
+
+        They are zero after the plan and without one. Before the plan they are those of its beginning: a plan
+        comes with the state that it begins at, and that state may be dated slightly earlier.
+        """
         rows = self._rows_of(senders)
         if not self._rows:
             return np.zeros((len(senders), 3))
@@ -173,24 +181,23 @@ class HorizonTable:
         return np.where((rows >= 0)[:, None], meant, 0.0)
 
     def _rows_of(self, senders: Sequence[int]) -> NDArray[np.int64]:
-        """−1 for those without a horizon."""
+        """Return the row of each sender (M,); −1 for those without a horizon."""
         if self._fresh:
             self._put_down()
         return np.array([self._rows.get(sender, -1) for sender in senders], dtype=np.int64)
 
     def _segments(self, rows: NDArray[np.int64], elapsed: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Which segments (M, n) those are; the first before, the last knot after."""
+        """Return the segments (M, n) at these times; the first one before a plan, the last knot after it."""
         index = elapsed // self._dts[rows][:, None]
         np.maximum(index, 0, out=index)
         np.minimum(index, self._lasts[rows][:, None], out=index)
         return index
 
     def _sampled(self, rows: NDArray[np.int64], elapsed: NDArray[np.int64]) -> Array:
-        """Positions (M, n, 3) of ``rows`` (M,) when so much time (M, n), µs, has ``elapsed`` since their
-        epochs."""
+        """Return positions (M, n, 3), m, of ``rows`` (M,) at ``elapsed`` (M, n), µs, after their epochs."""
         index = self._segments(rows, elapsed)
         s = ((elapsed - index * self._dts[rows][:, None]) * 1e-6)[:, :, None]
-        # Row by row of one long table: twice as fast as by two indices.
+        # One index into one long table is twice as fast as two indices.
         count = self._knots.shape[1]
         chosen = self._knots.reshape(-1, 9).take(index + (rows * count)[:, None], axis=0, mode="wrap")
         # Before its first knot a horizon has no acceleration.

@@ -1,4 +1,4 @@
-"""What is to be avoided, aligned in time with the own horizon."""
+"""Obstacles to avoid, aligned in time with the own horizon."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _VEHICLES.flags.writeable = False
 
 
 class Obstacles(NamedTuple):
-    """What is to be avoided, M of them, aligned in time with the own horizon (fleet-local ENU, m).
+    """M obstacles to avoid, aligned in time with the own horizon (fleet-local ENU, m).
 
-    ``positions`` (M, N + 1, 3) at n = 0…N; ``d_min``, ``d_safe`` (M,) between centres, ``radius`` (M,) or
-    (1,) included, which is what an obstacle is larger than a vehicle: its own size, and a margin for not
-    knowing where it is; ``ids`` name them for latches and logs.
+    ``positions`` (M, N + 1, 3) are those at n = 0…N. ``d_min`` and ``d_safe`` (M,) are distances between
+    centres and include ``radius`` (M,) or (1,), by which an obstacle is larger than a vehicle: its own size,
+    and a margin for the uncertainty of its position. ``ids`` identify the obstacles for latches and logs.
     """
 
     ids: tuple[int, ...]
@@ -28,7 +28,7 @@ class Obstacles(NamedTuple):
     radius: Array = _VEHICLES
 
     def joined(self, others: Obstacles) -> Obstacles:
-        """These and the others."""
+        """Return these obstacles and ``others`` together."""
         if not others.ids:
             return self
         return Obstacles(
@@ -40,8 +40,10 @@ class Obstacles(NamedTuple):
         )
 
     def shared(self, systems: Collection[int], spacing: float) -> Obstacles:
-        """The same, where those of ``systems`` and the own vehicle are to be ``spacing`` m apart: at that
-        distance they push no more."""
+        """Return the obstacles such that those of ``systems`` cease to repel at ``spacing`` (m).
+
+        ``spacing`` is the distance that they and the own vehicle shall keep.
+        """
         if not any(id_ in systems for id_ in self.ids):
             return self
         theirs = np.array([id_ in systems for id_ in self.ids])
@@ -50,4 +52,4 @@ class Obstacles(NamedTuple):
 
 
 _WIDTH = 1.0
-"""m, at least, between d_min and d_safe."""
+"""Least difference (m) kept between d_min and d_safe."""

@@ -1,4 +1,4 @@
-"""The phases of a flight."""
+"""Phases of a flight."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Phase(Enum):
-    """Where the flight is."""
+    """Phase of the flight."""
 
     CONNECT = "connect"
     PREPARE = "prepare"
@@ -20,4 +20,4 @@ class Phase(Enum):
 
 
 STEERED = (Phase.ESCORT, Phase.HOLD, Phase.RETURN, Phase.SETTLE)
-"""The phases in which set-points steer, as long as the autopilot lets them."""
+"""Phases in which set-points steer, as long as the autopilot follows them."""

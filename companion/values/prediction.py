@@ -1,8 +1,8 @@
-"""The double integrator over the horizon, as matrices: the A and B of the paper, eq. (5), stacked.
+"""Double integrator over the horizon, as matrices: the A and B of the paper, eq. (8), stacked.
 
-Settled against the text: A and B are 6 × 6 and 6 × 3 there, not 3 × 3; per axis that leaves 2 × 2 and 2 × 1,
-and with a (n,) the accelerations of n steps, velocities 1…n are v + S_v a and positions 1…n are x + t v + S_x
-a.
+Settled against the text: A and B are 6 × 6 and 6 × 3, as the equation shows, not 3 × 3; per axis that leaves
+2 × 2 and 2 × 1. With a (n,) the accelerations of n steps, velocities 1…n are v + S_v a and positions 1…n are
+x + t v + S_x a.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ Array = NDArray[np.float64]
 
 
 class Prediction(NamedTuple):
-    """``S_v``, ``S_x`` (n, n): accelerations to velocities and positions; ``time`` (n,): t of steps 1…n,
-    s."""
+    """Matrices ``S_v``, ``S_x`` (n, n) from accelerations to velocities and positions.
+
+    ``time`` (n,), s: t of steps 1…n.
+    """
 
     S_v: Array
     S_x: Array
@@ -27,7 +29,7 @@ class Prediction(NamedTuple):
 
 @lru_cache(maxsize=64)
 def prediction(steps: int, dt: float) -> Prediction:
-    """For ``steps`` inputs of ``dt`` seconds each."""
+    """Return the matrices for ``steps`` inputs of ``dt`` (s) each."""
     k = np.arange(steps)
     lower = (k[:, None] >= k).astype(np.float64)
     parts = Prediction(

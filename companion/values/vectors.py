@@ -1,4 +1,4 @@
-"""Vectors, many at once."""
+"""Operations on many vectors at once."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from companion.values.horizon import Array
 
 
 def limit(force: Array, bound: float) -> Array:
-    """The same directions with norms of at most ``bound``: rows (…, 3)."""
+    """Return vectors (…, 3) in the directions of ``force`` with norms of at most ``bound``."""
     norm = np.sqrt(np.vecdot(force, force))
     scale = bound / np.maximum(norm, bound)
     limited: Array = force * scale[..., None]

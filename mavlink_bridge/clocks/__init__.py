@@ -1,0 +1,1 @@
+"""Clocks that give the time in µs: simulated, real, skewed, or estimated from another machine's stamps."""

@@ -1,5 +1,7 @@
-"""Where *now* comes from: integer µs, simulated or real. Only the loop that runs nodes asks a clock; nodes
-are told the time."""
+"""Sources of the current time in integer µs, simulated or real.
+
+Only the loop that runs nodes reads a clock; nodes receive the time as an argument.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ class Clock(Protocol):
     """Time in integer µs that never decreases."""
 
     def now(self) -> int:
-        """The present, µs."""
+        """Return the current time, µs."""
         ...
 
     def wait_until(self, instant: int) -> None:
@@ -22,13 +24,13 @@ class Clock(Protocol):
 
 
 class SimulatedClock:
-    """Stands still until it is told to go on, then jumps."""
+    """Clock that stands still between calls of ``wait_until``, then jumps."""
 
     def __init__(self, start: int = 0) -> None:
         self._now = start
 
     def now(self) -> int:
-        """The instant last waited for, µs."""
+        """Return the instant last waited for, µs."""
         return self._now
 
     def wait_until(self, instant: int) -> None:
@@ -37,11 +39,12 @@ class SimulatedClock:
 
 
 class WallClock:
-    """Unix time in µs, read once; from then on it runs on the monotonic clock, so that no correction of the
-    host's time makes it jump.
+    """Unix time in µs, read once and then continued on the monotonic clock.
 
-    ``offset_ns`` of another WallClock of this host makes the two agree exactly, across processes too: the
-    monotonic clock is the same for all. Time 0 may be put elsewhere with an ``offset_ns`` of one's own.
+    A correction of the host's time therefore causes no jump.
+
+    With the ``offset_ns`` of another WallClock of this host the two agree exactly, across processes too,
+    because the monotonic clock is the same for all. A different ``offset_ns`` puts time 0 elsewhere.
     """
 
     def __init__(self, offset_ns: int | None = None) -> None:
@@ -49,21 +52,24 @@ class WallClock:
         """This clock minus the monotonic clock, ns."""
 
     def now(self) -> int:
-        """Unix time, µs."""
+        """Return Unix time, µs."""
         return (time.monotonic_ns() + self.offset_ns) // 1000
 
     def wait_until(self, instant: int) -> None:
-        """Sleep until ``instant`` (Unix µs), never spinning: on a shared machine that would be others' time.
+        """Sleep until ``instant`` (Unix µs), without spinning.
 
-        ``time.sleep`` waits for an absolute instant, so that the time spent before it begins is no delay.
+        Spinning would take time from others on a shared machine. ``time.sleep`` waits for an absolute
+        instant, so that the time spent before it begins is no delay.
         """
         while (left := instant - self.now()) > 0:
             time.sleep(left * 1e-6)
 
 
 class Account(Protocol):
-    """Where simulated time is booked that is given up: ``lost``, µs. One for all who live in the same
-    time."""
+    """Shared record of the simulated time that is given up: ``lost``, µs.
+
+    All clocks that show the same time share one account.
+    """
 
     lost: int
 
@@ -73,12 +79,15 @@ class _Own:
 
 
 class PacedClock:
-    """Simulated time: from 0 on, ``speed`` times as fast as ``clock``. Between two waits it goes no further
-    than ``stride`` (µs): what whoever runs by it cannot keep up with is given up, and counted in ``lost``
-    (µs), so that nobody ever has to make up for more than a stride at once.
+    """Simulated time: from 0 on, ``speed`` times as fast as ``clock``.
 
-    Copies of it in several processes show one time as long as they share an ``account``: what one of them
-    gives up is given up for all, and who is ahead then waits for the others. It is the clock's own if None.
+    Between two waits it advances by at most ``stride`` (µs). Time that the user of the clock cannot keep up
+    with is given up and counted in ``lost`` (µs), so that there is never more than one stride to catch up
+    with.
+
+    Copies in several processes show one time as long as they share an ``account``: what one of them gives up
+    is given up for all, and those that are ahead then wait for the others. None: the clock has an account of
+    its own.
     """
 
     def __init__(self, clock: Clock, speed: float, stride: int, account: Account | None = None) -> None:
@@ -90,45 +99,45 @@ class PacedClock:
 
     @property
     def start(self) -> int:
-        """What ``clock`` showed at 0."""
+        """Time that ``clock`` showed at 0, µs."""
         return self._start
 
     @property
     def lost(self) -> int:
-        """µs given up, by all."""
+        """Time given up, by all clocks of the account, µs."""
         return self._account.lost
 
     def now(self) -> int:
-        """Simulated time, µs."""
+        """Return simulated time, µs."""
         passed = int((self._clock.now() - self._start) * self._speed)
         shown = passed - self._account.lost
         if shown > self._most:
-            # Never added to: two of several processes would book the same time twice.
+            # Assigned, never incremented: two of several processes would book the same time twice.
             self._account.lost = passed - self._most
             shown = self._most
         self._latest = max(self._latest, shown)
         return self._latest
 
     def wait_until(self, instant: int) -> None:
-        """Until it is ``instant`` (µs, simulated)."""
+        """Wait until simulated time is ``instant`` (µs)."""
         self._most = max(self._most, instant + self._stride)
         while self.now() < instant:
-            # Again and again, as what is lost meanwhile makes it later; a µs more, for the rounding.
+            # In a loop, because time that is lost meanwhile makes it later; 1 µs more, for the rounding.
             lost = self._account.lost
             self._clock.wait_until(self._start + int((instant + lost) / self._speed) + 1)
         self._most = self.now() + self._stride
 
 
 class SkewedClock:
-    """The clock of a computer that is wrong: ``skew`` of what the true ``clock`` shows."""
+    """Clock of a computer with an error: ``skew`` applied to what the true ``clock`` shows."""
 
     def __init__(self, clock: Clock, skew: NodeClock) -> None:
         self._clock, self._skew = clock, skew
 
     def now(self) -> int:
-        """What it shows, µs."""
+        """Return the time that the skewed clock shows, µs."""
         return self._skew.reading(self._clock.now())
 
     def wait_until(self, instant: int) -> None:
-        """Until it shows ``instant`` (µs)."""
+        """Wait until the skewed clock shows ``instant`` (µs)."""
         self._clock.wait_until(self._skew.instant(instant))

@@ -1,15 +1,15 @@
-"""The clock of another machine, as its messages show it: an autopilot's, which may run ten times as fast as
-the wall's.
+"""Clock of another machine, estimated from its messages; it may run ten times as fast as wall time.
 
-A message shows what its sender's clock said when it left; it arrives later by a delay that changes. In the
-plane of arrival and stamp all messages lie on or below the line of those that took no time. That line is laid
-along the upper edge of what the last seconds brought, piece by piece (Moon, Skelly and Towsley, "Estimation
-and removal of clock skew from network delay measurements", 1999), and the clock runs along it.
+A stamp is the time of the sender's clock when the message left; the message arrives later by a varying delay.
+In the plane of arrival and stamp all messages lie on or below the line of messages without delay. That line
+is fitted to the upper edge of the last seconds, piece by piece (Moon, Skelly and Towsley, "Estimation and
+removal of clock skew from network delay measurements", 1999), and the clock runs along it.
 
-Only a simulation's clock is followed so, for good: on a busy machine it stands for a moment and never makes
-up for that; then the clock goes on as if nothing were, and follows the stamps from there. A real autopilot's
-clock is as good as the own one, and a delay that grows looks just like a clock that is slow: so there the
-wall's time is better, by which what is old looks old. Which of the two it is, is decided once.
+Only a simulation's clock is followed permanently. On a busy machine such a clock stops for a moment and never
+makes up for that. The followed clock then continues unchanged, and follows the stamps from there. A real
+autopilot's clock is as accurate as the own one, and a growing delay looks just like a slow clock. For a real
+autopilot wall time is therefore better, because old data then appears old. The clock decides once which of
+the two it follows.
 """
 
 from __future__ import annotations
@@ -23,29 +23,34 @@ from typing import Final, NamedTuple
 from mavlink_bridge.clocks.clock import Clock
 
 _PIECE: Final = 250_000
-"""µs of the wall; of each piece the stamp that took the shortest way counts."""
+"""Length of a piece in µs of wall time; the stamp with the shortest delay represents its piece."""
 _MEMORY: Final = 24
-"""Pieces: six seconds."""
+"""Number of pieces that are kept: six seconds."""
 _ENOUGH: Final = 4
-"""Pieces that a rate is learnt from."""
+"""Number of pieces from which a rate can be estimated."""
 _STEP: Final = 500_000
-"""µs of the wall: a stamp off the line by more tells of a clock that was set, stopped or began anew."""
+"""Deviation from the line (µs of wall time) that shows that the clock was set, stopped or restarted."""
 _STALL: Final = 50_000
-"""The same where the rate is off by more than ``_SPED``: a simulation stands whenever its machine has
-something else to do."""
+"""The same limit where the rate is off by more than ``_SPED``.
+
+It is lower because a simulation stops whenever its machine is busy with something else.
+"""
 _SPED: Final = 0.02
 _EVIDENCE, _MORE = 10_000_000, 30_000_000
-"""µs of the wall after which it is decided what it is; and for a rate between ``_QUARTZ`` and ``_PACED``: a
-simulation on a busy machine or a queue that grows, and no queue grows evenly for so long."""
+"""µs of wall time after which the kind of clock is decided.
+
+The second is for a rate between ``_QUARTZ`` and ``_PACED``: a simulation on a busy machine or a growing
+queue; no queue grows evenly for so long.
+"""
 _QUARTZ, _PACED = 0.005, 0.2
-"""A clock whose rate is off by no more than the first is real, by more than the second a simulation's."""
+"""Limits of the rate error: up to the first the clock is real, above the second it is a simulation's."""
 _BENT: Final = 0.125
-"""Even: all stamps within this share of what the rate has made of the time."""
+"""Limit for even evidence: all stamps deviate by at most this share of the time that the rate has gained."""
 _SLEW: Final = 0.5
-"""A clock that is ahead goes on at this share of its rate: it never stands."""
+"""Share of its rate at which a clock that is ahead continues: it never stops."""
 _WITNESSES: Final = 5
 SLOWEST, FASTEST = 0.02, 100.0
-"""Rates beyond are none of a simulator's."""
+"""Limits of the rate; no simulator runs beyond them."""
 
 
 class _Seen(NamedTuple):
@@ -56,14 +61,15 @@ class _Seen(NamedTuple):
 
 
 class FollowedClock:
-    """A ``Clock`` that shows what the stamps do, from ``begin`` (µs) on; it never goes back.
+    """``Clock`` that follows the stamps of another clock, from ``begin`` (µs) on; it never goes back.
 
-    Before the first stamp it runs as ``clock`` does. Where stamps jump, by more than half a second of the
-    wall, it goes on as before and follows them from there: ``steps`` counts that. So it does where a
-    simulation has lost time. ``rate``: of it against ``clock``. May be fed by one thread and read by others.
+    Before the first stamp it runs as ``clock`` does. Where stamps jump, by more than half a second of wall
+    time, it continues as before and follows them from there; ``steps`` counts these jumps. It does the same
+    where a simulation has lost time. ``rate``: its rate relative to ``clock``. One thread may feed it while
+    others read it.
 
-    ``simulated`` says what it follows. None: that is found out, by ten to thirty seconds of stamps, and after
-    them it runs on as ``clock`` does unless they are a simulation's.
+    ``simulated`` says whether the stamps are a simulation's. None: this is determined from ten to thirty
+    seconds of stamps; after them, unless they are a simulation's, the clock runs as ``clock`` does.
     """
 
     def __init__(self, clock: Clock, begin: int = 0, *, simulated: bool | None = True) -> None:
@@ -83,22 +89,22 @@ class FollowedClock:
         self.rate = 1.0
         self.steps = 0
         self.judged: float | None = None
-        """The rate by which it was decided what it follows; None before, and where that was known."""
+        """Rate on which the decision was based; None before it, and where the kind of clock was given."""
 
     def now(self) -> int:
-        """What it shows, µs."""
+        """Return the time that this clock shows, µs."""
         with self._lock:
             return self._read(self._clock.now())
 
     def wait_until(self, instant: int) -> None:
-        """Sleep until it shows ``instant`` (µs)."""
+        """Sleep until this clock shows ``instant`` (µs)."""
         while (left := instant - self.now()) > 0:
-            # The line may be laid anew meanwhile: look again from time to time.
+            # The line may be fitted again meanwhile, so read it again from time to time.
             pause = min(left / self.rate, _PIECE)
             self._clock.wait_until(self._clock.now() + max(1, round(pause)))
 
     def observe(self, wall: int, stamp: int) -> None:
-        """A message with ``stamp`` (µs of the sender's clock) arrived at ``wall`` (µs of ``clock``)."""
+        """Record a message with ``stamp`` (µs, sender's clock) that arrived at ``wall`` (µs of ``clock``)."""
         with self._lock:
             if self._verdict is False:
                 return
@@ -113,8 +119,8 @@ class FollowedClock:
                     if abs(ahead) > _STEP * max(1.0, self.rate):
                         self.steps += 1
                         self._evidence.clear()
-                    # What came before less than that stays evidence: a delay that swings looks like it, again
-                    # and again, and would have to be judged for ever.
+                    # Evidence before a smaller jump is kept: a delay that swings looks like such a jump,
+                    # again and again, and would never be judged otherwise.
                     self._lay(wall, stamp)
                 return
             self._strayed = 0
@@ -122,27 +128,27 @@ class FollowedClock:
 
     @property
     def known(self) -> bool:
-        """Whether its rate is known, and what it follows."""
+        """Whether the kind of clock is decided, and a simulation's rate is estimated."""
         return self._verdict is False or (self._verdict is True and self._known)
 
     @property
     def verdict(self) -> bool | None:
-        """What has been decided, or was said at the beginning: whether it is a simulation's. None before."""
+        """Whether the followed clock is a simulation's, as given or decided; None before the decision."""
         return self._verdict
 
     @property
     def simulated(self) -> bool:
-        """Whether it follows a simulation's clock; as it seems so far until that is decided."""
+        """Whether it follows a simulation's clock; before the decision, what the rate suggests so far."""
         return self._off if self._verdict is None else self._verdict
 
-    # Own, under the lock
+    # The methods below need the lock.
 
     @property
     def _off(self) -> bool:
         return abs(self.rate - 1.0) > _PACED
 
     def _decide(self, wall: int) -> None:
-        """When there is enough evidence: from here on it is the one or the other."""
+        """Decide the kind of clock for good, once there is enough evidence."""
         evidence = self._evidence
         span = evidence[-1].wall - evidence[0].wall
         if self._verdict is not None or span < _EVIDENCE:
@@ -162,7 +168,7 @@ class FollowedClock:
         return self._shown + self.rate * (wall - self._wall)
 
     def _slewed(self, wall: int) -> float:
-        """The line, and what of a surplus is not worked off yet."""
+        """Return the line, plus the part of a surplus that is not worked off yet."""
         since = max(wall - self._wall, 0)
         return self._line(wall) + max(0.0, self._surplus - (1.0 - _SLEW) * self.rate * since)
 
@@ -171,7 +177,7 @@ class FollowedClock:
         return self._latest
 
     def _lay(self, wall: int, stamp: int) -> None:
-        """Go on from what it shows, with the stamps from ``stamp`` on."""
+        """Continue from the time shown, and follow the stamps from ``stamp`` on."""
         shown = float(self._read(wall))
         self._wall, self._shown, self._surplus = wall, shown, 0.0
         self._base = shown - stamp
@@ -183,7 +189,7 @@ class FollowedClock:
     def _gather(self, seen: _Seen) -> None:
         best = self._best
         if best is not None and seen.wall - self._begun >= _PIECE:
-            # It ends before what comes now: much may come at once, and no two pieces have one time.
+            # The piece ends before the new message: many may arrive at once, and no two pieces have one time.
             self._pieces.append(best)
             self._fit(seen.wall)
             self._evidence.append(best)
@@ -195,14 +201,14 @@ class FollowedClock:
             self._best = seen
 
     def _fit(self, wall: int) -> None:
-        """The line anew, from ``wall`` on."""
+        """Fit the line again, from ``wall`` on."""
         pieces, base = self._pieces, self._base
         if base is None or len(pieces) < _ENOUGH:
             return
         rate = min(FASTEST, max(SLOWEST, _slope_above(pieces)))
         height = max(piece.stamp - rate * (piece.wall - wall) for piece in pieces)
         if not self._known:
-            # Nobody has relied on the rate yet: go on without a jump.
+            # The rate has not been used yet: continue without a jump.
             base = self._base = self._read(wall) - height
             self._known = True
         shown = float(self._read(wall))
@@ -211,14 +217,16 @@ class FollowedClock:
 
 
 def _even(pieces: Sequence[_Seen], rate: float) -> bool:
-    """Whether all ``pieces`` are near one line of that rate, for how far it is from the wall's."""
+    """Return whether all ``pieces`` lie near one line of that rate, relative to its distance from 1."""
     off = [piece.stamp - rate * (piece.wall - pieces[0].wall) for piece in pieces]
     return max(off) - min(off) <= _BENT * abs(rate - 1.0) * (pieces[-1].wall - pieces[0].wall)
 
 
 def _slope_above(pieces: Sequence[_Seen]) -> float:
-    """Slope of the line above all ``pieces`` that is nearest to them: the edge of their upper hull in the
-    middle of their time."""
+    """Return the slope of the line above all ``pieces`` that is nearest to them.
+
+    It is the edge of their upper hull in the middle of their time.
+    """
     hull: list[_Seen] = []
     for point in pieces:
         while len(hull) > 1 and _slope(hull[-2], hull[-1]) <= _slope(hull[-1], point):

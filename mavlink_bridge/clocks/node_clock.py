@@ -1,4 +1,4 @@
-"""The clock of one node's computer against true time: off by some µs, and fast or slow by some ppm.
+"""Clock of one node's computer relative to true time: off by some µs, and fast or slow by some ppm.
 
 Integer arithmetic throughout, so that a reading and the instant of a reading are exact inverses on any
 machine.
@@ -12,8 +12,10 @@ from math import isfinite
 from mavlink_bridge.errors import ScheduleError
 
 QUANTUM = 4
-"""µs; the two low bits of a tlog's time stamp carry the link, so every time that a node is told is a
-multiple."""
+"""Resolution (µs) of every time that a node receives.
+
+The two low bits of a tlog's time stamp carry the link, so these times are multiples of 4 µs.
+"""
 LARGEST_DRIFT_PPM = 100_000.0
 
 _BILLION = 1_000_000_000
@@ -21,10 +23,10 @@ _BILLION = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class NodeClock:
-    """At true time ``since`` (µs) it shows ``since + offset`` (µs; negative: late), and from there on runs
-    ``drift_ppm`` fast (negative: slow; resolved to 0.001 ppm).
+    """Linear clock that shows ``since + offset`` (µs; negative: late) at true time ``since`` (µs).
 
-    Raises ScheduleError for a drift that is not within ±100 000 ppm.
+    From there on it runs ``drift_ppm`` fast (negative: slow; resolved to 0.001 ppm). Raises ScheduleError for
+    a drift that is not within ±100 000 ppm.
     """
 
     offset: int = 0
@@ -39,18 +41,18 @@ class NodeClock:
 
     @property
     def _rate(self) -> int:
-        """How far it goes in 10⁹ µs."""
+        """Advance of the clock in 10⁹ µs."""
         return _BILLION + round(self.drift_ppm * 1000)
 
     def reading(self, true: int) -> int:
-        """What it shows at ``true`` (µs), to the µs; never decreases."""
+        """Return what the clock shows at ``true`` (µs), to the µs; it never decreases."""
         return self.since + self.offset + (true - self.since) * self._rate // _BILLION
 
     def local(self, true: int) -> int:
-        """What a node is told at ``true`` (µs): rounded down to a multiple of 4 µs."""
+        """Return the time that a node receives at ``true`` (µs): the reading, rounded down to 4 µs."""
         shown = self.reading(true)
         return shown - shown % QUANTUM
 
     def instant(self, shown: int) -> int:
-        """The first true time (µs) at which it shows ``shown`` (µs) or more."""
+        """Return the first true time (µs) at which the clock shows ``shown`` (µs) or more."""
         return self.since - (self.since + self.offset - shown) * _BILLION // self._rate

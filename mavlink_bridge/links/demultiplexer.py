@@ -1,5 +1,7 @@
-"""One physical link that several links of a node share, as behind a MAVLink router: frames are dealt out by
-their headers, and what is sent at any end goes the same way."""
+"""Demultiplexer of one physical link that several links of a node share, as behind a MAVLink router.
+
+Received frames are distributed by their headers, and what is sent at any end leaves by the physical link.
+"""
 
 from __future__ import annotations
 
@@ -14,28 +16,31 @@ from mavlink_bridge.wire.header import Header
 
 Wants = Callable[[Header], bool]
 ROOM: Final = 1 << 20
-"""Bytes that wait at an end at most."""
+"""Largest number of bytes that wait at an end."""
 _ROUNDS: Final = 1000
-"""Reads after which no more is forgotten, of somebody who never stops: more than any system keeps."""
+"""Number of reads after which ``forget`` ends even if data keeps arriving: more than any system buffers."""
 
 
 class Ear(Protocol):
-    """Who listens to all that passes a ``Dealer``."""
+    """Observer of all frames that pass a ``Dealer``."""
 
     def said(self, data: bytes) -> None:
-        """Frames that leave, by whichever end."""
+        """Observe frames that leave, by whichever end."""
         ...
 
     def heard(self, header: Header, frame: bytes) -> None:
-        """A frame that arrives, whoever gets it."""
+        """Observe a frame that arrives, whichever end gets it."""
         ...
 
 
 class Dealer:
-    """``ends``: a link for each name of ``deal``, which says which headers it gets; a frame goes to every end
-    that wants it, and to none if nobody does. Checksums are looked at, signatures are not. ``ear`` hears all.
+    """Demultiplexer of ``link``: one end for each name of ``deal``.
 
-    Its ends are read by one thread at a time. The physical link is closed with the last of them.
+    The function of a name in ``deal`` decides which headers its end gets. A frame goes to every end that
+    wants it, and is discarded if none does. Checksums are verified, signatures are not. ``ear`` observes all
+    frames.
+
+    The ends are read by one thread at a time. The physical link is closed with the last of them.
     """
 
     def __init__(self, link: Link, deal: Mapping[str, Wants], ear: Ear | None = None) -> None:
@@ -46,7 +51,7 @@ class Dealer:
         self._open = len(self.ends)
 
     def read(self) -> None:
-        """Deal out what has arrived."""
+        """Read the physical link and distribute the frames that have arrived."""
         for datagram in self.link.receive():
             frames = [
                 (Header(frame.system, frame.component, frame.message_id), frame.data)
@@ -61,16 +66,18 @@ class Dealer:
                     end.put(b"".join(own))
 
     def send(self, data: bytes) -> None:
-        """By the physical link."""
+        """Send ``data`` by the physical link."""
         if self._ear is not None:
             self._ear.said(data)
         self.link.send(data)
 
     def forget(self) -> None:
-        """What has arrived until now, at all ends; ``ear`` does not hear it either, as nobody knows when it
-        was said."""
+        """Discard all that has arrived until now, at all ends.
+
+        ``ear`` does not receive it either, because the time of its sending is unknown.
+        """
         for _ in range(_ROUNDS):
-            # One that brings nothing may have answered a call, of somebody who has spoken already.
+            # A read that returns nothing may have accepted a TCP connection whose peer has sent already.
             if not self.link.receive() and not _readable(self.link.fileno()):
                 break
         self._framer = Framer()
@@ -78,19 +85,19 @@ class Dealer:
             end.clear()
 
     def leave(self) -> None:
-        """One end is closed."""
+        """Record that one end is closed; close the physical link with the last one."""
         self._open -= 1
         if not self._open:
             self.link.close()
 
 
 def _readable(fileno: int | None) -> bool:
-    """Whether there is something to do for who waits for it."""
+    """Return whether ``fileno`` is ready to be read."""
     return fileno is not None and bool(select.select([fileno], [], [], 0)[0])
 
 
 class DealtLink:
-    """One end of a ``Dealer``: a ``Link``. If nobody takes what waits, the oldest gives way."""
+    """One end of a ``Dealer``: a ``Link``; if it is not read, the oldest data is dropped."""
 
     def __init__(self, dealer: Dealer, *, first: bool) -> None:
         self._dealer, self._first = dealer, first
@@ -101,15 +108,15 @@ class DealtLink:
 
     @property
     def counters(self) -> LinkCounters:
-        """Its own; ``dropped`` is that of the physical link, for all its ends."""
+        """Counts of this end; ``dropped`` is that of the physical link, for all its ends."""
         return LinkCounters(self._received, self._sent, self._dealer.link.counters.dropped)
 
     def fileno(self) -> int | None:
-        """That of the physical link, for one of its ends."""
+        """Return that of the physical link for the first end, None for the others."""
         return self._dealer.link.fileno() if self._first else None
 
     def put(self, data: bytes) -> None:
-        """Some frames for this end."""
+        """Add some frames for this end."""
         if not self._open:
             return
         self._waiting.append(data)
@@ -118,12 +125,12 @@ class DealtLink:
             self._bytes -= len(self._waiting.popleft())
 
     def clear(self) -> None:
-        """Forget what waits."""
+        """Discard what waits."""
         self._waiting.clear()
         self._bytes = 0
 
     def receive(self) -> list[bytes]:
-        """What has been dealt to it."""
+        """Return the frames that were distributed to this end."""
         if not self._open:
             return []
         self._dealer.read()
@@ -133,13 +140,13 @@ class DealtLink:
         return found
 
     def send(self, data: bytes) -> None:
-        """By the physical link."""
+        """Send ``data`` by the physical link."""
         if self._open:
             self._sent += 1
             self._dealer.send(data)
 
     def close(self) -> None:
-        """This end."""
+        """Close this end."""
         if self._open:
             self._open = False
             self.clear()

@@ -1,10 +1,10 @@
-"""Where a link leads to, as people write it, and as a value. Nothing is opened or looked up here.
+"""Endpoints of links, as text and as values; nothing is opened or looked up here.
 
 The forms are those of pymavlink and MAVProxy; ``//`` after the colon, as MAVSDK writes it, is allowed::
 
-    udpin:HOST:PORT        listen; answer whoever speaks          tcp:HOST:PORT      call, again and again
-    udpout:HOST:PORT       speak first                            tcpin:HOST:PORT    be called
-    udpin:HOST:PORT,HOST:PORT    listen, and speak to the second, too, from the beginning
+    udpin:HOST:PORT        listen; answer every sender            tcp:HOST:PORT      connect, again and again
+    udpout:HOST:PORT       send first                             tcpin:HOST:PORT    accept connections
+    udpin:HOST:PORT,HOST:PORT    listen, and send to the second address, too, from the beginning
     mcast:[GROUP[:PORT]][,INTERFACE]                              /dev/DEVICE,BAUD   serial port
     tlog:PATH              a log, at the times it was recorded at
 
@@ -29,7 +29,7 @@ BAUD_RATES: Final = (
     *(1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 500000, 576000, 921600),
     *(1000000, 1152000, 1500000, 2000000, 2500000, 3000000, 3500000, 4000000),
 )
-"""Bit/s that a serial port may have; not every system knows all."""
+"""Bit/s that a serial port may have; not every system supports all."""
 
 _FORMS: Final = (
     "udpin:HOST:PORT, udpout:HOST:PORT, mcast:GROUP:PORT, tcp:HOST:PORT, tcpin:HOST:PORT, "
@@ -47,8 +47,11 @@ def _address(host: str, port: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class UdpIn:
-    """Bind to ``host``, ``port`` (0: a free one of the system's choice). ``peer``: host and port of someone
-    who is sent everything though it has not spoken yet, as autopilots do with a ground station."""
+    """Bind to ``host``, ``port`` (0: a free one of the system's choice).
+
+    ``peer``: host and port of a peer that is sent everything before it has sent anything itself, as
+    autopilots do with a ground station.
+    """
 
     host: str
     port: int
@@ -61,7 +64,7 @@ class UdpIn:
 
 @dataclass(frozen=True, slots=True)
 class UdpOut:
-    """Send to ``host``, ``port``, and hear only from there."""
+    """Send to ``host``, ``port``, and receive only from there."""
 
     host: str
     port: int
@@ -72,7 +75,7 @@ class UdpOut:
 
 @dataclass(frozen=True, slots=True)
 class Multicast:
-    """A group that all members hear; ``interface``: an IPv4 address, None leaves it to the routing table."""
+    """Multicast group; ``interface``: an IPv4 address, None leaves it to the routing table."""
 
     group: str = MULTICAST_GROUP
     port: int = MULTICAST_PORT
@@ -107,7 +110,7 @@ class TcpIn:
 
 @dataclass(frozen=True, slots=True)
 class Serial:
-    """A serial port, 8N1, without flow control, at ``baud`` bit/s."""
+    """Serial port, 8N1, without flow control, at ``baud`` bit/s."""
 
     device: str
     baud: int
@@ -118,7 +121,7 @@ class Serial:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """The frames of the tlog at ``path``, read only."""
+    """Frames of the tlog at ``path``, read only."""
 
     path: str
 
@@ -130,7 +133,7 @@ Endpoint = UdpIn | UdpOut | Multicast | TcpOut | TcpIn | Serial | Replay
 
 
 def parse_endpoint(text: str) -> Endpoint:
-    """The endpoint that ``text`` names; ``parse_endpoint(str(endpoint))`` is ``endpoint``.
+    """Parse an endpoint; ``parse_endpoint(str(endpoint))`` is ``endpoint``.
 
     Raises EndpointError, one line: the text, what is wrong, what is allowed.
     """
@@ -142,7 +145,7 @@ def parse_endpoint(text: str) -> Endpoint:
 
 
 class _FormError(ValueError):
-    """What is wrong and what is allowed, without the text itself."""
+    """A fault of the text and what is allowed, without the text itself."""
 
 
 def _parse(text: str) -> Endpoint:
@@ -243,7 +246,7 @@ def _host_port(scheme: str, rest: str, lowest: int) -> tuple[str, int]:
 def _host(text: str, form: str) -> str:
     if text.startswith("[") and text.endswith("]"):
         try:
-            # A zone (%eth0) may hold anything as far as IPv6Address is concerned.
+            # IPv6Address accepts anything as a zone (%eth0).
             if _SIX.fullmatch(text[1:-1]) is None:
                 raise AddressValueError
             IPv6Address(text[1:-1])

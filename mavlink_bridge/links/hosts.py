@@ -1,4 +1,4 @@
-"""Host names to socket addresses, and what the system says when something is wrong, in words."""
+"""Resolution of host names to socket addresses, and error texts of the system."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from mavlink_bridge.links.endpoints import Endpoint
 def resolved(
     endpoint: Endpoint, host: str, port: int, kind: socket.SocketKind
 ) -> tuple[socket.AddressFamily, tuple[Any, ...]]:
-    """Family and address for ``host``; IPv4 where a name has both, as MAVLink tools listen there.
+    """Return family and address for ``host``.
 
-    May ask a name server, so that it takes its time. Raises LinkError.
+    IPv4 is preferred where a name has both, because MAVLink tools listen there. The call may query a name
+    server and block meanwhile. Raises LinkError.
     """
     try:
         found = socket.getaddrinfo(host, port, type=kind)
@@ -28,5 +29,5 @@ def resolved(
 
 
 def because(error: OSError) -> str:
-    """The system's own words for an error number."""
+    """Return the system's text for an error number."""
     return os.strerror(error.errno) if error.errno is not None else str(error)

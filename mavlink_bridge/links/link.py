@@ -1,7 +1,7 @@
-"""What every link can do: a way for datagrams between this process and others, that never waits.
+"""Interface of every link: transfer of datagrams between this process and others, without waiting.
 
-A link has no opinion on what passes through it; it gives up whole MAVLink frames if whole frames went in,
-also where the transport below is a stream that cuts them anywhere.
+A link does not interpret the data. If complete MAVLink frames go in, complete frames come out, also where the
+transport is a stream that cuts them anywhere.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from collections import deque
 from typing import NamedTuple, Protocol
 
 BURST = 1024
-"""Datagrams that one ``receive`` hands over at most: a flood must not keep its reader for ever."""
+"""Largest number of datagrams of one ``receive``: a flood must not occupy its reader for ever."""
 WAITING = 4096
-"""Datagrams that wait in a MemoryLink at most."""
+"""Largest number of datagrams that wait in a MemoryLink."""
 
 
 class LinkCounters(NamedTuple):
-    """``received`` and ``sent`` datagrams; ``dropped``: of those to send, that nobody could take."""
+    """``received`` and ``sent`` datagrams; ``dropped``: datagrams to send that no peer could take."""
 
     received: int
     sent: int
@@ -24,40 +24,45 @@ class LinkCounters(NamedTuple):
 
 
 class Link(Protocol):
-    """One open end. ``receive`` and ``send`` may be called by two different threads, each by one at a time.
+    """One open end of a link.
 
-    Neither waits, and neither raises for trouble on the way: a peer that is gone, a cable that is out, a
-    buffer that is full show in the counters, and the link recovers by itself where that is possible.
+    ``receive`` and ``send`` may be called by two different threads, each by one at a time.
+
+    Neither waits, and neither raises for trouble on the way. A lost peer, an unplugged cable or a full buffer
+    shows in the counters, and the link recovers by itself where that is possible.
     """
 
     @property
     def counters(self) -> LinkCounters:
-        """The counts since it was opened."""
+        """Counts since the link was opened."""
         ...
 
     def fileno(self) -> int | None:
-        """What to wait for (readable: ``receive`` has something to do), the same as long as the link is open;
-        None: there is nothing to wait for, ask from time to time.
+        """Return the file descriptor to wait for, or None if there is none and the link must be polled.
 
-        A link that has lost its peer tries to find it again when it is asked, so ask also without cause.
+        When it is readable, ``receive`` has something to do. It stays the same as long as the link is open. A
+        link that has lost its peer tries to reconnect when it is polled, so poll it also without cause.
         """
         ...
 
     def receive(self) -> list[bytes]:
-        """All that has arrived, oldest first, but no more than BURST; empty when there is nothing."""
+        """Return all that has arrived, oldest first, but no more than BURST; empty when there is nothing."""
         ...
 
     def send(self, data: bytes) -> None:
-        """Pass on ``data``, some whole frames, if it is possible at once."""
+        """Send ``data`` (one or more complete frames) if that is possible at once."""
         ...
 
     def close(self) -> None:
-        """Give everything back; again is harmless. Afterwards nothing arrives and nothing leaves."""
+        """Release all resources; calling it again is harmless.
+
+        Afterwards nothing arrives and nothing leaves.
+        """
         ...
 
 
 class MemoryLink:
-    """One of two ends within a process; see ``memory_pair``. At a full end the oldest give way."""
+    """One of two ends within a process, see ``memory_pair``; a full end drops the oldest data."""
 
     def __init__(self, ours: deque[bytes], theirs: deque[bytes]) -> None:
         self._ours, self._theirs = ours, theirs
@@ -66,32 +71,32 @@ class MemoryLink:
 
     @property
     def counters(self) -> LinkCounters:
-        """None is dropped by the sender."""
+        """Counts; the sender drops nothing."""
         return LinkCounters(self._received, self._sent, 0)
 
     def fileno(self) -> None:
-        """Nothing to wait for."""
+        """Return None: there is nothing to wait for."""
 
     def receive(self) -> list[bytes]:
-        """What the other end has sent."""
-        # Only this end takes out, so that what has been counted is there.
+        """Return what the other end has sent."""
+        # Only this end removes data, so the counted datagrams are there.
         found = [self._ours.popleft() for _ in range(min(len(self._ours), BURST))] if self._open else []
         self._received += len(found)
         return found
 
     def send(self, data: bytes) -> None:
-        """Put it where the other end finds it."""
+        """Pass ``data`` to the other end."""
         if self._open:
             self._theirs.append(data)
             self._sent += 1
 
     def close(self) -> None:
-        """This end; the other may still take what was sent."""
+        """Close this end; the other may still receive what was sent."""
         self._open = False
 
 
 def memory_pair() -> tuple[MemoryLink, MemoryLink]:
-    """Two ends: what is sent at one arrives at the other."""
+    """Return two connected ends: what is sent at one arrives at the other."""
     there: deque[bytes] = deque(maxlen=WAITING)
     back: deque[bytes] = deque(maxlen=WAITING)
     return MemoryLink(there, back), MemoryLink(back, there)

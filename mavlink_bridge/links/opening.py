@@ -1,4 +1,4 @@
-"""From an endpoint to an open link."""
+"""Opening of a link to an endpoint."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from mavlink_bridge.links.udp import MulticastLink, UdpCaller, UdpListener
 
 
 def open_link(endpoint: Endpoint | str, clock: Clock) -> Link:
-    """The link to ``endpoint``; ``clock`` paces reconnections and replays, and forgets silent peers.
+    """Open the link to ``endpoint``; ``clock`` times reconnections, replays and the removal of silent peers.
 
-    Raises EndpointError for a text that names none, LinkError (LogError for a log) if it cannot be opened.
+    Raises EndpointError for a text that is no endpoint, LinkError (LogError for a log) if it cannot be
+    opened.
     """
     match parse_endpoint(endpoint) if isinstance(endpoint, str) else endpoint:
         case UdpIn() as place:

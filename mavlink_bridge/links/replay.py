@@ -1,4 +1,4 @@
-"""A tlog as a link: its frames arrive at the times at which they were recorded, from the first receive on."""
+"""A tlog as a link: its frames arrive at the recorded times, counted from the first receive on."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from mavlink_bridge.tlog.log import Record, read_tlog
 
 
 class ReplayLink:
-    """Every record of the log is one datagram, both directions and all links of it: whoever listens leaves
-    out his own voice. A record whose time steps back arrives with the one before it.
+    """Link that returns every record of a log as one datagram.
 
-    What is sent goes nowhere and counts as dropped. Raises LogError if the log cannot be read.
+    The log's both directions and all its links are included: a receiver must filter out its own messages. A
+    record whose time steps back arrives with the previous one.
+
+    What is sent is discarded and counts as dropped. Raises LogError if the log cannot be read.
     """
 
     def __init__(self, endpoint: Replay, clock: Clock) -> None:
@@ -25,7 +27,7 @@ class ReplayLink:
 
     @property
     def counters(self) -> LinkCounters:
-        """Nothing is ever sent."""
+        """Counts; nothing is ever sent."""
         return LinkCounters(self._received, 0, self._dropped)
 
     @property
@@ -34,10 +36,10 @@ class ReplayLink:
         return self._next is None
 
     def fileno(self) -> None:
-        """Time alone makes something arrive."""
+        """Return None: only time makes data arrive."""
 
     def receive(self) -> list[bytes]:
-        """What was recorded by now."""
+        """Return what was recorded up to now."""
         found: list[bytes] = []
         if self._next is None:
             return found
@@ -51,7 +53,7 @@ class ReplayLink:
         return found
 
     def send(self, data: bytes) -> None:
-        """Not here."""
+        """Discard ``data``."""
         self._dropped += 1
 
     def close(self) -> None:
@@ -63,4 +65,4 @@ class ReplayLink:
         try:
             return next(self._records, None)
         except LogError:
-            return None  # a disk that breaks off ends the log
+            return None  # a read error ends the log

@@ -1,4 +1,4 @@
-"""A link over a serial port, with nothing but POSIX: raw bytes, 8N1, no flow control."""
+"""Link over a serial port, with nothing but POSIX: raw bytes, 8N1, no flow control."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ if sys.platform != "win32":
     import termios
 
 QUEUE: Final = 0.25
-"""s of the line's capacity that may wait to be sent; what is more is refused. The system alone would queue
-4 KiB, 0.7 s of 57 600 baud: too old for set-points."""
-_BITS: Final = 10  # a byte on the line, with start and stop bit
+"""s of the line's capacity that may wait to be sent; more is refused.
+
+The system alone would queue 4 KiB, 0.7 s of 57 600 baud: too old for set-points.
+"""
+_BITS: Final = 10  # bits of a byte on the line, with start and stop bit
 
 
 class SerialPort(StreamLink):
-    """``/dev/…,BAUD``. A port that vanishes (a cable pulled out) is opened anew when it is back.
+    """Link of ``/dev/…,BAUD``.
 
-    Raises LinkError if it is not there at first, is in use by another, or is no serial port.
+    A port that vanishes (a cable pulled out) is opened again when it is back. Raises LinkError if it is
+    missing at first, is in use by another process, or is no serial port.
     """
 
     def __init__(self, endpoint: Serial, clock: Clock) -> None:
@@ -42,7 +45,7 @@ class SerialPort(StreamLink):
         self._adopt(first)
 
     def send(self, data: bytes) -> None:
-        """Write ``data`` if the line will get to it soon."""
+        """Write ``data`` if the line will transmit it soon; drop it otherwise."""
         if self._queued() > self._most:
             with self._lock:
                 self._dropped += 1
@@ -50,8 +53,11 @@ class SerialPort(StreamLink):
         super().send(data)
 
     def let_go(self) -> None:
-        """Leave the port to a process that was forked with it; whoever receives or sends here again opens it
-        again. As long as somebody has a port open that was pulled out, it comes back under another name."""
+        """Leave the port to a process that was forked with it.
+
+        The next call of receive or send here opens the port again. The copy must be closed: a port that was
+        pulled out comes back under another name while any process has it open.
+        """
         with self._lock:
             self._forget()
             self._next_attempt = self._clock.now()
@@ -63,7 +69,7 @@ class SerialPort(StreamLink):
             return
 
     def _raw(self) -> int:
-        """The port, opened, for us alone, and set up."""
+        """Open the port for exclusive use, set it up, and return its file descriptor."""
         try:
             port = os.open(self._endpoint.device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as error:
@@ -73,7 +79,7 @@ class SerialPort(StreamLink):
             _, _, control, _, _, _, characters = termios.tcgetattr(port)
             control &= ~(termios.CSIZE | termios.PARENB | termios.CSTOPB | getattr(termios, "CRTSCTS", 0))
             control |= termios.CS8 | termios.CREAD | termios.CLOCAL
-            # Somebody may have left 0 there: then nothing to read looks like a port that is gone.
+            # VMIN may be 0 from an earlier user: then an idle port would look like one that is gone.
             characters[termios.VMIN], characters[termios.VTIME] = 1, 0
             speed = self._speed
             termios.tcsetattr(port, termios.TCSANOW, [0, 0, control, 0, speed, speed, characters])
@@ -83,7 +89,7 @@ class SerialPort(StreamLink):
         return port
 
     def _queued(self) -> int:
-        """Bytes that the system still has to send."""
+        """Return the number of bytes that the system still has to send."""
         with self._lock:
             if not self._streams:
                 return 0

@@ -1,4 +1,4 @@
-"""One byte stream, without waiting: frames are put together on the way in, and never cut on the way out."""
+"""One byte stream, without waiting: input is assembled into frames, and output is never cut within one."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ _CHUNK: Final = 8192
 
 
 class Assembler:
-    """Holds back the beginning of a frame until its rest is there. Nothing is lost: all other bytes, garbage
-    too, are handed on at once, so that whoever decodes counts them. (Garbage that looks like a start makes
-    the decoder wait for the next piece at times; whole frames alone never do.)"""
+    """Assembler that holds back the beginning of a frame until its rest has arrived.
+
+    Nothing is lost: all other bytes, garbage included, are passed on at once, so that the decoder can count
+    them. (Garbage that looks like a start may make the decoder wait for the next piece; complete frames alone
+    never do.)
+    """
 
     def __init__(self) -> None:
         self._framer = Framer()
         self._rest = b""
 
     def feed(self, data: bytes) -> bytes:
-        """What is complete of what came before and ``data``; may be empty."""
+        """Return the complete part of earlier input and ``data``; it may be empty."""
         self._framer.feed(data)
         data = self._rest + data
         whole = len(data) - self._framer.pending_bytes
@@ -29,9 +32,11 @@ class Assembler:
 
 
 class Stream:
-    """A file descriptor, which becomes this object's own. When the other side is slow, ``backlog`` bytes wait
-    (or one datagram that is longer); beyond, whole datagrams are refused: what is late is worth less than
-    what comes next."""
+    """Non-blocking stream over a file descriptor, which it owns.
+
+    When the other side is slow, up to ``backlog`` bytes wait (or one datagram that is longer). Beyond that,
+    whole datagrams are refused: late data is worth less than newer data.
+    """
 
     def __init__(self, fileno: int, backlog: int) -> None:
         os.set_blocking(fileno, False)
@@ -41,20 +46,22 @@ class Stream:
         self._waiting = b""
         self._stuck_at: int | None = None
         self.alive = True
-        """False once the other side is gone; then only ``close`` makes sense."""
+        """False once the other side is gone; then only ``close`` is useful."""
 
     @property
     def waits(self) -> bool:
-        """Whether something is left to be written as soon as there is room."""
+        """Whether data waits to be written as soon as there is room."""
         return bool(self._waiting)
 
     def fileno(self) -> int:
-        """The file descriptor, open until ``close``."""
+        """Return the file descriptor, open until ``close``."""
         return self._fileno
 
     def read(self) -> bytes | None:
-        """What has arrived, in whole frames as far as it is frames, about 8 KiB at most; None if there is
-        nothing."""
+        """Return what has arrived, about 8 KiB at most; None if there is nothing.
+
+        Frames are returned complete.
+        """
         try:
             data = os.read(self._fileno, _CHUNK)
         except BlockingIOError:
@@ -67,7 +74,7 @@ class Stream:
         return self._assembler.feed(data)
 
     def stuck(self, now: int) -> int:
-        """For how long (µs) something has been waiting of which the other side took nothing, at ``now``."""
+        """Return for how long (µs), at ``now``, the other side has taken nothing of the data that waits."""
         if not self._waiting:
             return 0
         if self._stuck_at is None:
@@ -75,7 +82,7 @@ class Stream:
         return now - self._stuck_at
 
     def write(self, data: bytes) -> bool:
-        """False if ``data`` was refused; then none of it has been or will be written."""
+        """Write ``data``, or return False if it was refused; then none of it has been or will be written."""
         self.flush()
         if not self.alive or (self._waiting and len(self._waiting) + len(data) > self._backlog):
             return False
@@ -84,7 +91,7 @@ class Stream:
         return True
 
     def flush(self) -> None:
-        """Write of what waits as much as there is room for."""
+        """Write as much of the waiting data as there is room for."""
         try:
             while self._waiting:
                 self._waiting = self._waiting[os.write(self._fileno, self._waiting) :]
@@ -96,5 +103,5 @@ class Stream:
             self._waiting = b""
 
     def close(self) -> None:
-        """Give the file descriptor back; once."""
+        """Close the file descriptor; call this once."""
         os.close(self._fileno)

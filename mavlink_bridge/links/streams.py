@@ -1,4 +1,4 @@
-"""What links over byte streams have in common: some streams, one thing to wait for, and coming back."""
+"""Common base of links over byte streams: several streams, one file descriptor to wait for, reconnection."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from mavlink_bridge.links.link import LinkCounters
 from mavlink_bridge.links.stream import Stream
 
 RETRY: Final = 1_000_000
-"""µs between two attempts to get a lost connection back."""
+"""µs between two attempts to reconnect."""
 HUNG: Final = 30_000_000
-"""µs after which a peer that takes nothing of what waits for it is given up: it would hold its place for
-ever."""
+"""µs after which a peer that takes no data is dropped: it would keep its place for ever."""
 _ENOUGH: Final = 16384
-# Bytes of all streams that are taken in at once: there may be many, full of what takes long to look at.
+# Bytes of all streams that are read at once: there may be many streams, full of data that is slow to parse.
 
 
 class StreamLink:
-    """A link over any number of streams. A stream that breaks or hangs is dropped, and if none is left,
-    ``_reopen`` is called once a second.
+    """Link over any number of streams.
+
+    A stream that breaks or hangs is dropped, and if none is left, ``_reopen`` is called once a second.
 
     The two threads that may use a link share its streams, hence the lock; nothing within it waits.
     """
@@ -40,20 +40,24 @@ class StreamLink:
 
     @property
     def counters(self) -> LinkCounters:
-        """A datagram that one of several peers takes is sent; on a stream, what is read at once is one."""
+        """Counts of datagrams.
+
+        A datagram that at least one of several peers takes is sent; on a stream, the result of one read is
+        one datagram.
+        """
         return LinkCounters(self._received, self._sent, self._dropped)
 
     @property
     def peers(self) -> int:
-        """How many streams are open."""
+        """Number of open streams."""
         return len(self._streams)
 
     def fileno(self) -> int | None:
-        """The selector over all streams, where the system has such a thing."""
+        """Return the file descriptor of the selector over all streams; None where the system has none."""
         return self._fileno
 
     def receive(self) -> list[bytes]:
-        """What has arrived on all streams; also goes on with what is under way: calls, writing."""
+        """Return what has arrived on all streams; also continue pending connections and writes."""
         with self._lock:
             found: list[bytes] = []
             if not self._open:
@@ -94,11 +98,13 @@ class StreamLink:
             self._release()
             self._selector.close()
 
-    # For the kinds of links
+    # For subclasses.
 
     def _forget(self) -> None:
-        """Close this process's copies of all streams, and of what waits for them: the selector of the other
-        process, which is the same to the system, stays as it is."""
+        """Close this process's copies of all streams, and discard what waits for them.
+
+        The selector of the other process, which is the same object of the system, stays as it is.
+        """
         if not self._open:
             return
         for stream in self._streams:
@@ -109,21 +115,21 @@ class StreamLink:
         self._fileno = _number(self._selector)
 
     def _adopt(self, fileno: int) -> None:
-        """One more stream."""
+        """Add a stream."""
         stream = Stream(fileno, self._backlog)
         self._streams.append(stream)
         self._selector.register(stream, selectors.EVENT_READ)
 
     def _reopen(self, now: int) -> None:
-        """No stream is left at ``now`` (µs): get one, or at least begin to."""
+        """Open a stream, or begin to, when none is left at ``now`` (µs)."""
 
     def _attend(self, ready: Any) -> None:
-        """``ready`` is registered in the selector and no stream."""
+        """Handle ``ready``, which is registered in the selector and is not a stream."""
 
     def _release(self) -> None:
         """Close what is not a stream."""
 
-    # Own
+    # For this class alone.
 
     def _recover(self) -> None:
         if self._streams:
@@ -134,14 +140,16 @@ class StreamLink:
             self._reopen(now)
 
     def _ready(self) -> list[Any]:
-        """What there is to do, each time beginning with another one."""
+        """Return what is ready, each time beginning with another one."""
         ready = [key.fileobj for key, _ in self._selector.select(0)]
         self._turn = turn = (self._turn + 1) % max(len(ready), 1)
         return ready[turn:] + ready[:turn]
 
     def _serve(self, stream: Stream, found: list[bytes]) -> int:
-        """Read a little, so that who says most is not all that is heard, and the rest the next time. How much
-        it was."""
+        """Read a little, so that the busiest sender does not displace the others; return the number of bytes.
+
+        The rest is read the next time.
+        """
         data = stream.read()
         if data:
             found.append(data)
@@ -150,7 +158,7 @@ class StreamLink:
         return len(data or b"")
 
     def _settle(self, stream: Stream) -> None:
-        """Watch for room only while something waits for it; drop what is broken or hangs."""
+        """Watch for room only while something waits for it; drop a stream that is broken or hung."""
         if not stream.alive or (stream.waits and stream.stuck(self._clock.now()) > HUNG):
             self._selector.unregister(stream)
             self._streams.remove(stream)

@@ -1,4 +1,4 @@
-"""Links over TCP: calling, again whenever the connection breaks, and being called by several."""
+"""Links over TCP: a client that reconnects whenever the connection breaks, and a server for several peers."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ MOST_CALLERS: Final = 32
 BACKLOG: Final = 65536
 """Bytes; some seconds of a vehicle's telemetry."""
 PATIENCE: Final = 5_000_000
-"""µs for which one call is left ringing: a lost packet is repeated after one second and after three."""
+"""µs after which a connection attempt ends: a lost packet is repeated after one second and after three."""
 
 
 _UNHEARD: Final = 30
-# s without a sign of life from the other machine: what it has not acknowledged, and probes when all is quiet.
+# s without an answer from the other machine: for data that it has not acknowledged, and for probes when idle.
 _WATCH: Final = {
     "TCP_USER_TIMEOUT": 1000 * _UNHEARD,
     "TCP_KEEPIDLE": 15,
@@ -31,8 +31,11 @@ _WATCH: Final = {
 
 
 def _quick(connection: socket.socket) -> None:
-    """Small packets at once, little that waits in the system beside the own backlog, and a notice within
-    half a minute, where the system can give it, that the other machine is gone."""
+    """Configure ``connection`` for low latency and detection of a lost peer.
+
+    Small packets are sent at once; little waits in the system beside the own backlog; and where the system
+    supports it, a lost peer is detected within half a minute.
+    """
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BACKLOG)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -43,8 +46,10 @@ def _quick(connection: socket.socket) -> None:
 
 
 class TcpCaller(StreamLink):
-    """``tcp``: calls once a second until someone answers. That nobody does at first is no error: the other
-    side may be started later."""
+    """Link of ``tcp``: it attempts to connect once a second until a peer accepts.
+
+    A missing peer is no error at first: the other side may be started later.
+    """
 
     def __init__(self, endpoint: TcpOut, clock: Clock) -> None:
         # First, so that a host without address leaves nothing open.
@@ -63,7 +68,7 @@ class TcpCaller(StreamLink):
         try:
             call.connect(self._address)
         except BlockingIOError:
-            pass  # the usual case: it becomes writable when it is decided
+            pass  # the usual case: the socket becomes writable when the connection is decided
         except OSError:
             call.close()
             return
@@ -74,7 +79,7 @@ class TcpCaller(StreamLink):
         call = self._calling
         if call is None or ready is not call:
             return
-        # A call to a free port of this machine may by chance reach itself.
+        # A connection to a free port of this machine may by chance reach itself.
         if call.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) or call.getsockname() == self._address:
             self._hang_up()
             return
@@ -94,14 +99,14 @@ class TcpCaller(StreamLink):
 
 
 class TcpListener(StreamLink):
-    """``tcpin``: what is sent goes to everyone who has called."""
+    """Link of ``tcpin``: what is sent goes to every connected peer."""
 
     def __init__(self, endpoint: TcpIn, clock: Clock) -> None:
         family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
         super().__init__(clock, BACKLOG)
         self._door = door = socket.socket(family, socket.SOCK_STREAM)
         try:
-            # Or a restart would have to wait a minute for the port.
+            # Without it a restart would have to wait a minute for the port.
             door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             door.bind(address)
             door.listen()
@@ -114,14 +119,14 @@ class TcpListener(StreamLink):
 
     @property
     def address(self) -> tuple[Any, ...]:
-        """Where this end listens: host, port, …"""
+        """Local address of the listening socket: host, port, …."""
         address: tuple[Any, ...] = self._door.getsockname()
         return address
 
     def _attend(self, ready: Any) -> None:
         if ready is not self._door:
             return
-        with suppress(OSError):  # it may have hung up before we looked
+        with suppress(OSError):  # the peer may have hung up before accept()
             caller, _ = self._door.accept()
             if self.peers >= MOST_CALLERS:
                 caller.close()

@@ -1,4 +1,4 @@
-"""Links over UDP: listening, speaking first, and multicast. One datagram is one UDP packet."""
+"""Links over UDP: listening, sending first, and multicast; one datagram is one UDP packet."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from mavlink_bridge.links.hosts import because, resolved
 from mavlink_bridge.links.link import BURST, LinkCounters
 
 Address = tuple[Any, ...]
-"""As the socket module writes it: (host, port, …)."""
+"""Address as in the socket module: (host, port, …)."""
 
 REMEMBERED: Final = 10_000_000
-"""µs for which a peer of a listening link is answered after it was last heard; the last one for ever."""
+"""µs after its last packet for which a listening link answers a peer; the last peer is answered for ever."""
 MOST_PEERS: Final = 32
 STEADY: Final = 3_000_000
-"""µs in which a peer has to say something, or one more may take its place when there are too many."""
+"""µs within which a peer must send, or a new one may take its place when there are too many."""
 _LONGEST: Final = 65536
 # The default holds some 250 packets: less than a swarm sends while one plan is being solved on a busy host.
 _BUFFER: Final = 1 << 20
 
 
 class _Udp:
-    """What the three have in common. ``receiver`` and ``sender`` may be one socket."""
+    """Common base of the three links; ``receiver`` and ``sender`` may be one socket."""
 
     def __init__(self, receiver: socket.socket, sender: socket.socket) -> None:
         self._receiver, self._sender = receiver, sender
@@ -38,27 +38,27 @@ class _Udp:
 
     @property
     def counters(self) -> LinkCounters:
-        """A packet to several peers is sent once."""
+        """Counts; a packet to several peers is sent once."""
         return LinkCounters(self._received, self._sent, self._dropped)
 
     @property
     def address(self) -> Address:
-        """Where this end listens: host, port, …"""
+        """Local address of the receiving socket: host, port, …."""
         address: Address = self._receiver.getsockname()
         return address
 
     def fileno(self) -> int:
-        """The receiving socket."""
+        """Return the receiving socket's file descriptor."""
         return self._fileno
 
     def receive(self) -> list[bytes]:
-        """The packets that have arrived."""
+        """Return the packets that have arrived."""
         found: list[bytes] = []
         for _ in range(BURST):
             try:
                 data, source = self._receiver.recvfrom(_LONGEST)
             except ConnectionError:
-                continue  # an earlier packet of ours found nobody: that says nothing about what has arrived
+                continue  # an earlier packet of this end was refused: that says nothing about what arrived
             except OSError:
                 break
             if self._heard(source) and data:
@@ -67,7 +67,7 @@ class _Udp:
         return found
 
     def send(self, data: bytes) -> None:
-        """One packet to everyone who is to have it."""
+        """Send one packet to every peer."""
         if self._send(data):
             self._sent += 1
         else:
@@ -79,11 +79,11 @@ class _Udp:
         self._sender.close()
 
     def _heard(self, source: Address) -> bool:
-        """Whether what ``source`` sends counts."""
+        """Return whether packets from ``source`` are accepted."""
         return True
 
     def _send(self, data: bytes) -> bool:
-        """To the connected peer. Once more if it was refused: the refusal was that of an earlier packet."""
+        """Send to the connected peer; repeat once if refused: the refusal was that of an earlier packet."""
         for _ in range(2):
             try:
                 self._sender.send(data)
@@ -96,13 +96,14 @@ class _Udp:
 
 
 class UdpListener(_Udp):
-    """``udpin``: binds, and sends everything to all peers heard in the last 10 s, or else to the last one.
-    When there are too many, those that go on speaking stay, and what one more says is heard but not answered:
-    else somebody with many ports could take the stream away from all others.
+    """Link of ``udpin``: binds, and sends to all peers of the last 10 s, or else to the last one.
 
-    As pymavlink and unlike mavlink-router's server mode, which answers the last one only: with two peers
-    (an autopilot's two ports, a ground station beside a script) each would then see half of the stream.
-    The endpoint's own peer, if it has one, is sent everything always.
+    When there are too many peers, those that continue to send stay. Packets of a further one are received but
+    not answered: otherwise a sender with many ports could take the stream away from all others.
+
+    This matches pymavlink and differs from mavlink-router's server mode, which answers the last peer only:
+    with two peers (an autopilot's two ports, a ground station beside a script) each would then see half of
+    the stream. The endpoint's own peer, if it has one, is always sent everything.
     """
 
     def __init__(self, endpoint: UdpIn, clock: Clock) -> None:
@@ -122,12 +123,13 @@ class UdpListener(_Udp):
 
     @property
     def peers(self) -> int:
-        """How many were heard in the last 10 s."""
+        """Number of peers that sent in the last 10 s."""
         now = self._clock.now()
         return sum(now - time <= REMEMBERED for time in self._peers.values())
 
     def _heard(self, source: Address) -> bool:
-        # Another dictionary each time: the sending thread may be going through this one. Last heard is last.
+        # A new dictionary each time, because the sending thread may be iterating over the old one. The latest
+        # sender comes last.
         now = self._clock.now()
         peers = {
             peer: time for peer, time in self._peers.items() if peer != source and now - time <= REMEMBERED
@@ -163,7 +165,7 @@ def _peer_address(endpoint: UdpIn, host: str, port: int, family: socket.AddressF
 
 
 class UdpCaller(_Udp):
-    """``udpout``: a connected socket, so that nobody but the peer is heard."""
+    """Link of ``udpout``: a connected socket, so that only the peer's packets are received."""
 
     def __init__(self, endpoint: UdpOut) -> None:
         family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_DGRAM)
@@ -178,10 +180,11 @@ class UdpCaller(_Udp):
 
 
 class MulticastLink(_Udp):
-    """``mcast``: every other member of the group hears it, on this machine too; the own echo is left out.
+    """Link of ``mcast``: every other member of the group receives, on this machine too.
 
-    Two sockets, as every member needs the group's port to hear but an address of its own to be told from its
-    echo. On a loopback interface the time to live is 0: nothing leaves the machine; elsewhere 1.
+    The link drops its own echo. It has two sockets, because every member needs the group's port to receive,
+    but an address of its own to recognise its echo. On a loopback interface the time to live is 0: nothing
+    leaves the machine; elsewhere it is 1.
     """
 
     def __init__(self, endpoint: Multicast) -> None:
@@ -203,9 +206,9 @@ class MulticastLink(_Udp):
         local = endpoint.interface is not None and IPv4Address(endpoint.interface).is_loopback
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if hasattr(socket, "SO_REUSEPORT"):
-            # Elsewhere than on Linux it takes this for several members on one machine.
+            # Systems other than Linux need it for several members on one machine.
             receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
-        # Bound to the group: what else comes to this port is not for us.
+        # Bound to the group, so that other packets to this port are not received.
         receiver.bind((endpoint.group, endpoint.port))
         receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group + interface)
         if endpoint.interface is not None:
@@ -213,7 +216,7 @@ class MulticastLink(_Udp):
             sender.bind((endpoint.interface, 0))
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0 if local else 1)
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
-        # Connected, it has one source address, by which the echo is known.
+        # Connected, it has one source address, by which its echo is recognised.
         sender.connect((endpoint.group, endpoint.port))
 
     def _heard(self, source: Address) -> bool:

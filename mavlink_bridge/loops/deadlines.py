@@ -1,4 +1,4 @@
-"""When a node is due under a clock that does not wait: at phase + k period, whatever happens."""
+"""Deadlines of a node under a wall clock: at phase + k period, regardless of delays."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from mavlink_bridge.loops.histogram import Histogram
 
 
 class Deadlines:
-    """The grid ``phase`` + k ``period`` (µs, whole multiples of 4; k an integer), and how well it is kept.
+    """The grid ``phase`` + k ``period`` (µs, multiples of 4; k an integer), and statistics of its observance.
 
-    Who comes late goes on with the latest deadline that has passed; those before it are skipped, so that
-    being late never leads to a burst and never shifts the grid. ``misses``: steps that began more than
-    ``tolerance`` (µs, one period unless told otherwise) after the deadline they waited for. Raises
-    ScheduleError for a grid that is none.
+    After a late step the node continues with the latest deadline that has passed; earlier ones are skipped.
+    Lateness therefore never causes a burst and never shifts the grid. ``misses`` counts steps that began more
+    than ``tolerance`` (µs, default one period) after the deadline they waited for. Raises ScheduleError for
+    an invalid period or phase.
     """
 
     def __init__(self, period: int, phase: int, tolerance: int | None = None) -> None:
@@ -29,12 +29,15 @@ class Deadlines:
         self.lateness = Histogram()
 
     def first(self, now: int) -> int:
-        """The earliest deadline from ``now`` (µs) on."""
+        """Return the earliest deadline at or after ``now`` (µs)."""
         return now + (self.phase - now) % self.period
 
     def begin(self, deadline: int, now: int, *, excused: bool = False) -> int:
-        """``now`` (µs) a step begins that waited for ``deadline``; the deadline that it is the step of. One
-        that is ``excused`` (it was held up on purpose) counts nowhere."""
+        """Record the beginning of a step at ``now`` (µs), which waited for ``deadline``.
+
+        Returns the deadline to which the step counts: the latest that has passed. An ``excused`` step (one
+        that was held up on purpose) is not counted in the statistics.
+        """
         late = now - deadline
         passed = max(late // self.period, 0)
         if not excused:
@@ -44,5 +47,5 @@ class Deadlines:
         return deadline + passed * self.period
 
     def after(self, deadline: int) -> int:
-        """The deadline that follows ``deadline``."""
+        """Return the deadline that follows ``deadline``."""
         return deadline + self.period

@@ -1,4 +1,4 @@
-"""How durations are distributed, counted in constant memory: logarithmic bins, as those of HdrHistogram."""
+"""Distribution of durations in constant memory: logarithmic bins, as in HdrHistogram."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _OCTAVES: Final = 40
 
 
 class Spread(NamedTuple):
-    """Median, 99th percentile and largest of some durations (µs); all zero if there are none."""
+    """Median, 99th percentile and maximum of some durations (µs); all zero if there are none."""
 
     p50: int
     p99: int
@@ -19,10 +19,11 @@ class Spread(NamedTuple):
 
 
 class Histogram:
-    """Counts non-negative integers (µs). A quantile is exact below 64 and at most 1/32 too high above; what
-    is above 2^45 (a year) counts as that.
+    """Counts of non-negative integers (µs) in logarithmic bins.
 
-    Adding takes constant time and makes nothing that a garbage collector would have to look at.
+    A quantile is exact below 64 and at most 1/32 too high above. Values above 2^45 (a year) count as 2^45.
+
+    Adding takes constant time and creates no object that a garbage collector would have to examine.
     """
 
     def __init__(self) -> None:
@@ -31,7 +32,7 @@ class Histogram:
         self._bins = array("Q", bytes(8 * _EXACT * (_OCTAVES + 1)))
 
     def add(self, value: int) -> None:
-        """Count ``value``; a negative one as 0."""
+        """Count ``value``; a negative value counts as 0."""
         value = max(value, 0)
         self.count += 1
         self.max = max(self.max, value)
@@ -41,7 +42,7 @@ class Histogram:
         self._bins[min(place, len(self._bins) - 1)] += 1
 
     def include(self, other: Histogram) -> None:
-        """Count all that ``other`` counted, too."""
+        """Add all counts of ``other``."""
         self.count += other.count
         self.max = max(self.max, other.max)
         for place, count in enumerate(other._bins):
@@ -49,7 +50,7 @@ class Histogram:
                 self._bins[place] += count
 
     def quantile(self, fraction: float) -> int:
-        """The smallest value (or the upper end of its bin) that this ``fraction`` of all does not exceed."""
+        """Return the smallest value (or the upper end of its bin) that this ``fraction`` does not exceed."""
         rank = fraction * self.count
         seen = 0
         for place, count in enumerate(self._bins):
@@ -60,11 +61,11 @@ class Histogram:
 
     @property
     def spread(self) -> Spread:
-        """The three figures that are reported."""
+        """The three reported figures: median, 99th percentile and maximum."""
         return Spread(self.quantile(0.5), self.quantile(0.99), self.max)
 
 
 def _highest(place: int) -> int:
-    """The largest value that is counted at ``place``."""
+    """Return the largest value that is counted at ``place``."""
     octave = max((place >> _BITS) - 1, 0)
     return ((place - (octave << _BITS) + 1) << octave) - 1

@@ -1,4 +1,4 @@
-"""What arrives on all links of a node, kept until the node is due."""
+"""Buffer of the datagrams that arrive on all links of a node until the node is due."""
 
 from __future__ import annotations
 
@@ -13,32 +13,37 @@ from mavlink_bridge.links.tcp import TcpCaller, TcpListener
 from mavlink_bridge.node import Datagram
 
 CAPACITY: Final = 4096
-"""Datagrams that wait at most, of each link."""
+"""Largest number of datagrams that wait, for each link."""
 ROOM: Final = 1 << 20
-"""Bytes that wait at most, of each link."""
+"""Largest number of bytes that wait, for each link."""
 HANDFUL: Final = 16384
-"""Bytes of each link that one step is given: what it can see through in some milliseconds, were it garbage of
-the worst kind, and ten times what a busy swarm says meanwhile."""
+"""Largest number of bytes of each link that one step receives.
+
+A node parses this amount in some milliseconds even in the worst case of garbage; it is ten times what a busy
+swarm sends in that time.
+"""
 FINGERS: Final = 256
-"""Datagrams of a handful."""
+"""Largest number of datagrams of each link that one step receives."""
 _ROUND: Final = 0.02
-# s; in so long no link fills the buffer that the system keeps for it, not even a fast serial port.
+# s; no link fills the system's receive buffer in this time, not even a fast serial port.
 
 
 class Inbox:
-    """``links``: pairs of the node's name for a link, and the link. They are read when the inbox is emptied;
-    and now and then by a thread, because the system's own buffers are small and a step may be long. The
-    thread does not wake for every datagram: its turns would be taken from the steps of all on a small
-    computer.
+    """Receive queues of several links, one for each.
 
-    A flood on one link costs those who speak on others nothing: each has a queue of its own. If more than
-    ``capacity`` datagrams wait in one, or ``ROOM`` bytes, the oldest are dropped and counted in ``overruns``;
-    over TCP the sender is made to wait instead.
+    ``links``: pairs of the node's name for a link, and the link. The links are read when the inbox is
+    emptied. A thread also reads them periodically, because the system's own buffers are small and a step may
+    be long. The thread does not wake for every datagram: on a small computer that would take time from the
+    steps of all nodes.
+
+    A flood on one link does not affect the others, because each link has a queue of its own. If more than
+    ``capacity`` datagrams wait in a queue, or more than ``ROOM`` bytes, the oldest are dropped and counted in
+    ``overruns``; over TCP the sender is throttled instead.
     """
 
     def __init__(self, links: Sequence[tuple[str, Link]], capacity: int = CAPACITY) -> None:
         self._queues = tuple(_Queue(name, link, capacity) for name, link in links)
-        # Whoever has it reads links: two at once would mix up the order of arrival.
+        # The holder of this lock reads the links: two readers at once would mix up the order of arrival.
         self._reading = Lock()
         self._closing = Event()
         self._thread = None
@@ -48,12 +53,14 @@ class Inbox:
 
     @property
     def overruns(self) -> int:
-        """Datagrams that were dropped because too many waited."""
+        """Number of datagrams that were dropped because too many waited."""
         return sum(queue.overruns for queue in self._queues)
 
     def take(self) -> list[Datagram]:
-        """Take out what has arrived, by link in the order of arrival, a handful of each; the rest waits.
-        Raises BridgeError if the thread has ended, which it never should."""
+        """Remove and return what has arrived, by link and in order of arrival, up to the limit of each link.
+
+        The rest waits. Raises BridgeError if the thread has ended, which it never should.
+        """
         if self._thread is not None and not self._thread.is_alive():
             raise BridgeError("the receiving thread has ended")
         with self._reading:
@@ -61,7 +68,7 @@ class Inbox:
             return [datagram for queue in self._queues for datagram in queue.handful()]
 
     def close(self) -> None:
-        """End the thread and wait for it; the links stay open. Again is harmless."""
+        """End the thread and wait for it; the links stay open. Calling it again is harmless."""
         self._closing.set()
         if self._thread is not None:
             self._thread.join()
@@ -78,7 +85,7 @@ class Inbox:
 
 
 class _Queue:
-    """What waits of one link, oldest first."""
+    """Waiting datagrams of one link, oldest first."""
 
     def __init__(self, name: str, link: Link, capacity: int) -> None:
         self.overruns = 0
@@ -88,7 +95,7 @@ class _Queue:
         self._bytes = 0
 
     def read(self) -> None:
-        """Ask the link, unless its senders have said more than enough already and can be made to wait."""
+        """Read the link, unless enough data waits already and its senders can be throttled."""
         if self._throttles and self._bytes >= HANDFUL:
             return
         for data in self._link.receive():
@@ -99,7 +106,7 @@ class _Queue:
             self.overruns += 1
 
     def handful(self) -> list[Datagram]:
-        """The oldest, and all that fit beside it."""
+        """Remove and return the oldest datagram and all that fit beside it."""
         found: list[Datagram] = []
         room = HANDFUL
         while self._waiting and len(found) < FINGERS and (len(self._waiting[0].data) <= room or not found):

@@ -1,5 +1,8 @@
-"""The loop that runs nodes in lock-step under simulated time: one process, bit-identical whatever the order
-of the nodes. Each node may live by a clock of its own, hang for a while, or vanish."""
+"""Loop that runs nodes in lock-step under simulated time, in one process.
+
+The result is bit-identical whatever the order of the nodes. Each node may have a clock of its own, hang for a
+while, or vanish.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +22,14 @@ __all__ = ["BUFFER", "QUANTUM", "Direction", "LockStep", "Scheduled", "Tap"]
 Direction = Literal["in", "out"]
 
 BUFFER = 256
-"""Datagrams that wait for a node that hangs; about what a UDP socket holds by default on Linux."""
+"""Number of datagrams that wait for a hung node; about what a UDP socket holds by default on Linux."""
 
 
 class Scheduled(NamedTuple):
-    """``node`` is due whenever its clock shows ``phase`` + k ``period`` (µs, k an integer), for the first
-    time not before the true time ``phase``, and is told the time that its clock shows.
+    """A node and its timing.
+
+    ``node`` is due whenever its clock shows ``phase`` + k ``period`` (µs, k an integer), for the first time
+    not before the true time ``phase``. The node receives the time that its clock shows.
 
     Without a ``clock`` that is true time: due at ``phase``, ``phase`` + ``period``, …
     """
@@ -36,25 +41,30 @@ class Scheduled(NamedTuple):
 
 
 class Tap(Protocol):
-    """Sees every step of a node, and every datagram as it enters (``in``) or leaves (``out``) it; must not
-    change anything."""
+    """Observer of every step of a node and of every datagram that enters (``in``) or leaves (``out``) it.
+
+    A tap must not change anything.
+    """
 
     def begin(self, now: int, node: str, /) -> None:
-        """The node is stepped at ``now``; what enters and leaves it then follows."""
+        """Announce the step of ``node`` at ``now``; the datagrams that enter and leave it then follow."""
         ...
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        """At ``now`` µs, the time that the node is told; true time is the loop's ``now``."""
+        """Observe a datagram at ``now`` (µs) of the node's clock; true time is the loop's ``now``."""
         ...
 
 
 class LockStep:
-    """Runs ``scheduled`` nodes over ``ether``. All times are µs; periods and phases are whole multiples of
-    ``base_tick``, which is one of 4 µs. For a node that hangs ``buffer`` datagrams wait.
+    """Loop that steps ``scheduled`` nodes over ``ether`` in simulated time.
+
+    All times are µs; periods and phases are whole multiples of ``base_tick``, which is a multiple of 4 µs.
+    For a hung node up to ``buffer`` datagrams wait.
 
     Within a tick all due nodes first receive, then all step, then everything is sent: no node sees another's
-    output of the same tick. A node whose clock is not true is due at the first tick at which its clock shows
-    the deadline or more, so that its calls wander against the others'; a tick calls it once at most.
+    output of the same tick. A node whose clock deviates from true time is due at the first tick at which its
+    clock shows the deadline or more, so its steps drift relative to those of the others; a tick steps it at
+    most once.
 
     Raises ScheduleError for periods or phases off the grid, for names used twice, and for a clock that shows
     a negative time.
@@ -86,7 +96,7 @@ class LockStep:
             if one.node.name == following.node.name:
                 raise ScheduleError(f"two nodes are named {one.node.name!r}")
         self._slots = [Slot(*entry, base_tick) for entry in entries]
-        # Rooms of the buffers of those that hang.
+        # Remaining buffer capacity of each hung node.
         self._hanging: dict[str, int] = {}
         self._vanished: set[str] = set()
         # The index breaks ties by name, so that taps are called in one order whatever the order given.
@@ -95,14 +105,14 @@ class LockStep:
 
     @property
     def now(self) -> int:
-        """Every tick before this instant (µs, true time) has been run."""
+        """Time (µs, true time) before which every tick has been run."""
         return self._now
 
     def run(self, until: int, on_tick: Callable[[int], bool | None] | None = None) -> None:
-        """Run all ticks from ``now`` to before ``until`` (µs); ``run(a); run(b)`` is ``run(b)``.
+        """Run all ticks before ``until`` (µs), starting at the loop's ``now``.
 
-        Ticks on which no node is due are skipped. ``on_tick(time)`` is called after each tick that was run;
-        if it returns True the run ends there.
+        ``run(a); run(b)`` is the same as ``run(b)``. Ticks on which no node is due are skipped.
+        ``on_tick(time)`` is called after each tick that was run; if it returns True the run ends there.
         """
         due = self._due
         while due and due[0][0] < until:
@@ -114,20 +124,29 @@ class LockStep:
         self._now = max(self._now, until)
 
     def freeze(self, name: str) -> None:
-        """Node ``name`` hangs from now on: it is not stepped, and what arrives for it waits in its buffer;
-        when that is full, the newest is dropped. Its clock goes on."""
+        """Suspend node ``name``: it is not stepped, and what arrives for it waits in its buffer.
+
+        When the buffer is full, the newest datagrams are dropped. The node's clock continues. Raises
+        ScheduleError for an unknown name.
+        """
         self._index_of(name)
         self._hanging.setdefault(name, self._buffer)
 
     def thaw(self, name: str) -> None:
-        """Node ``name`` goes on at its next deadline with all that waited; those that passed are not made up
-        for. Nothing happens to one that has vanished."""
+        """Resume node ``name`` at its next deadline with all datagrams that waited.
+
+        Missed deadlines are not made up for. The call has no effect on a node that has vanished. Raises
+        ScheduleError for an unknown name.
+        """
         self._index_of(name)
         if name not in self._vanished:
             self._hanging.pop(name, None)
 
     def vanish(self, name: str) -> None:
-        """Node ``name`` is never stepped again; what waits or arrives for it is dropped."""
+        """Remove node ``name`` for good: it is never stepped again, and all its input is dropped.
+
+        Raises ScheduleError for an unknown name.
+        """
         self._index_of(name)
         self._hanging[name] = 0
         self._vanished.add(name)
@@ -163,7 +182,7 @@ class LockStep:
                 ether.send(now, slot.name, outbox)
 
     def _awake(self, now: int, slots: list[Slot]) -> list[Slot]:
-        """Those of ``slots`` that do not hang; the others let wait what has arrived."""
+        """Return those of ``slots`` that are not hung; for the others, buffer what has arrived."""
         for slot in slots:
             room = self._hanging.get(slot.name)
             if room is not None:

@@ -1,4 +1,4 @@
-"""Asking the system to let a loop run on time: real-time priority, memory that stays, a sharp timer."""
+"""Requests to the system for punctual loops: real-time priority, locked memory, precise timers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 from typing import Final, NamedTuple
 
 LEVEL: Final = 20
-"""Of 1…99: above all that is not real-time, below the threads of the kernel that serve devices (50)."""
+"""Real-time priority (1…99): above all normal threads, below the kernel's device threads (50)."""
 
 _LOCK_CURRENT, _LOCK_FUTURE, _LOCK_ON_FAULT = 1, 2, 4
 _SET_TIMER_SLACK: Final = 29
@@ -21,7 +21,10 @@ _HINT: Final = (
 
 
 class Priority(NamedTuple):
-    """What was granted. ``told`` says it in a sentence, with what to do if something was refused."""
+    """Privileges that the system granted.
+
+    ``told`` reports them in a sentence, with the remedy if a request was refused.
+    """
 
     realtime: bool
     locked: bool
@@ -29,9 +32,11 @@ class Priority(NamedTuple):
 
 
 def ask_for_priority(level: int = LEVEL) -> Priority:
-    """SCHED_FIFO at ``level`` for this thread and those it will start, pages that are not taken away, timers
-    without slack. What is refused is left out. Call it before any other thread is started: a thread of lower
-    priority that holds the interpreter lock would hold up all others."""
+    """Request SCHED_FIFO at ``level``, locked pages and timers without slack, for this and later threads.
+
+    Refused requests are left out of the result. Call this before any other thread is started: a thread of
+    lower priority that holds the interpreter lock would hold up all others.
+    """
     sharpen_timers()
     refusal = _fifo(level)
     locked = refusal is None and _lock_memory()
@@ -42,7 +47,10 @@ def ask_for_priority(level: int = LEVEL) -> Priority:
 
 
 def sharpen_timers() -> bool:
-    """Linux lets every sleep of a normal thread last up to 50 µs longer; this thread's 1 µs from now on."""
+    """Reduce the timer slack of this thread to 1 µs and return whether that succeeded.
+
+    By default Linux may extend every sleep of a normal thread by up to 50 µs.
+    """
     if sys.platform != "linux":
         return False
     libc = ctypes.CDLL(None, use_errno=True)
@@ -50,7 +58,7 @@ def sharpen_timers() -> bool:
 
 
 def _fifo(level: int) -> str | None:
-    """None, or why not."""
+    """Request SCHED_FIFO; return None, or the reason of the refusal."""
     if sys.platform != "linux":
         return "it needs Linux"
     try:
@@ -66,7 +74,10 @@ def _fifo(level: int) -> str | None:
 
 
 def _lock_memory() -> bool:
-    """Lock pages as they come into use. Only without limit: under one, memory would run out in flight."""
+    """Lock pages as they come into use, and only if the limit can be lifted.
+
+    Under a limit, memory would run out in flight.
+    """
     if sys.platform != "linux":
         return False
     import resource

@@ -1,4 +1,4 @@
-"""The loop that runs one node under a clock that does not wait, over real links."""
+"""Loop that runs one node under a wall clock, over real links."""
 
 from __future__ import annotations
 
@@ -17,14 +17,20 @@ from mavlink_bridge.loops.lockstep import Direction, Scheduled, Tap
 from mavlink_bridge.node import Datagram
 
 _NAP: Final = 100_000
-# µs; someone who wants the loop to stop waits no longer than this and one step.
+# µs; a request to stop takes effect after at most this time and one step.
 
 
 class Statistics(NamedTuple):
-    """How a run went. ``steps``: all that were not excused; ``misses``: those that began too late;
-    ``skipped``: deadlines without a step; ``lateness``: from the deadline to the beginning of a step;
-    ``busy``: from there to its end, with receiving, sending and taps; ``overruns``: datagrams dropped because
-    too many waited; ``unrouted``: datagrams on a link that leads nowhere."""
+    """Statistics of a run.
+
+    - ``steps``: all steps that were not excused
+    - ``misses``: steps that began too late
+    - ``skipped``: deadlines without a step
+    - ``lateness``: from the deadline to the beginning of a step (µs)
+    - ``busy``: from the beginning to the end of a step, with receiving, sending and taps (µs)
+    - ``overruns``: datagrams dropped because too many waited
+    - ``unrouted``: datagrams for a link that is not connected
+    """
 
     steps: int
     misses: int
@@ -36,15 +42,18 @@ class Statistics(NamedTuple):
 
 
 class RealTime:
-    """Runs ``scheduled.node`` at phase + k period (µs), from the first such instant that is not past, of
-    ``clock``, or of the node's own clock if ``scheduled`` has one. The node is told the deadline, not the
-    instant at which it really runs, which is less than a period later: so its own periods divide evenly, and
-    the low two bits of every time are free for a tlog's link.
+    """Loop that steps ``scheduled.node`` at phase + k period (µs).
 
-    ``links``: by the node's name for a link, the link or several; what the node sends goes to all of them.
-    The links belong to the loop, which closes them in the end. ``on_idle(µs)`` is told after each step how
-    long nothing will happen. ``excused()`` is asked before each step whether something held it up on purpose:
-    then its lateness counts nowhere. See ``Deadlines`` for ``tolerance``, ``Inbox`` for ``capacity``.
+    It starts at the first such instant that is not past, on ``clock``, or on the node's own clock if
+    ``scheduled`` has one. The node receives the deadline, not the instant at which it really runs, which is
+    less than a period later. So the node's own periods divide evenly, and the low two bits of every time are
+    free for a tlog's link.
+
+    ``links`` maps the node's name for a link to one or several links; what the node sends goes to all of
+    them. The loop owns the links and closes them at the end. After each step the loop calls ``on_idle(µs)``
+    with the time until the next deadline. Before each step it calls ``excused()``, which returns whether the
+    step was held up on purpose; the lateness of such a step is not counted. See ``Deadlines`` for
+    ``tolerance``, ``Inbox`` for ``capacity``.
 
     Raises ScheduleError for periods and phases off the grid.
     """
@@ -80,7 +89,10 @@ class RealTime:
 
     @property
     def statistics(self) -> Statistics:
-        """So far. For figures over several loops put ``deadlines.lateness`` and ``busy`` together."""
+        """Statistics of the run so far.
+
+        For figures over several loops, combine ``deadlines.lateness`` and ``busy``.
+        """
         due = self.deadlines
         return Statistics(
             due.lateness.count,
@@ -95,8 +107,10 @@ class RealTime:
     def run(
         self, stop: Callable[[], bool], on_step: Callable[[int], bool | None] | None = None
     ) -> Statistics:
-        """Run until ``stop()`` is true (asked before every step, from this thread) or ``on_step(now)``,
-        called after every step with true time, returns True. Once: the links are closed, whatever the end.
+        """Run until ``stop()`` or ``on_step(now)`` returns True, and return the statistics.
+
+        ``stop`` is called before every step, from this thread; ``on_step`` after every step, with true time.
+        The loop runs only once: the links are closed however it ends.
         """
         clock, due = self._clock, self.deadlines
         with ExitStack() as cleanup:
@@ -123,7 +137,7 @@ class RealTime:
         return self.statistics
 
     def _wait(self, deadline: int, stop: Callable[[], bool]) -> bool:
-        """Until ``deadline``; False if it is time to stop."""
+        """Wait until ``deadline``; return False if the loop shall stop."""
         clock = self._clock
         while not stop():
             nap = clock.now() + _NAP
@@ -136,7 +150,8 @@ class RealTime:
     def _step(self, now: int, inbox: Inbox) -> None:
         arrived = inbox.take()
         self._overruns = inbox.overruns
-        # Taps come last, so that writing a log makes no set-point late; but what a node fails at is logged.
+        # Taps run last, so that writing a log delays no set-point. ``finally`` logs the input on which a node
+        # fails.
         try:
             leaving = self._node.step(now, arrived)
             self._send(leaving)

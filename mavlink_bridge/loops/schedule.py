@@ -1,4 +1,4 @@
-"""When one node is due in lock-step, and what time it is told."""
+"""Schedule of one node in lock-step: the ticks at which it is due, and the times that it receives."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from mavlink_bridge.node import Node
 
 
 class Slot:
-    """A node's deadlines: ``phase`` + k ``period`` (µs) on its own ``clock`` (None: true time), each met at
-    the first multiple of ``tick`` (µs, true time) at which the clock shows it or more.
+    """A node's deadlines: ``phase`` + k ``period`` (µs) on its own ``clock`` (None: true time).
 
-    Raises ScheduleError for a clock that shows a negative time at ``phase``.
+    Each deadline is met at the first multiple of ``tick`` (µs, true time) at which the clock shows it or
+    more. Raises ScheduleError for a clock that shows a negative time at ``phase``.
     """
 
     __slots__ = ("_clock", "_period", "_phase", "_tick", "name", "step")
@@ -22,12 +22,14 @@ class Slot:
         self._clock = None if clock is None else self._checked(clock, phase)
 
     def first(self) -> int:
-        """The first tick (µs, true time) at which the node is due: none before ``phase``."""
+        """Return the first tick (µs, true time) at which the node is due; never before ``phase``."""
         return self._phase if self._clock is None else self.after(self._phase - 1)
 
     def after(self, true: int) -> int:
-        """The tick of the first deadline that the clock does not show yet at ``true`` (µs), where without a
-        clock the node is due; no deadline is met twice."""
+        """Return the tick (µs, true time) of the first deadline that the clock does not show yet at ``true``.
+
+        Without a clock, ``true`` must be a tick at which the node is due. No deadline is met twice.
+        """
         if self._clock is None:
             return true + self._period
         shown = self._clock.reading(true)
@@ -35,8 +37,10 @@ class Slot:
         return instant + -instant % self._tick
 
     def told(self, true: int) -> int:
-        """The time (µs) to tell the node when it is called at ``true``: more than the last time, as
-        there is a deadline between the two."""
+        """Return the time (µs) that the node receives when it is stepped at ``true``.
+
+        It is later than the previous one, because a deadline lies between the two.
+        """
         return true if self._clock is None else self._clock.local(true)
 
     def _checked(self, clock: NodeClock, true: int) -> NodeClock:

@@ -1,10 +1,9 @@
-"""The values that outrider exchanges: one frozen tuple per MAVLink message, SI units, the message's own
-frame.
+"""Values that outrider exchanges: one frozen tuple per MAVLink message, SI units, the message's own frame.
 
 Angles are radians, distances metres, latitudes and longitudes degrees (float64, so that the degE7 step of 1.1
-cm is kept), times integer µs. Positions stay local NED or geodetic as the message is: ``frames`` alone
-converts. ``None`` stands for a field that the sender marked unknown. Tuples rather than dataclasses: they are
-made thousands of times a second and a tuple costs a third as much.
+cm is kept), times integer µs. Positions stay local NED or geodetic as in the message; only ``frames``
+converts them. ``None`` stands for a field that the sender marked unknown. The values are tuples rather than
+dataclasses because they are created thousands of times a second, and a tuple costs a third as much.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a vehicle says of itself, and what it is told: states, commands, set-points, texts, plans."""
+"""Messages of flight: vehicle states, commands, set-points, texts and plans."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Heartbeat(NamedTuple):
 
 
 class SysStatus(NamedTuple):
-    """SYS_STATUS (1): sensor bit masks, battery. ``battery_remaining`` in 0…1 or None."""
+    """SYS_STATUS (1): sensor bit masks and battery; ``battery_remaining`` in 0…1 or None."""
 
     source: Source
     present: int
@@ -48,7 +48,7 @@ class Ping(NamedTuple):
 
 
 class Attitude(NamedTuple):
-    """ATTITUDE (30): FRD body against local NED; Euler angles (rad) and body rates (rad/s)."""
+    """ATTITUDE (30): FRD body relative to local NED; Euler angles (rad) and body rates (rad/s)."""
 
     source: Source
     time_boot: int
@@ -59,7 +59,7 @@ class Attitude(NamedTuple):
 
 
 class LocalPosition(NamedTuple):
-    """LOCAL_POSITION_NED (32): relative to the sender's *own* origin; never compare two vehicles'."""
+    """LOCAL_POSITION_NED (32), relative to the sender's *own* origin; never compare those of two vehicles."""
 
     source: Source
     time_boot: int
@@ -68,8 +68,11 @@ class LocalPosition(NamedTuple):
 
 
 class GlobalPosition(NamedTuple):
-    """GLOBAL_POSITION_INT (33). ``altitude`` above mean sea level, ``relative_altitude`` above home, yaw
-    clockwise from north in rad or None."""
+    """GLOBAL_POSITION_INT (33).
+
+    ``altitude`` above mean sea level, ``relative_altitude`` above home, ``yaw`` clockwise from north in rad
+    or None.
+    """
 
     source: Source
     time_boot: int
@@ -82,7 +85,7 @@ class GlobalPosition(NamedTuple):
 
 
 class GpsGlobalOrigin(NamedTuple):
-    """GPS_GLOBAL_ORIGIN (49): where the sender's local frame has its zero."""
+    """GPS_GLOBAL_ORIGIN (49): the origin of the sender's local frame."""
 
     source: Source
     latitude: float
@@ -92,7 +95,7 @@ class GpsGlobalOrigin(NamedTuple):
 
 
 class CommandInt(NamedTuple):
-    """COMMAND_INT (75). ``x``, ``y`` are the raw int32 (degE7 in global frames)."""
+    """COMMAND_INT (75); ``x``, ``y`` are the raw int32 (degE7 in global frames)."""
 
     source: Source
     target_system: int
@@ -129,7 +132,7 @@ class CommandAck(NamedTuple):
 
 
 class SetpointLocal(NamedTuple):
-    """SET_POSITION_TARGET_LOCAL_NED (84): as sent, ignored fields included (they may hold NaN)."""
+    """SET_POSITION_TARGET_LOCAL_NED (84) as sent, including ignored fields (they may hold NaN)."""
 
     source: Source
     time_boot: int
@@ -145,8 +148,10 @@ class SetpointLocal(NamedTuple):
 
 
 class SetpointGlobal(NamedTuple):
-    """SET_POSITION_TARGET_GLOBAL_INT (86): as sent; ``x``, ``y`` are the raw int32 (degE7), ``altitude`` (m)
-    counts from what ``frame`` says."""
+    """SET_POSITION_TARGET_GLOBAL_INT (86) as sent.
+
+    ``x``, ``y`` are the raw int32 (degE7); ``altitude`` (m) is relative to the reference of ``frame``.
+    """
 
     source: Source
     time_boot: int
@@ -164,8 +169,10 @@ class SetpointGlobal(NamedTuple):
 
 
 class SetpointAttitude(NamedTuple):
-    """SET_ATTITUDE_TARGET (82): attitude (w, x, y, z; FRD body to NED), body rates (rad/s) and thrust, as
-    sent, ignored fields included."""
+    """SET_ATTITUDE_TARGET (82) as sent, including ignored fields.
+
+    Attitude (w, x, y, z; FRD body to NED), body rates (rad/s) and thrust.
+    """
 
     source: Source
     time_boot: int
@@ -178,7 +185,7 @@ class SetpointAttitude(NamedTuple):
 
 
 class PositionTarget(NamedTuple):
-    """POSITION_TARGET_LOCAL_NED (85): the autopilot's echo of what it follows."""
+    """POSITION_TARGET_LOCAL_NED (85): the autopilot's echo of the set-point that it follows."""
 
     source: Source
     time_boot: int
@@ -192,7 +199,7 @@ class PositionTarget(NamedTuple):
 
 
 class Timesync(NamedTuple):
-    """TIMESYNC (111): ``tc1`` and ``ts1`` in ns, as the message says; tc1 = 0 is a request."""
+    """TIMESYNC (111): ``tc1`` and ``ts1`` in ns, as in the message; tc1 = 0 is a request."""
 
     source: Source
     tc1: int
@@ -200,8 +207,10 @@ class Timesync(NamedTuple):
 
 
 class FollowTarget(NamedTuple):
-    """FOLLOW_TARGET (144): where one to be followed is. Degrees, m above mean sea level, m/s NED;
-    ``velocity`` is None where the sender knows none."""
+    """FOLLOW_TARGET (144): position of a target to follow, in degrees, m above mean sea level, m/s NED.
+
+    ``velocity`` is None where the sender does not know it.
+    """
 
     source: Source
     time_boot: int
@@ -212,8 +221,7 @@ class FollowTarget(NamedTuple):
 
 
 class FenceStatus(NamedTuple):
-    """FENCE_STATUS (162): since when (µs since boot) which kind (FENCE_BREACH) of limit has been broken, and
-    how often."""
+    """FENCE_STATUS (162): time of the breach (µs since boot), kind (FENCE_BREACH), and number of breaches."""
 
     source: Source
     time_boot: int
@@ -223,8 +231,10 @@ class FenceStatus(NamedTuple):
 
 
 class EkfStatus(NamedTuple):
-    """EKF_STATUS_REPORT (193, ardupilotmega): bit mask of ESTIMATOR flags; ratios of innovations to their
-    gates (below 1 is good)."""
+    """EKF_STATUS_REPORT (193, ardupilotmega).
+
+    Bit mask of ESTIMATOR flags; ratios of innovations to their gates (below 1 is good).
+    """
 
     source: Source
     flags: int
@@ -243,7 +253,7 @@ class ExtendedSysState(NamedTuple):
 
 
 class StatusText(NamedTuple):
-    """STATUSTEXT (253): ``text`` at most 50 characters here; longer texts are split by the encoder."""
+    """STATUSTEXT (253): ``text`` at most 50 characters here; the encoder splits longer texts."""
 
     source: Source
     severity: int

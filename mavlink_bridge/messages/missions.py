@@ -1,6 +1,7 @@
-"""The mission protocol: missions, fences and rally points up and down.
+"""Messages of the mission protocol: transfer of missions, fences and rally points in both directions.
 
-``mission_type`` is MAV_MISSION_TYPE. ``opaque_id`` names a plan that the vehicle holds, 0 when it has none.
+``mission_type`` is MAV_MISSION_TYPE. ``opaque_id`` identifies the plan that the vehicle holds; 0 when it has
+none.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from mavlink_bridge.messages.source import Source
 
 
 class MissionWritePartialList(NamedTuple):
-    """MISSION_WRITE_PARTIAL_LIST (38): items ``start`` to ``end``, both included, will be sent anew."""
+    """MISSION_WRITE_PARTIAL_LIST (38): items ``start`` to ``end``, both included, will be sent again."""
 
     source: Source
     start: int
@@ -59,8 +60,11 @@ class MissionSetCurrent(NamedTuple):
 
 
 class MissionCurrent(NamedTuple):
-    """MISSION_CURRENT (42). ``total`` is the last item, 65535 without a mission; ``state`` is MISSION_STATE;
-    ``mode`` 1 in mission mode, 2 out of it; then the ids of the three plans."""
+    """MISSION_CURRENT (42).
+
+    ``total`` is the last item, 65535 without a mission; ``state`` is MISSION_STATE; ``mode`` is 1 in mission
+    mode, 2 out of it; the ids of the three plans follow.
+    """
 
     source: Source
     seq: int

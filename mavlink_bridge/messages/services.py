@@ -1,4 +1,4 @@
-"""What ground stations ask of an autopilot: parameters, streams, files, its home."""
+"""Messages of an autopilot's services: parameters, streams, files, home."""
 
 from __future__ import annotations
 
@@ -36,9 +36,11 @@ class ParamRequestList(NamedTuple):
 
 
 class ParamValue(NamedTuple):
-    """PARAM_VALUE (22). ``raw``: the four bytes of the value as sent; their meaning is the firmware's own,
-    and an integer in them may look like a signalling NaN, which no float survives. It is parameter
-    ``number`` of ``total``."""
+    """PARAM_VALUE (22): parameter ``number`` of ``total``.
+
+    ``raw``: the four bytes of the value as sent. Their meaning depends on the firmware, and an integer in
+    them may look like a signalling NaN, which a conversion to float would change.
+    """
 
     source: Source
     raw: bytes
@@ -49,7 +51,7 @@ class ParamValue(NamedTuple):
 
 
 class ParamSet(NamedTuple):
-    """PARAM_SET (23). ``raw`` as in ``ParamValue``."""
+    """PARAM_SET (23); ``raw`` as in ``ParamValue``."""
 
     source: Source
     raw: bytes
@@ -92,8 +94,11 @@ class FileTransfer(NamedTuple):
 
 
 class AutopilotVersion(NamedTuple):
-    """AUTOPILOT_VERSION (148). ``capabilities`` are MAV_PROTOCOL_CAPABILITY; versions as four bytes, the
-    first the highest; custom versions of eight bytes, ``uid2`` of 18."""
+    """AUTOPILOT_VERSION (148).
+
+    ``capabilities`` are MAV_PROTOCOL_CAPABILITY; versions are four bytes, the most significant first; custom
+    versions have eight bytes, ``uid2`` has 18.
+    """
 
     source: Source
     capabilities: int
@@ -111,7 +116,7 @@ class AutopilotVersion(NamedTuple):
 
 
 class HomePosition(NamedTuple):
-    """HOME_POSITION (242). ``attitude`` (w, x, y, z) there and ``approach`` (m) are NaN if nobody knows."""
+    """HOME_POSITION (242); ``attitude`` (w, x, y, z) at home and ``approach`` (m) are NaN if unknown."""
 
     source: Source
     latitude: float
@@ -138,7 +143,7 @@ class SetHomePosition(NamedTuple):
 
 
 class MessageInterval(NamedTuple):
-    """MESSAGE_INTERVAL (244): ``interval`` in µs, −1 when it is not sent, 0 when there is no such message."""
+    """MESSAGE_INTERVAL (244): ``interval`` in µs; −1: not sent; 0: no such message."""
 
     source: Source
     interval: int
@@ -146,8 +151,10 @@ class MessageInterval(NamedTuple):
 
 
 class SetupSigning(NamedTuple):
-    """SETUP_SIGNING (256): sign with ``key`` from now on, which is ``since`` (10 µs since 2015); zeros in
-    both end signing."""
+    """SETUP_SIGNING (256): sign with ``key`` from now on.
+
+    ``since`` is the current time (10 µs since 2015). Zeros in both end signing.
+    """
 
     source: Source
     since: int

@@ -1,4 +1,4 @@
-"""Who sent a message, and three numbers."""
+"""Sender of a message, and a vector of three numbers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ Vector = tuple[float, float, float]
 
 
 class Source(NamedTuple):
-    """Who sent a message: MAVLink system and component id (both 0…255)."""
+    """Sender of a message: MAVLink system and component id (both 0…255)."""
 
     system: int
     component: int

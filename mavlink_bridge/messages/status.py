@@ -1,4 +1,4 @@
-"""How a vehicle is: what ground stations show beside its motion."""
+"""Messages of vehicle status, which ground stations show beside the motion."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from mavlink_bridge.messages.source import Source, Vector
 
 
 class GpsRaw(NamedTuple):
-    """GPS_RAW_INT (24). ``time`` µs since boot; ``hdop``, ``vdop`` dilutions; ``speed`` over ground and
-    ``course`` (clockwise from north); the three accuracies in m, m and m/s, 0 when not known."""
+    """GPS_RAW_INT (24).
+
+    ``time`` µs since boot; ``hdop``, ``vdop`` dilutions; ``speed`` over ground and ``course`` (clockwise from
+    north); the three accuracies in m, m and m/s, 0 when not known.
+    """
 
     source: Source
     time: int
@@ -50,7 +53,7 @@ class VfrHud(NamedTuple):
 
 
 class Altitude(NamedTuple):
-    """ALTITUDE (141): m; NaN for what nobody measures. ``time`` µs since boot."""
+    """ALTITUDE (141): m; NaN for altitudes that are not measured; ``time`` µs since boot."""
 
     source: Source
     time: int
@@ -63,9 +66,11 @@ class Altitude(NamedTuple):
 
 
 class BatteryStatus(NamedTuple):
-    """BATTERY_STATUS (147). ``voltages`` (V) of up to ten cells, or one of all in the first; ``current`` (A);
-    ``consumed`` (A s); ``remaining`` 0…1; ``time_remaining`` (s, 0 when not known); ``charge_state`` is
-    MAV_BATTERY_CHARGE_STATE."""
+    """BATTERY_STATUS (147).
+
+    ``voltages`` (V) of up to ten cells, or that of all in the first; ``current`` (A); ``consumed`` (A s);
+    ``remaining`` 0…1; ``time_remaining`` (s, 0 when not known); ``charge_state`` is MAV_BATTERY_CHARGE_STATE.
+    """
 
     source: Source
     id: int
@@ -80,8 +85,11 @@ class BatteryStatus(NamedTuple):
 
 
 class EstimatorStatus(NamedTuple):
-    """ESTIMATOR_STATUS (230): ratios of innovations to their gates (below 1 is good, NaN not tested),
-    accuracies (m), ESTIMATOR_STATUS_FLAGS. ``time`` µs since boot."""
+    """ESTIMATOR_STATUS (230).
+
+    Ratios of innovations to their gates (below 1 is good, NaN not tested), accuracies (m),
+    ESTIMATOR_STATUS_FLAGS. ``time`` µs since boot.
+    """
 
     source: Source
     time: int
@@ -107,7 +115,7 @@ class RawImu(NamedTuple):
 
 
 class HighresImu(NamedTuple):
-    """HIGHRES_IMU (105), the same; static pressure (hPa), altitude by it (m), temperature (°C)."""
+    """HIGHRES_IMU (105): as RAW_IMU, plus static pressure (hPa), pressure altitude (m), temperature (°C)."""
 
     source: Source
     time_boot: int
@@ -120,8 +128,10 @@ class HighresImu(NamedTuple):
 
 
 class SimState(NamedTuple):
-    """SIMSTATE (164, ardupilotmega): the truth of a simulation. Euler angles (rad), specific force (m/s²,
-    FRD), body rates (rad/s), degrees."""
+    """SIMSTATE (164, ardupilotmega): ground truth of a simulation.
+
+    Euler angles (rad), specific force (m/s², FRD), body rates (rad/s), degrees.
+    """
 
     source: Source
     roll: float
@@ -134,8 +144,10 @@ class SimState(NamedTuple):
 
 
 class SimulationState(NamedTuple):
-    """SIM_STATE (108): the truth of a simulation, which carries no time; ArduPilot's sends it when asked.
-    Degrees, altitude above mean sea level (m, float32), velocity (m/s)."""
+    """SIM_STATE (108): ground truth of a simulation, without time; ArduPilot's sends it on request.
+
+    Degrees, altitude above mean sea level (m, float32), velocity (m/s).
+    """
 
     source: Source
     latitude: float
@@ -145,8 +157,10 @@ class SimulationState(NamedTuple):
 
 
 class HilState(NamedTuple):
-    """HIL_STATE_QUATERNION (115): the same of PX4's simulation in hardware (SIH), ``time`` µs since boot;
-    velocity in steps of 1 cm/s."""
+    """HIL_STATE_QUATERNION (115): ground truth of PX4's simulation in hardware (SIH).
+
+    ``time`` µs since boot; velocity in steps of 1 cm/s.
+    """
 
     source: Source
     time: int

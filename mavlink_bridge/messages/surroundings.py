@@ -1,5 +1,4 @@
-"""What others tell of the surroundings: tracked targets, distances all round, traffic; and figures to be
-plotted."""
+"""Messages about the surroundings: tracked targets, obstacle distances, air traffic; and figures to plot."""
 
 from __future__ import annotations
 
@@ -9,9 +8,11 @@ from mavlink_bridge.messages.source import Source, Vector
 
 
 class AdsbVehicle(NamedTuple):
-    """ADSB_VEHICLE (246): traffic as a receiver heard it ``age`` (µs, whole seconds) ago. Degrees; altitude m
-    (``geometric``: by satellite; otherwise by pressure), course rad clockwise from north, speed and climb m/s
-    (up); None where the receiver marks them invalid. ``address``: ICAO's."""
+    """ADSB_VEHICLE (246): an aircraft that a receiver detected ``age`` (µs, whole seconds) ago.
+
+    Degrees; altitude m (``geometric``: by satellite; otherwise by pressure), course rad clockwise from north,
+    speed and climb m/s (up); None where the receiver marks them invalid. ``address``: ICAO's.
+    """
 
     source: Source
     address: int
@@ -37,8 +38,11 @@ class NamedValue(NamedTuple):
 
 
 class CameraTrackingGeo(NamedTuple):
-    """CAMERA_TRACKING_GEO_STATUS (276): where what a camera tracks is. Degrees, m above mean sea level, m/s
-    NED or None. ``status`` is CAMERA_TRACKING_STATUS_FLAGS: 1 while it tracks. It has no time stamp."""
+    """CAMERA_TRACKING_GEO_STATUS (276): position of the object that a camera tracks.
+
+    Degrees, m above mean sea level, m/s NED or None. ``status`` is CAMERA_TRACKING_STATUS_FLAGS: 1 while it
+    tracks. The message has no time stamp.
+    """
 
     source: Source
     status: int
@@ -49,8 +53,9 @@ class CameraTrackingGeo(NamedTuple):
 
 
 class ObstacleDistance(NamedTuple):
-    """OBSTACLE_DISTANCE (330): the nearest thing in each of 72 sectors, m; None where that is not known, more
-    than ``max_distance`` where nothing is.
+    """OBSTACLE_DISTANCE (330): distance (m) of the nearest obstacle in each of 72 sectors.
+
+    A distance is None where it is unknown, and more than ``max_distance`` where there is no obstacle.
 
     The middle of sector k is at ``offset + k·increment`` (rad, clockwise from above) from north, or from the
     nose if ``frame`` is MAV_FRAME_BODY_FRD (12). ``time``: µs, on the sender's clock.

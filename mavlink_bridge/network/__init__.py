@@ -1,0 +1,1 @@
+"""Simulated network: takes datagrams from nodes and delivers them with seeded faults."""

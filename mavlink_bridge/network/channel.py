@@ -1,4 +1,4 @@
-"""What an ether is made of: channels, and what they do to datagrams in each direction."""
+"""Channels of the simulated network, and their faults in each direction."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from mavlink_bridge.errors import BridgeError
 
 
 class Faults(NamedTuple):
-    """What a channel does to each datagram on its way to each receiver, independently.
+    """Faults that a channel applies to each datagram on its way to each receiver, independently.
 
-    ``delay`` µs always, plus up to ``jitter`` µs, uniform; ``loss``, ``duplication``, ``reordering`` are
-    probabilities in 0…1. A reordered datagram waits until one tick after the next one on its path has arrived
-    (and for ever if none follows); jitter that exceeds the spacing of datagrams reorders too.
+    The delay is ``delay`` µs, plus up to ``jitter`` µs, uniform; ``loss``, ``duplication``, ``reordering``
+    are probabilities in 0…1. A reordered datagram waits until one tick after the next one on its path has
+    arrived (and for ever if none follows); jitter that exceeds the spacing of datagrams reorders too.
 
-    ``burst``: with 0 each datagram is lost or not whatever became of the one before. Otherwise losses come in
-    bursts of so many datagrams on average, and ``loss`` stays their share: the chain of Gilbert (1960) with
-    two states, one that passes all and one that loses all. A burst below ``loss / (1 - loss)`` or 1 cannot
-    be.
+    ``burst``: with 0 the losses are independent of each other. Otherwise losses come in bursts of ``burst``
+    datagrams on average, and ``loss`` remains their share: the chain of Gilbert (1960) with two states, one
+    that passes all and one that loses all. A burst below ``loss / (1 - loss)`` or 1 is impossible.
     """
 
     delay: int = 0
@@ -31,19 +30,21 @@ class Faults(NamedTuple):
 
     @property
     def least_burst(self) -> float:
-        """The shortest mean burst (datagrams) with which so large a share can be lost."""
-        # 0.8 / (1 − 0.8) is a little more than 4.
+        """Shortest mean burst (datagrams) with which a share of ``loss`` is possible."""
+        # Rounded, because 0.8 / (1 − 0.8) is a little more than 4.
         return max(1.0, round(self.loss / (1.0 - self.loss), 9)) if self.loss < 1 else 1.0
 
     @property
     def loss_after_loss(self) -> float:
-        """Probability that a datagram is lost if the one before on its path was."""
+        """Probability that a datagram is lost if the previous one on its path was lost."""
         return 1.0 - 1.0 / self.burst if self.burst and self.loss < 1 else self.loss
 
     @property
     def loss_after_passing(self) -> float:
-        """Probability that a datagram is lost if the one before on its path was not: the share of losses is
-        then ``loss``."""
+        """Probability that a datagram is lost if the previous one on its path was not.
+
+        With it, the share of losses is ``loss``.
+        """
         return self.loss / (self.burst * (1.0 - self.loss)) if self.burst and self.loss < 1 else self.loss
 
 
@@ -52,7 +53,7 @@ Direction = tuple[str | None, str | None]
 
 
 class Channel(NamedTuple):
-    """A broadcast domain: what a member sends on its link reaches every other under *their* link's name.
+    """Broadcast domain: what a member sends on its link reaches every other under *their* link's name.
 
     ``members``: node name → name of its link into this channel. ``overrides``: faults in place of ``faults``
     for one direction.
@@ -64,15 +65,18 @@ class Channel(NamedTuple):
     overrides: Mapping[Direction, Faults] = MappingProxyType({})
 
     def between(self, sender: str, receiver: str) -> Faults:
-        """The faults from ``sender`` to ``receiver``: the override for both, else for the sender, else for
-        the receiver, else for any, else the channel's own."""
+        """Return the faults from ``sender`` to ``receiver``.
+
+        The order of precedence: the override for both, for the sender, for the receiver, for any, and the
+        channel's own faults.
+        """
         for direction in ((sender, receiver), (sender, None), (None, receiver), (None, None)):
             if direction in self.overrides:
                 return self.overrides[direction]
         return self.faults
 
     def check(self) -> None:
-        """Raise BridgeError for faults that make no sense and for overrides of nodes that are no members."""
+        """Raise BridgeError for invalid faults and for overrides of nodes that are not members."""
         _check(f"channel {self.name!r}", self.faults)
         for (sender, receiver), faults in self.overrides.items():
             where = f"channel {self.name!r}, from {sender or 'any'} to {receiver or 'any'}"

@@ -1,8 +1,8 @@
-"""The in-memory link: broadcast channels with seeded delay, loss, duplication, reordering and partitions.
+"""Simulated network: broadcast channels with seeded delay, loss, duplication, reordering and partitions.
 
-Every path (channel, sender, receiver) draws from its own generator, so that a run depends on the seed and on
-names, never on the order in which nodes are listed or stepped; and what is changed on one path changes no
-draw of another.
+Every path (channel, sender, receiver) draws from its own generator. A run therefore depends on the seed and
+on names, never on the order in which nodes are listed or stepped, and a change on one path changes no draw of
+another.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ __all__ = ["Channel", "Ether", "EtherCounters", "Faults"]
 
 
 class EtherCounters(NamedTuple):
-    """Each datagram counts once per receiver: sent + duplicated = delivered + dropped + still under way.
+    """Counts of datagrams; each datagram counts once per receiver.
 
-    ``dropped``: lost, cut off, or found a full buffer; ``unrouted``: datagrams on a link that no channel
-    carries.
+    The sum sent + duplicated equals delivered + dropped + still under way. ``dropped``: lost, cut off, or
+    arrived at a full buffer; ``unrouted``: datagrams on a link that no channel carries.
     """
 
     sent: int
@@ -39,7 +39,7 @@ _FOREVER = 1 << 63
 
 
 class _Path:
-    """From one sender over one channel to one receiver. Nothing passes before ``shut`` (µs)."""
+    """Path from one sender over one channel to one receiver; nothing passes before ``shut`` (µs)."""
 
     __slots__ = (
         "channel",
@@ -70,13 +70,13 @@ class _Path:
         self.way = max(self.faults.delay, tick)
 
     def take(self, faults: Faults) -> None:
-        """Have these from now on."""
+        """Apply ``faults`` from now on."""
         self.faults = faults
-        # No chance: what most datagrams of most runs go through.
+        # Without random faults, as for most datagrams of most runs.
         self.plain = not any((faults.jitter, faults.loss, faults.duplication, faults.reordering))
 
     def loses(self) -> bool:
-        """Whether the next datagram is lost. One draw, or none if nothing ever is."""
+        """Return whether the next datagram is lost, with one draw, or without a draw if ``loss`` is zero."""
         faults = self.faults
         if not faults.loss:
             return False
@@ -88,7 +88,7 @@ class _Path:
 
 
 class _Cut(NamedTuple):
-    """Made while running, in force since then."""
+    """Partition that was made while running and is in force since then."""
 
     channel: str | None
     members: frozenset[str]
@@ -100,17 +100,17 @@ class _Cut(NamedTuple):
 
 
 class _Buffer(NamedTuple):
-    """What waits for a node that does not read, ``room`` datagrams at most."""
+    """Datagrams that wait for a node that does not read, at most ``room``."""
 
     room: int
     waiting: list[Datagram]
 
 
 class Ether:
-    """All channels of a run. ``seed`` of the faults; ``tick`` (µs): nothing arrives earlier than one tick
-    after it was sent.
+    """All channels of a run.
 
-    Raises BridgeError for faults that make no sense and for two channels of one name.
+    ``seed`` is that of the faults. ``tick`` (µs): nothing arrives earlier than one tick after it was sent.
+    Raises BridgeError for invalid faults and for two channels of one name.
     """
 
     def __init__(self, channels: Iterable[Channel], seed: int, tick: int) -> None:
@@ -140,18 +140,18 @@ class Ether:
 
     @property
     def counters(self) -> EtherCounters:
-        """The counts since the beginning."""
+        """Counts since the beginning."""
         return EtherCounters(self._sent, self._delivered, self._dropped, self._duplicated, self._unrouted)
 
     @property
     def under_way(self) -> int:
-        """How many are queued, held back or waiting for a node at present."""
+        """Number of datagrams that are queued, held back or waiting for a node at present."""
         held = sum(path.held is not None for path in self._all_paths())
         waiting = sum(len(buffer.waiting) for buffer in self._buffers.values())
         return held + waiting + sum(map(len, self._queues.values()))
 
     def send(self, now: int, sender: str, datagrams: Iterable[Datagram]) -> None:
-        """Put what ``sender`` emits at ``now`` (µs) on its way."""
+        """Send the datagrams that ``sender`` emits at ``now`` (µs)."""
         for link, data in datagrams:
             ways = self._paths.get((sender, link))
             if ways is None:
@@ -164,7 +164,7 @@ class Ether:
                 way, there, arrival = -1, "", None
                 for path in paths:
                     if path.plain and now >= path.shut:
-                        # Mostly one and the same for all: it is made once.
+                        # The arrival is mostly the same for all receivers, so it is made once.
                         if arrival is None or path.way != way or path.link != there:
                             way, there = path.way, path.link
                             arrival = (now + way, sender, number, 1, Datagram(there, data))
@@ -173,7 +173,10 @@ class Ether:
                         self._carry(now, number, path, data)
 
     def receive(self, now: int, node: str) -> list[Datagram]:
-        """What has reached ``node`` by ``now`` (µs) and is new, by arrival time, sender, order of sending."""
+        """Return what has newly reached ``node`` by ``now`` (µs).
+
+        The order is by arrival time, sender, and order of sending.
+        """
         if node in self._buffers:
             self.keep(now, node, self._buffers[node].room)
             arrived = self._buffers.pop(node).waiting
@@ -186,8 +189,10 @@ class Ether:
         return arrived
 
     def keep(self, now: int, node: str, room: int) -> None:
-        """``node`` does not read at ``now`` (µs): what has reached it waits for the next ``receive`` in a
-        buffer of ``room`` datagrams. What finds it full is dropped, as by a socket: the newest."""
+        """Buffer what has reached ``node`` at ``now`` (µs) until its next ``receive``, as it does not read.
+
+        The buffer holds ``room`` datagrams. When it is full, the newest are dropped, as by a socket.
+        """
         waiting = self._buffers[node].waiting if node in self._buffers else []
         waiting += self._arrivals(now, node)
         self._dropped += max(len(waiting) - room, 0)
@@ -195,10 +200,10 @@ class Ether:
         self._buffers[node] = _Buffer(room, waiting)
 
     def cut(self, channel: str | None, members: Iterable[str], until: int | None = None) -> None:
-        """From now on and until before ``until`` (µs, time of sending; None: until healed) nothing passes
-        between ``members`` and the others on ``channel`` (None: on any). What is under way arrives.
+        """Block all traffic between ``members`` and the others on ``channel`` (None: on any channel).
 
-        Raises BridgeError for a channel or a member that does not exist.
+        The cut lasts from now on until before ``until`` (µs, time of sending; None: until healed). What is
+        under way arrives. Raises BridgeError for a channel or a member that does not exist.
         """
         inside = frozenset(members)
         if channel is not None and channel not in self._names:
@@ -220,8 +225,11 @@ class Ether:
         self._shut()
 
     def lose(self, channels: tuple[str, ...], share: float) -> None:
-        """From now on this ``share`` (0…1) is lost on all channels whose names begin so, each datagram by
-        itself."""
+        """Set the loss to ``share`` (0…1) on all channels whose names begin with one of ``channels``.
+
+        The change holds from now on. Each datagram is lost independently. Raises BridgeError for a share
+        outside 0…1.
+        """
         if not 0.0 <= share <= 1.0:
             raise BridgeError(f"loss = {share} is not in 0…1")
         for path in self._all_paths():

@@ -1,0 +1,1 @@
+"""Reader and writer of tlog files: MAVLink frames with their times."""

@@ -1,8 +1,11 @@
-"""tlog files: each frame as it was, after its time (µs, 8 bytes big endian) with the link in the low 2 bits.
+"""Reader and writer of tlog files.
 
-Logs of real flights are damaged. The reader trusts a frame when its checksum holds, steps over a record that
-does not hold when a plausible record follows where it says it ends, and otherwise searches for the next frame
-that does. Where nothing is wrong it reads many records at once (``tlog_stretch``).
+Each record is a time (µs, 8 bytes big endian, with the link in the low 2 bits) and a frame as it was on the
+wire.
+
+Logs of real flights are damaged. The reader accepts a frame when its checksum is correct. It steps over a
+damaged record when a plausible record follows at the end that the record claims, and otherwise searches for
+the next valid frame. Where nothing is wrong it reads many records at once (``stretch``).
 """
 
 from __future__ import annotations
@@ -35,18 +38,23 @@ __all__ = ["LINKS", "PLAUSIBLE_JUMP", "Record", "TlogReader", "TlogReport", "Tlo
 
 LINKS = 4
 PLAUSIBLE_JUMP = 86_400_000_000
-"""µs. A stamp next to damage is believed only within a day of the record before."""
+"""µs. A stamp next to damage is accepted only within a day of the previous record."""
 
 _STAMP = Struct(">Q")
 _CHUNK = 1 << 15
-# A record, the stamp after it and the start byte behind that: what has to be seen to judge a record.
+# A record, the stamp after it and the start byte behind that: the bytes needed to judge a record.
 _AHEAD = 8 + LONGEST_FRAME + 8 + 1
 
 
 class TlogReport(NamedTuple):
-    """What one pass found. ``bad``: records whose checksum failed, or stretches that are no record;
-    ``unknown``: well-placed records of messages that the dialect lacks, not handed out; ``skipped_bytes``: in
-    no good or unknown record; ``truncated``: the log ends within a record, or its compression breaks off."""
+    """Statistics of one pass.
+
+    - ``good``: records with a correct checksum
+    - ``bad``: records with a wrong checksum, or stretches that are no record
+    - ``unknown``: well-placed records of messages that the dialect lacks; they are not returned
+    - ``skipped_bytes``: bytes in no good or unknown record
+    - ``truncated``: the log ends within a record, or its compression breaks off
+    """
 
     good: int
     bad: int
@@ -57,11 +65,11 @@ class TlogReport(NamedTuple):
 
 
 class TlogWriter:
-    """Writes a tlog, compressed if ``path`` ends in ``.gz``; a context manager. Same records, same bytes.
+    """Writer of a tlog, compressed if ``path`` ends in ``.gz``; a context manager.
 
-    Logs are passed on, so that no secret gets into them: signatures are taken off (with many of them a weak
-    key can be found), and SETUP_SIGNING, which holds a key, is left out and counted in ``withheld``.
-    Raises LogError if the file cannot be made.
+    The same records give the same bytes. Logs are passed on to others, so no secret may get into them:
+    signatures are removed (with many of them a weak key can be found), and SETUP_SIGNING, which holds a key,
+    is left out and counted in ``withheld``. Raises LogError if the file cannot be created.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -85,13 +93,13 @@ class TlogWriter:
         self.close()
 
     def close(self) -> None:
-        """Finish the file; again is harmless."""
+        """Finish the file; calling it again is harmless."""
         if self._gzip is not None:
             self._gzip.close()
         self._file.close()
 
     def write(self, time_us: int, link: int, data: bytes) -> None:
-        """One record for each frame of a datagram, all at one time, whose low 2 bits give way to the link.
+        """Write one record for each frame of a datagram, all at one time; the link replaces its low 2 bits.
 
         Bytes that are no frame are left out and counted in ``skipped_bytes``. Raises LogError for a link
         outside 0…3 and for a time that does not fit.
@@ -120,12 +128,12 @@ class TlogWriter:
 
 
 def _goes_on(data: bytes, at: int) -> bool:
-    """Whether a datagram ends here or a frame begins: the only check that an unknown message allows."""
+    """Return whether a datagram ends at ``at`` or a frame begins: the only check for an unknown message."""
     return at == len(data) or STARTS.match(data, at) is not None
 
 
 def _is_gzip(head: bytes) -> bool:
-    """Whether a file begins as gzip does and can be unpacked so far: garbage may have the first two bytes."""
+    """Return whether a file begins as gzip and can be unpacked so far; garbage may have the magic bytes."""
     if not head.startswith(b"\x1f\x8b\x08"):
         return False
     try:
@@ -136,7 +144,7 @@ def _is_gzip(head: bytes) -> bool:
 
 
 class TlogReader:
-    """The records of a log, in the order of the file; each iteration reads it again, in bounded memory."""
+    """Records of a log, in the order of the file; each iteration reads it again, in bounded memory."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -153,8 +161,10 @@ class TlogReader:
 
     @property
     def report(self) -> TlogReport:
-        """What the latest iteration has found so far; it may be some thousand records ahead of those handed
-        out."""
+        """Statistics of the latest iteration so far.
+
+        They may be some thousand records ahead of those returned.
+        """
         if self._pass is None:
             return TlogReport(0, 0, 0, 0, 0, False)
         one = self._pass
@@ -164,18 +174,23 @@ class TlogReader:
 
     @property
     def bytes_read(self) -> int:
-        """Bytes of the file, as it lies there, that the latest iteration has taken in."""
+        """Bytes of the file, as stored, that the latest iteration has read."""
         return 0 if self._pass is None else self._pass.bytes_read
 
     @property
     def record_bytes(self) -> int:
-        """Bytes, unpacked, of good and unknown records and their stamps. With ``skipped_bytes`` they are all
-        that the latest iteration has come by: at its end the whole log."""
+        """Unpacked bytes of good and unknown records and their stamps.
+
+        With ``skipped_bytes`` they are all that the latest iteration has passed: at its end the whole log.
+        """
         return 0 if self._pass is None else self._pass.record_bytes
 
 
 def read_tlog(path: Path | str) -> TlogReader:
-    """The log at ``path``, plain or gzip. Raises LogError if it is missing, unreadable or without MAVLink."""
+    """Open the log at ``path``, plain or gzip.
+
+    Raises LogError if it is missing, unreadable or without MAVLink.
+    """
     reader = TlogReader(Path(path))
     with closing(iter(reader)) as records:
         first = next(records, None)
@@ -185,7 +200,7 @@ def read_tlog(path: Path | str) -> TlogReader:
 
 
 class _Pass:
-    """One reading of the file: a window of bytes that slides along it, and the counts."""
+    """One pass over the file: a window of bytes that slides along it, and the counts."""
 
     def __init__(self, file: BufferedReader, stream: BufferedIOBase) -> None:
         self.good = self.bad = self.unknown = self.skipped_bytes = self.time_steps_back = 0
@@ -199,7 +214,7 @@ class _Pass:
         self._stamp: int | None = None
 
     def records(self) -> Iterator[Record]:
-        """Every record with a good checksum."""
+        """Yield every record with a correct checksum."""
         while self._fill():
             stretch = leading_records(self._window, self._at, (self._stamp or 0) & ~3)
             if stretch.records:
@@ -213,11 +228,13 @@ class _Pass:
                     yield record
 
     def _fill(self) -> bool:
-        """Have in the window all that is needed to judge the record here; False at the end. The 8 bytes
-        before stay: a search may find that they were a stamp."""
+        """Load into the window all that is needed to judge the current record; return False at the end.
+
+        The 8 bytes before it stay: a search may find that they were a stamp.
+        """
         while len(self._window) - self._at < _AHEAD and not self._ended:
             try:
-                # Not read(): before a compressed stream breaks off, this hands out all that came before.
+                # Not read(): before a compressed stream breaks off, read1() returns all that came before.
                 chunk = self._stream.read1(_CHUNK)
             except (EOFError, zlib.error, gzip.BadGzipFile):
                 chunk = b""
@@ -230,7 +247,7 @@ class _Pass:
         return self._at < len(self._window)
 
     def _advance(self, stretch: Stretch) -> None:
-        """Go on behind ``stretch``."""
+        """Continue behind ``stretch``."""
         last = stretch.records[-1]
         self.good += len(stretch.records)
         self.time_steps_back += stretch.time_steps_back
@@ -250,8 +267,11 @@ class _Pass:
         return reference is None or bool(abs(stamp - reference) <= PLAUSIBLE_JUMP)
 
     def _step_over(self, *, sound: bool) -> bool:
-        """Pass a record that cannot be trusted by the length it claims, if its stamp is in order and the log
-        goes on properly behind it. ``sound``: only the message is unknown."""
+        """Step over an untrusted record by the length that it claims; return whether that was possible.
+
+        Its stamp must be plausible, and a plausible record must follow it. ``sound``: only the message is
+        unknown.
+        """
         length = claimed_length(self._window, self._at + 8)
         if length is None:
             return False
@@ -273,8 +293,11 @@ class _Pass:
         return True
 
     def _search(self, *, cut: bool) -> Record | None:
-        """Go on at the next frame whose checksum holds, if there is one. If it is right here, it shares the
-        last stamp. ``cut``: what is here may be a good record that the end of the file cuts off."""
+        """Continue at the next frame with a correct checksum; return its record, or None if there is none.
+
+        A frame without skipped bytes before it gets the last stamp. ``cut``: the current record may be a good
+        one that the end of the file cuts off.
+        """
         skipped = 0
         while self._fill():
             start = STARTS.search(self._window, self._at)

@@ -1,7 +1,7 @@
-"""The healthy stretch of a log: whole records right behind one another, each with a checksum that holds.
+"""Undamaged stretch of a log: complete records right behind one another, each with a correct checksum.
 
-Nearly all of a log is such a stretch, so this is where the time of reading goes. It reads no more of a header
-than length, flags and message id; what is not clean is left to the search in ``tlog``, which takes its time.
+Nearly all of a log is such a stretch, so most of the reading time is spent here. The reader examines only
+length, flags and message id of a header; anything irregular is left to the slower search in ``log``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _EXTRA_V2 = {number.to_bytes(3, "little"): extra for number, extra in CRC_EXTRA.
 
 
 class Record(NamedTuple):
-    """One whole frame of a log, ``time`` in µs (a multiple of 4), ``link`` 0…3."""
+    """One complete frame of a log, ``time`` in µs (a multiple of 4), ``link`` 0…3."""
 
     time: int
     link: int
@@ -30,8 +30,11 @@ class Record(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """``records`` in their order; ``end``: where the last one ends; ``time_steps_back``: how many have a time
-    before that of the one before."""
+    """Consecutive undamaged records.
+
+    ``records`` in their order; ``end``: where the last one ends; ``time_steps_back``: number of records with
+    a time before that of the previous one.
+    """
 
     records: list[Record]
     end: int
@@ -39,8 +42,11 @@ class Stretch(NamedTuple):
 
 
 def leading_records(data: bytes, start: int, before: int) -> Stretch:
-    """The records that ``data`` has from ``start`` on, up to the first that is damaged, cut off, or of a
-    message that the dialect lacks. ``before``: time (µs) of the record before, 0 if there is none."""
+    """Return the records of ``data`` from ``start`` on, up to the first that cannot be read here.
+
+    That is the first that is damaged, cut off, or of a message that the dialect lacks. ``before``: time (µs)
+    of the previous record, 0 if there is none.
+    """
     records: list[Record] = []
     back, at, last = 0, start, len(data) - SHORTEST_RECORD
     # Each name that is local here saves a look-up for each record.
@@ -72,7 +78,7 @@ def leading_records(data: bytes, start: int, before: int) -> Stretch:
         if time < before:
             back += 1
         before = time
-        # Half the price of Record(…), which would put the same three together.
+        # Half the cost of Record(…), which would give the same tuple.
         add(make(Record, (time, stamp & 3, data[at + 8 : stop])))
         at = stop
     return Stretch(records, at, back)

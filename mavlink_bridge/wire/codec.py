@@ -1,4 +1,7 @@
-"""Bytes to messages and back, without I/O. Bytes from outside never raise; what is dropped is counted."""
+"""Codec from bytes to messages and back, without I/O.
+
+Bytes from outside never raise; dropped frames are counted.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +21,19 @@ Accept = Callable[[int, int, int], bool]
 
 @lru_cache(maxsize=1024)
 def _read(frame: Frame) -> Message | None:
-    """What ``Converter.parse`` makes of a frame; done once in a process for all who receive it."""
+    """Parse a frame with ``Converter.parse``, once in a process for all receivers of the frame."""
     return BY_ID[frame.message_id].parse(Source(frame.system, frame.component), frame.payload)
 
 
 class Counters(NamedTuple):
-    """What became of the bytes fed so far.
+    """Statistics of the bytes fed so far.
 
-    ``good``: frames that became messages; ``filtered``: sound frames that nobody asked for, or of a message
-    not in the table;
-    ``bad``: false starts, broken checksums, values that make no sense; ``unknown``: message ids that the
-    dialect lacks;
-    ``skipped_bytes``: bytes that belong to no frame; ``refused``: wanted, but not signed as they have to be.
+    - ``good``: frames that became messages
+    - ``bad``: false starts, wrong checksums, invalid values
+    - ``unknown``: frames with message ids that the dialect lacks
+    - ``filtered``: valid frames that ``accept`` rejected, or of a message not in the table
+    - ``skipped_bytes``: bytes that belong to no frame
+    - ``refused``: accepted frames that lack the required signature
     """
 
     good: int
@@ -41,9 +45,12 @@ class Counters(NamedTuple):
 
 
 class Codec:
-    """One direction each of one link. ``accept(message_id, system, component)`` is asked after the checksum
-    and before the payload is decoded; None accepts everything. Then ``signing`` is asked, and it signs what
-    goes out as of link id ``link``; without it signatures mean nothing."""
+    """Decoder and encoder of one link.
+
+    ``accept(message_id, system, component)`` is called after the checksum test and before the payload is
+    decoded; None accepts everything. Accepted frames are then checked by ``signing``, which also signs
+    outgoing frames with link id ``link``. Without ``signing``, signatures are ignored.
+    """
 
     def __init__(self, accept: Accept | None = None, signing: Signing | None = None, link: int = 0) -> None:
         self._accept = accept
@@ -58,7 +65,7 @@ class Codec:
 
     @property
     def counters(self) -> Counters:
-        """The counts of everything fed so far."""
+        """Counts of everything fed so far."""
         framer = self._framer
         return Counters(
             self._good,
@@ -71,16 +78,16 @@ class Codec:
 
     @property
     def pending_bytes(self) -> int:
-        """Bytes of a frame that is not complete yet (at most 280)."""
+        """Number of bytes of a frame that is not complete yet (at most 280)."""
         return self._framer.pending_bytes
 
     def feed(self, data: bytes, *, whole: bool = False) -> list[Message]:
-        """The messages that ``data`` completes, in order. Never raises.
+        """Return the messages that ``data`` completes, in order; never raise.
 
-        A partial frame waits for its rest; not so where ``whole`` says that no rest will come, as in
-        datagrams of several senders: there it would hold up what the next one says.
+        A partial frame waits for its rest, unless ``whole`` says that no rest will come, as in datagrams of
+        several senders: there the partial frame would delay the data of the next sender.
 
-        A NaN or infinity drops a state message (counted as bad) and is kept in what is commanded or echoed,
+        A NaN or infinity drops a state message (counted as bad). It is kept in messages that command or echo,
         where it may mean *ignored*: CommandInt, CommandLong, SetpointLocal, PositionTarget.
         """
         accept, signing = self._accept, self._signing
@@ -104,9 +111,10 @@ class Codec:
         return found
 
     def encode(self, message: Message) -> bytes:
-        """MAVLink 2 frames from ``message.source``: one, or several for a StatusText above 50 characters.
+        """Encode ``message`` as MAVLink 2 frames from ``message.source``.
 
-        Raises EncodeError, naming field and value, for what does not fit or is not finite in a state message.
+        Returns one frame, or several for a StatusText above 50 characters. Raises EncodeError, with field and
+        value, for a value that does not fit or that is not finite in a state message.
         """
         row = BY_TYPE[type(message)]
         if isinstance(message, StatusText) and len(message.text) > TEXT_LENGTH:
@@ -114,10 +122,10 @@ class Codec:
         return self._frame(row, message.source, row.pack(message))
 
     def encode_v1(self, message: Message) -> bytes:
-        """As ``encode``, in MAVLink 1, which knows no signatures: without extension fields; a StatusText is
-        cut at 50 characters.
+        """Encode ``message`` in MAVLink 1, without signature and without extension fields.
 
-        Raises EncodeError also for message ids above 255.
+        A StatusText is cut at 50 characters. Raises EncodeError as ``encode`` does, and also for message ids
+        above 255.
         """
         row = BY_TYPE[type(message)]
         if row.id > 255:
@@ -126,7 +134,7 @@ class Codec:
         return frame_v1(row.id, row.crc_extra, message.source, self._next(message.source), payload)
 
     def _encode_long(self, row: Converter, message: StatusText) -> bytes:
-        # STATUSTEXT.id ties the pieces together; zero would say that there is only one.
+        # STATUSTEXT.id marks chunks of one text; zero means that there is only one chunk.
         text_id = self._sequences.get(message.source, 0) + 1
         pieces = [
             row.struct.pack(message.severity, piece, text_id, number)

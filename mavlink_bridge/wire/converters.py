@@ -1,4 +1,4 @@
-"""One table: how each message of ``messages`` becomes a MAVLink payload and back. A message more, a row more.
+"""Table of converters between the values of ``messages`` and MAVLink payloads: one row for each message.
 
 The dialect that pymavlink generated gives ids, CRC_EXTRA, field order and struct; units and unknown-markers
 are in ``fields``.
@@ -27,11 +27,11 @@ from mavlink_bridge.wire.fields.units import Fields, unchanged
 
 
 class Converter(NamedTuple):
-    """How one message goes to its payload and back.
+    """Conversion of one message to its payload and back.
 
-    ``decode`` makes a message of the fields in wire order, None if they are absurd; ``encode`` the reverse.
-    ``finite``: a NaN or infinity anywhere is an error (states); else it has a meaning and is kept (commands).
-    ``size_v1``: payload bytes without extension fields.
+    ``decode`` builds a message from the fields in wire order, or returns None if they are absurd; ``encode``
+    is the reverse. ``finite``: a NaN or infinity anywhere is an error (state messages); otherwise it has a
+    meaning and is kept (commands). ``size_v1``: payload bytes without extension fields.
     """
 
     message: type[m.Message]
@@ -46,7 +46,7 @@ class Converter(NamedTuple):
     finite: bool
 
     def parse(self, source: m.Source, payload: bytes) -> m.Message | None:
-        """The message in a payload of any length (padded with zeros, or cut), None if it is bad."""
+        """Decode a payload of any length (padded with zeros, or cut); return None if it is bad."""
         size = self.struct.size
         fields = self.struct.unpack(payload[:size] if len(payload) >= size else payload.ljust(size, b"\0"))
         if self.finite and not isfinite(sum(fields)):
@@ -54,7 +54,7 @@ class Converter(NamedTuple):
         return self.decode(source, fields)
 
     def pack(self, message: m.Message) -> bytes:
-        """The whole payload. Raises EncodeError naming field and value."""
+        """Encode ``message`` as a full payload; raise EncodeError with field and value if it does not fit."""
         try:
             fields = self.encode(message)
             if self.finite and not isfinite(sum(fields)):
@@ -79,12 +79,12 @@ class Converter(NamedTuple):
 
 
 def _spelt_out(code: str) -> str:
-    """A struct's code for each value of a field: ``4f`` is four of them, ``16s`` is one."""
+    """Return a struct code for each value of a field: ``4f`` is four values, ``16s`` is one."""
     return code if code.endswith("s") else code[-1] * int(code[:-1] or 1)
 
 
 def _plain(message: type[Any]) -> Callable[[m.Source, Fields], Any]:
-    """For messages that have their fields in wire order and in MAVLink's units."""
+    """Return a decoder for messages that have their fields in wire order and in MAVLink's units."""
     return lambda source, fields: message(source, *fields)
 
 
@@ -99,8 +99,11 @@ def _row(
     layout: str | None = None,
     more: tuple[str, ...] = (),
 ) -> Converter:
-    """``size_v1`` has to be said where there are extension fields: the generated classes do not mark them.
-    ``layout`` instead of the dialect's, with ``more`` extension fields that it lacks."""
+    """Build a converter from the dialect's definition of ``message_id``.
+
+    ``size_v1`` is required where there are extension fields: the generated classes do not mark them.
+    ``layout`` replaces the dialect's, with ``more`` extension fields that the dialect lacks.
+    """
     kind = dialect.mavlink_map[message_id]
     fields = re.findall(r"\d*[a-zA-Z]", re.sub(r"(\d+)B", r"\1s", layout or kind.unpacker.format))
     codes = [_spelt_out(field) for field in fields]
@@ -132,7 +135,7 @@ TABLE: tuple[Converter, ...] = (
     _row(m.SetMode, 11, _plain(m.SetMode)),
     _row(m.ParamRequestRead, 20, p.param_request_read, p.param_request_read_fields),
     _row(m.ParamRequestList, 21, _plain(m.ParamRequestList)),
-    # A value is four bytes: a float changes those that look like a signalling NaN.
+    # The value is raw bytes: conversion to float changes those that look like a signalling NaN.
     _row(m.ParamValue, 22, p.param_value, p.param_value_fields, layout="<4sHH16sB"),
     _row(m.ParamSet, 23, p.param_set, p.param_set_fields, layout="<4sBB16sB"),
     _row(m.GpsRaw, 24, q.gps_raw, q.gps_raw_fields, size_v1=30),

@@ -1,4 +1,4 @@
-"""Where MAVLink frames begin and end in a stream of bytes, and whether their checksum holds.
+"""Framing of MAVLink in a stream of bytes: where frames begin and end, and whether their checksum is right.
 
 Source: the MAVLink serialisation guide. Version 1 is ``FE len seq sys comp id payload crc``; version 2 is
 ``FD len incompat compat seq sys comp id(3) payload crc [signature(13)]``, with trailing zeros of the payload
@@ -29,15 +29,20 @@ _HEADER_V2 = Struct("<7BHB")
 CRC_EXTRA: dict[int, bytes] = {
     number: bytes((kind.crc_extra,)) for number, kind in dialect.mavlink_map.items()
 }
-"""By message id. The dialect ``all`` is that of ardupilotmega and more: logs of PX4 hold messages of
-``development``, which could not be verified otherwise. No id means two things in it."""
+"""CRC_EXTRA by message id.
+
+The dialect ``all`` is that of ardupilotmega and more: logs of PX4 hold messages of ``development``, which
+could not be verified otherwise. No id has two meanings in it.
+"""
 
 
 class Frame(NamedTuple):
-    """One frame as it was on the wire. ``data`` is all of it, ``payload`` as sent, trailing zeros cut off.
+    """One frame as it was on the wire.
 
-    ``known`` is False when the dialect lacks the message id: its checksum cannot be verified.
-    ``signed`` says that 13 bytes of signature end the frame, not that they are genuine.
+    ``data`` is the whole frame, ``payload`` its payload as sent, without trailing zeros.
+
+    ``known`` is False when the dialect lacks the message id: its checksum cannot be verified. ``signed`` says
+    that 13 bytes of signature end the frame, not that they are genuine.
     """
 
     version: int
@@ -52,15 +57,18 @@ class Frame(NamedTuple):
 
 
 class Flaw(Enum):
-    """Why there is no frame: the bytes end too early, or no frame starts here."""
+    """Reason why there is no frame: the bytes end too early, or no frame starts here."""
 
     PARTIAL = "partial"
     FALSE_START = "false start"
 
 
 def frame_at(data: bytes, start: int) -> Frame | Flaw:
-    """The frame that starts at ``data[start]``. An incompatibility flag other than *signed* makes it a false
-    start, as MAVLink demands: its length cannot be known."""
+    """Return the frame that starts at ``data[start]``, or the reason why there is none.
+
+    An incompatibility flag other than *signed* makes it a false start, as MAVLink demands: the length of such
+    a frame is unknown.
+    """
     size = len(data)
     if start >= size:
         return Flaw.PARTIAL
@@ -117,11 +125,13 @@ def _leading(data: bytes) -> tuple[tuple[Frame, ...], int]:
 
 
 def leading_frames(data: bytes) -> tuple[tuple[Frame, ...], int]:
-    """The frames of known messages with a good checksum that ``data`` begins with, one right behind the
-    other, and where they end: of a datagram, as a rule, all that it holds.
+    """Return the known, valid frames at the beginning of ``data``, and where they end.
 
-    Short data is remembered for a while: in one process a datagram is read by every receiver and once more
-    for every log, and what its frames are depends on nothing but its bytes.
+    The frames follow each other without a gap, are of messages of the dialect, and have a correct checksum. A
+    datagram usually holds nothing else.
+
+    Results for short data are cached: in one process every receiver and every log reads the same datagram,
+    and its frames depend only on its bytes.
     """
     # A bytearray may change, and may not be hashed.
     short = type(data) is bytes and len(data) <= _DATAGRAM
@@ -129,7 +139,7 @@ def leading_frames(data: bytes) -> tuple[tuple[Frame, ...], int]:
 
 
 def claimed_length(data: bytes, start: int) -> int | None:
-    """Length that the frame at ``data[start]`` claims, verified or not; None if it claims none."""
+    """Return the length that the frame at ``data[start]`` claims, verified or not; None if it claims none."""
     mark = data[start : start + 1]
     if mark == b"\xfd" and start + 3 <= len(data) and data[start + 2] <= SIGNED_FLAG:
         return 12 + data[start + 1] + SIGNATURE_LENGTH * data[start + 2]
@@ -146,8 +156,10 @@ def frame_v2(
     payload: bytes,
     flags: int = 0,
 ) -> bytes:
-    """A version 2 frame; trailing zeros of ``payload`` are cut off, down to one byte. ``flags``: SIGNED_FLAG
-    if a signature will be put behind it."""
+    """Return a version 2 frame; trailing zeros of ``payload`` are cut off, down to one byte.
+
+    ``flags``: SIGNED_FLAG if a signature will be appended.
+    """
     payload = payload.rstrip(b"\0") or b"\0"
     body = _HEADER_V2.pack(
         START_V2, len(payload), flags, 0, sequence, *source, message_id & 0xFFFF, message_id >> 16
@@ -159,33 +171,37 @@ def frame_v2(
 def frame_v1(
     message_id: int, crc_extra: bytes, source: tuple[int, int], sequence: int, payload: bytes
 ) -> bytes:
-    """A version 1 frame of ``payload``, which must be whole and without extension fields."""
+    """Return a version 1 frame of ``payload``, which must be complete and without extension fields."""
     body = _HEADER_V1.pack(START_V1, len(payload), sequence, *source, message_id) + payload
     return body + mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")
 
 
 def without_signature(data: bytes) -> bytes:
-    """A frame as it was before it was signed, with a checksum that holds if its own does; or as it is."""
+    """Return a frame as it was before it was signed; an unsigned frame is returned unchanged.
+
+    The checksum of the result is correct if that of ``data`` is.
+    """
     if data[0] != START_V2 or data[2] != SIGNED_FLAG:
         return data
     end = len(data) - SIGNATURE_LENGTH - 2
     body = data[:2] + b"\0" + data[3:end]
-    # The checksum is linear: what CRC_EXTRA adds to both is not in their difference.
+    # The checksum is linear: the contribution of CRC_EXTRA to both cancels in their difference.
     change = mcrf4xx(data[1:end] + b"\0") ^ mcrf4xx(body[1:] + b"\0")
     return body + ((data[end] | data[end + 1] << 8) ^ change).to_bytes(2, "little")
 
 
 class Framer:
-    """Cuts a byte stream into frames, however it is chopped up; keeps fewer than 281 bytes between two calls.
+    """Splitter of a byte stream into frames, however the stream is chopped up.
 
-    After a false start the search goes on one byte later. A frame of an unknown message cannot be verified,
-    so it is skipped by its length only if another frame starts right behind it (for that one byte it waits);
-    otherwise it was a false start. Where ``whole`` says that no frame goes on in the next call nothing waits.
-    ``frames`` + ``unknown`` count frames, ``bad`` false starts; ``skipped_bytes`` are those of no frame.
+    It keeps fewer than 281 bytes between two calls. After a false start the search continues one byte later.
+    A frame of an unknown message cannot be verified. It is therefore skipped by its length only if another
+    frame starts right behind it (the framer waits for that one byte); otherwise it was a false start. Where
+    ``whole`` says that no frame continues in the next call, nothing waits. ``frames`` + ``unknown`` count
+    frames, ``bad`` false starts, ``skipped_bytes`` the bytes that belong to no frame.
     """
 
     def __init__(self, *, unknown: bool = False) -> None:
-        """``unknown``: frames of unknown messages are returned too, with their checksum unverified."""
+        """If ``unknown``, also return frames of unknown messages, with their checksum unverified."""
         self._returns_unknown = unknown
         self.frames = 0
         self.bad = 0
@@ -195,11 +211,11 @@ class Framer:
 
     @property
     def pending_bytes(self) -> int:
-        """Bytes kept for the next call."""
+        """Number of bytes kept for the next call."""
         return len(self._rest)
 
     def feed(self, data: bytes, *, whole: bool = False) -> Sequence[Frame]:
-        """The frames with a good checksum that ``data`` completes."""
+        """Return the frames with a correct checksum that ``data`` completes."""
         if self._rest:
             data = self._rest + data
         frames, at = leading_frames(data)
@@ -210,7 +226,7 @@ class Framer:
         return self._search(data, at, list(frames), whole=whole)
 
     def _search(self, data: bytes, at: int, found: list[Frame], *, whole: bool) -> list[Frame]:
-        """``found`` and the frames of ``data`` from ``at`` on, where something is wrong."""
+        """Return ``found`` and the frames of ``data`` from ``at`` on, where something is wrong."""
         size = len(data)
         while at < size:
             frame = frame_at(data, at)

@@ -1,21 +1,21 @@
-"""Who says what, read from the header of a frame without looking further."""
+"""Sender and message id, read from the header of a frame alone."""
 
 from __future__ import annotations
 
 from typing import Final, NamedTuple
 
 _MAGIC: Final = {0xFD: 5, 0xFE: 3}
-"""Where MAVLink 2 and 1 have the system id."""
+"""Offset of the system id in MAVLink 2 and 1."""
 
 
 def sending_system(data: bytes) -> int:
-    """System id in the header of the first frame; 0, which nobody has, if there is none."""
+    """Return the system id in the header of the first frame; 0, which is no system's id, if there is none."""
     place = _MAGIC.get(data[0]) if data else None
     return data[place] if place is not None and place < len(data) else 0
 
 
 class Header(NamedTuple):
-    """Who says what."""
+    """Sender and message id of a frame."""
 
     system: int
     component: int
@@ -23,7 +23,7 @@ class Header(NamedTuple):
 
 
 def header(frame: bytes) -> Header:
-    """Of a whole frame."""
+    """Read the header of a complete frame."""
     if frame[0] == 0xFD:
         return Header(frame[5], frame[6], int.from_bytes(frame[7:10], "little"))
     return Header(frame[3], frame[4], frame[5])

@@ -1,4 +1,4 @@
-"""Frames to datagrams that go through any network in one piece."""
+"""Packing of frames into datagrams that pass any network in one piece."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ from collections.abc import Sequence
 from typing import Final
 
 LONGEST: Final = 1400
-"""Bytes of a datagram: what Ethernet carries in one packet, tunnels included. Some clients read no more than
-2048, and above 65507 UDP sends nothing at all."""
+"""Bytes of a datagram: what Ethernet carries in one packet, tunnels included.
+
+Some clients read no more than 2048, and UDP sends nothing above 65507.
+"""
 
 
 def parcels(pieces: Sequence[bytes], longest: int = LONGEST) -> list[bytes]:
-    """``pieces`` (whole frames) in their order, several to a datagram where they fit; a longer one goes
-    alone."""
+    """Pack ``pieces`` (complete frames) in their order, several to a datagram where they fit.
+
+    A piece that is longer than ``longest`` gets a datagram of its own.
+    """
     whole = b"".join(pieces)
     if len(whole) <= longest:
         return [whole] if whole else []

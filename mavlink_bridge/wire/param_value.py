@@ -1,4 +1,4 @@
-"""The number in the four bytes of PARAM_VALUE (22), as each firmware means them.
+"""Number in the four bytes of PARAM_VALUE (22), in the encoding of each firmware.
 
 ArduPilot casts every number to float32. PX4 puts the bytes of an integer there
 (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE).
@@ -13,11 +13,11 @@ from typing import Final
 from mavlink_bridge.messages import ParamValue
 
 _INTEGERS: Final = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
-"""By MAV_PARAM_TYPE."""
+"""Layout of the integer types by MAV_PARAM_TYPE."""
 
 
 def number_of(message: ParamValue, *, bytewise: bool) -> float | None:
-    """The value; ``bytewise``: as PX4. None if it is not finite."""
+    """Return the value of ``message``, or None if it is not finite; ``bytewise``: encoded as by PX4."""
     layout = _INTEGERS.get(message.type, "<f") if bytewise else "<f"
     (number,) = unpack(layout, message.raw)
     return float(number) if isfinite(number) else None

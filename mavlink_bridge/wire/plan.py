@@ -1,10 +1,9 @@
-"""A committed plan in at most 128 bytes of TUNNEL, in integers: who packs it and who unpacks it hold the same
-numbers, bit for bit.
+"""Committed plan in at most 128 bytes of TUNNEL, in integers.
 
-A plan is piecewise constant acceleration a_n (n = 0…N−1) on knots epoch + n dt, from the state p_0, v_0, in
-fleet-local ENU. With accelerations in A = 1 mm/s², velocities in units of A dt and positions in units of ½ A
-dt², the exact motion over a knot, p' = p + v dt + ½ a dt², v' = v + a dt, is p' = p + 2v + a, v' = v + a in
-integers: nothing is ever rounded again.
+Sender and receiver hold the same numbers, bit for bit. A plan is piecewise constant acceleration a_n (n =
+0…N−1) on knots epoch + n dt, from the state p_0, v_0, in fleet-local ENU. With accelerations in A = 1 mm/s²,
+velocities in units of A dt and positions in units of ½ A dt², the exact motion over a knot, p' = p + v dt + ½
+a dt², v' = v + a dt, is p' = p + 2v + a, v' = v + a in integers: nothing is ever rounded again.
 
 Little endian: kind 1, origin 1, dt/4 µs 2, epoch 7, position 3×4, velocity 3×3, then 3×2 for each knot: 32 +
 6 N bytes, N ≤ 16.
@@ -22,11 +21,11 @@ import numpy.typing as npt
 from mavlink_bridge.errors import PlanWireError
 
 PAYLOAD_TYPE = 0xDC01
-"""TUNNEL.payload_type; above 32767 is free for private use."""
+"""TUNNEL.payload_type; values above 32767 are free for private use."""
 KNOTS = 16
 KIND = 1
 STEP = 4
-"""dt is a whole number of these, µs."""
+"""Unit of dt (µs); dt is a whole multiple of it."""
 
 Integers = tuple[int, int, int]
 Array = npt.NDArray[np.float64]
@@ -36,8 +35,11 @@ _KNOT = Struct("<3h")
 
 
 class WirePlan(NamedTuple):
-    """A plan as the wire holds it. ``epoch`` and ``dt`` in µs; ``position``, ``velocity``, ``accelerations``
-    in the units of the module's docstring (fleet-local ENU); ``origin``: 8-bit fingerprint of that frame."""
+    """Plan in the integers of the wire.
+
+    ``epoch`` and ``dt`` in µs; ``position``, ``velocity``, ``accelerations`` in the units of the module's
+    docstring (fleet-local ENU); ``origin``: 8-bit fingerprint of that frame.
+    """
 
     epoch: int
     dt: int
@@ -47,7 +49,7 @@ class WirePlan(NamedTuple):
     origin: int
 
     def states(self) -> npt.NDArray[np.int64]:
-        """(N+1, 2, 3): exact position and velocity at every knot, in wire units."""
+        """Return the exact position and velocity at every knot, (N+1, 2, 3), in wire units."""
         out = np.empty((len(self.accelerations) + 1, 2, 3), dtype=np.int64)
         velocities = out[:, 1]
         velocities[0] = self.velocity
@@ -59,10 +61,10 @@ class WirePlan(NamedTuple):
         return out
 
     def shifted(self, knots: int) -> WirePlan:
-        """The rest of the same motion from knot ``knots`` (0…N) on: the epoch moves, the state advances
-        exactly, and the accelerations that are over are dropped. Nothing is appended: the plan gets shorter.
+        """Return the rest of the same motion from knot ``knots`` (0…N) on.
 
-        Raises PlanWireError beyond the end.
+        The epoch moves, the state advances exactly, and the accelerations that are over are dropped. Nothing
+        is appended: the plan gets shorter. Raises PlanWireError beyond the end.
         """
         if not 0 <= knots <= len(self.accelerations):
             raise PlanWireError(f"shift by {knots} knots of a plan that has {len(self.accelerations)}")
@@ -82,35 +84,35 @@ class WirePlan(NamedTuple):
 
     @property
     def position_m(self) -> Array:
-        """(3,) m at the epoch."""
+        """Position (3,) at the epoch, m."""
         return np.array(self.position, dtype=np.float64) * _position_unit(self.dt)
 
     @property
     def velocity_m_s(self) -> Array:
-        """(3,) m/s at the epoch."""
+        """Velocity (3,) at the epoch, m/s."""
         return np.array(self.velocity, dtype=np.float64) * _velocity_unit(self.dt)
 
     @property
     def accelerations_m_s2(self) -> Array:
-        """(N, 3) m/s², constant from each knot to the next."""
+        """Accelerations (N, 3), m/s², constant from each knot to the next."""
         return np.array(self.accelerations, dtype=np.float64).reshape(-1, 3) * 1e-3
 
     def positions_m(self) -> Array:
-        """(N+1, 3) m at the knots."""
+        """Return the positions (N+1, 3) at the knots, m."""
         return self.states()[:, 0].astype(np.float64) * _position_unit(self.dt)
 
     def velocities_m_s(self) -> Array:
-        """(N+1, 3) m/s at the knots."""
+        """Return the velocities (N+1, 3) at the knots, m/s."""
         return self.states()[:, 1].astype(np.float64) * _velocity_unit(self.dt)
 
 
 def _position_unit(dt: int) -> float:
-    """½ A dt², m."""
+    """Return ½ A dt² in m."""
     return 0.5e-3 * (dt * 1e-6) ** 2
 
 
 def _velocity_unit(dt: int) -> float:
-    """A dt, m/s."""
+    """Return A dt in m/s."""
     return 1e-3 * (dt * 1e-6)
 
 
@@ -127,7 +129,7 @@ def quantise(
     accelerations: npt.ArrayLike,
     origin: int,
 ) -> WirePlan:
-    """The nearest plan on the wire to position (3,) m, velocity (3,) m/s, accelerations (n, 3) m/s².
+    """Return the nearest plan on the wire to position (3,) m, velocity (3,) m/s, accelerations (n, 3) m/s².
 
     Each number is off by half a unit at most, hence a position at knot n by at most (½ + n + ½n²) · ½ A dt²
     (0.73 mm after 16 knots of 0.1 s). Raises PlanWireError when a number is not finite or out of range.
@@ -137,7 +139,7 @@ def quantise(
     if p.shape != (3,) or v.shape != (3,) or a.ndim != 2 or a.shape[1] != 3:
         raise PlanWireError(f"shapes {p.shape}, {v.shape}, {a.shape} are not (3,), (3,), (n, 3)")
     scaled = np.concatenate((p / _position_unit(dt), v / _velocity_unit(dt), a.ravel() / 1e-3))
-    # Beyond int64 the cast is undefined; the wire's own limits are far below and are checked when packing.
+    # Beyond int64 the cast is undefined; the wire's own limits are far below and are checked by ``pack``.
     if not np.all(np.abs(scaled) < 2.0**62):
         raise PlanWireError(f"not finite, or far out of range: {position!r}, {velocity!r}, {accelerations!r}")
     px, py, pz, vx, vy, vz, *rest = np.rint(scaled).astype(np.int64).tolist()
@@ -148,7 +150,7 @@ def quantise(
 
 
 def pack(plan: WirePlan) -> bytes:
-    """32 + 6 N bytes. Raises PlanWireError for what does not fit."""
+    """Encode ``plan`` in 32 + 6 N bytes; raise PlanWireError for a value that does not fit."""
     if len(plan.accelerations) > KNOTS:
         raise PlanWireError(f"{len(plan.accelerations)} knots are more than {KNOTS}")
     _check_step(plan.dt)
@@ -163,7 +165,7 @@ def pack(plan: WirePlan) -> bytes:
 
 
 def unpack(data: bytes) -> WirePlan:
-    """The plan in a TUNNEL payload. Raises PlanWireError for anything that ``pack`` does not make."""
+    """Decode the plan in a TUNNEL payload; raise PlanWireError for anything that ``pack`` cannot produce."""
     knots, rest = divmod(len(data) - _HEADER.size, _KNOT.size)
     if rest or not 0 <= knots <= KNOTS:
         raise PlanWireError(f"{len(data)} bytes are not a plan")

@@ -1,4 +1,4 @@
-"""Whom a vehicle counts with, in 41 bytes of TUNNEL: sent beside its committed plan.
+"""Coordination set of a vehicle in 41 bytes of TUNNEL, sent beside its committed plan.
 
 Little endian: kind 1, flags 1 (1: farewell), epoch 7 (µs), system ids 1…255 as bits 32, bit k of the whole
 for id k.
@@ -11,15 +11,18 @@ from typing import NamedTuple
 from mavlink_bridge.errors import PlanWireError
 
 PAYLOAD_TYPE = 0xDC02
-"""TUNNEL.payload_type; above 32767 is free for private use."""
+"""TUNNEL.payload_type; values above 32767 are free for private use."""
 KIND = 1
 _FAREWELL = 1
 _SIZE = 41
 
 
 class Roster(NamedTuple):
-    """``members``: system ids 1…255; ``epoch`` (µs) of the plan it goes with; ``farewell``: the sender's last
-    plan stands, and it will make no other before it has joined again."""
+    """Coordination set that goes with a committed plan.
+
+    ``members``: system ids 1…255; ``epoch`` (µs): that of the plan; ``farewell``: the sender's last plan
+    remains valid, and the sender makes no other before it has joined again.
+    """
 
     epoch: int
     members: frozenset[int]
@@ -27,7 +30,7 @@ class Roster(NamedTuple):
 
 
 def pack(roster: Roster) -> bytes:
-    """41 bytes. Raises PlanWireError for what does not fit."""
+    """Encode ``roster`` in 41 bytes; raise PlanWireError for a value that does not fit."""
     bits = 0
     for system in roster.members:
         if not 1 <= system <= 255:
@@ -41,7 +44,10 @@ def pack(roster: Roster) -> bytes:
 
 
 def unpack(data: bytes) -> Roster:
-    """The roster in a TUNNEL payload. Raises PlanWireError for anything that ``pack`` does not make."""
+    """Decode the roster in a TUNNEL payload.
+
+    Raises PlanWireError for anything that ``pack`` cannot produce.
+    """
     if len(data) != _SIZE or data[0] != KIND or data[1] & ~_FAREWELL or data[9] & 1:
         raise PlanWireError(f"{len(data)} bytes are not a roster")
     bits = int.from_bytes(data[9:], "little")

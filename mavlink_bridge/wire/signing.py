@@ -1,7 +1,7 @@
-"""MAVLink 2 message signing: who has the key made this frame, and it was not heard before.
+"""MAVLink 2 message signing: proof that a holder of the key made a frame, and that the frame is new.
 
 Source: the MAVLink guide, "Message Signing". A signed frame ends with 13 bytes: the link id, a time stamp of
-48 bits in 10 µs since 2015, and the first 48 bits of SHA-256 over the key and all that comes before them.
+48 bits in 10 µs since 2015, and the first 48 bits of SHA-256 over the key and all that precedes them.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from mavlink_bridge.wire.framing import Frame
 EPOCH: Final = 1_420_070_400_000_000
 """Unix time of the stamp 0, 2015-01-01 (µs)."""
 UNIT: Final = 10
-"""µs of a stamp's step."""
+"""Step of a stamp (µs)."""
 LATEST: Final = (1 << 48) - 1
-"""The last stamp, in the year 2104."""
+"""Last possible stamp, in the year 2104."""
 MINUTE: Final = 6_000_000
-"""Steps by which a stream that was not heard yet may be behind."""
+"""Steps by which the first stamp of a new stream may be behind the newest stamp."""
 STREAMS: Final = 256
-"""Streams that are remembered; only who has the key can make one."""
+"""Largest number of streams that are remembered; only a holder of the key can create one."""
 SETUP_SIGNING: Final = 256
-"""The message that hands over a key."""
+"""Id of the message that transfers a key."""
 RADIOS: Final = frozenset((109, 166))
-"""RADIO_STATUS and RADIO, which come from telemetry radios, and these have no key."""
+"""RADIO_STATUS and RADIO, which come from telemetry radios; these have no key."""
 
 
 class Refusal(Enum):
-    """Why a frame does not count."""
+    """Reason why a frame is refused."""
 
     UNSIGNED = "not signed"
     FORGED = "signed with another key"
@@ -39,16 +39,20 @@ class Refusal(Enum):
 
 
 class Signing:
-    """What one node knows about signing: the key, the time, and the newest stamp of each stream, that is of
-    each sending system, component and link id. One object for all links of a node, so that what was said on
-    one cannot be said again on another; not shared between nodes.
+    """Signing state of one node: the key, the time, and the newest stamp of each stream.
 
-    Without a key nothing is signed and everything counts. ``newest``: the newest stamp (10 µs since 2015)
-    that was sent or heard; kept over a restart, it goes into ``resume``.
+    A stream is a combination of sending system, component and link id. One object serves all links of a node,
+    so that a frame received on one cannot be replayed on another; nodes do not share it.
+
+    Without a key nothing is signed and every frame is accepted. ``newest``: the newest stamp (10 µs since
+    2015) that was sent or received; after a restart, pass the stored value to ``resume``.
     """
 
     def __init__(self, key: Key | None = None, unsigned: Collection[int] = RADIOS) -> None:
-        """``unsigned``: ids of messages that count without a signature. A wrong signature never counts."""
+        """Create the state; ``unsigned``: ids of messages that are accepted without a signature.
+
+        A wrong signature is never accepted.
+        """
         self.key = key
         self.newest = 0
         self.refused = dict.fromkeys(Refusal, 0)
@@ -59,9 +63,12 @@ class Signing:
         self._began = False
 
     def present(self, unix: int) -> None:
-        """It is ``unix`` (µs); who does not know the time may count from anywhere before 2015. From the first
-        call on nothing counts on a new stream that is older than that call: somebody may have recorded it
-        for a restart."""
+        """Set the current time to ``unix`` (µs).
+
+        A node that does not know the time may count from any instant before 2015. From the first call on, a
+        new stream is refused if it is older than that call: its frames may have been recorded for replay
+        after a restart.
+        """
         stamp = (unix - EPOCH) // UNIT
         if stamp > self.newest:
             self.newest = min(stamp, LATEST)
@@ -70,20 +77,22 @@ class Signing:
             self._floor = max(self._floor, min(stamp, LATEST))
 
     def resume(self, newest: int) -> None:
-        """Go on after a restart: nothing up to this stamp counts or will be sent."""
+        """Continue after a restart: no stamp up to ``newest`` is accepted or sent."""
         self.newest = max(self.newest, min(newest, LATEST))
         self._floor = max(self._floor, self.newest)
 
     def use(self, key: Key | None, since: int = 0) -> None:
-        """Another key, or none, from now on; it is at least the stamp ``since``."""
+        """Replace the key (None: no key) from now on; the current stamp is at least ``since``."""
         if key != self.key:
             self.key, self._floor = key, 0
             self._streams.clear()
         self.newest = max(self.newest, min(since, LATEST))
 
     def sign(self, frame: bytes, link: int) -> bytes:
-        """``frame``, whose header says that it is signed, with its signature; ``link``: 0…255. Each stamp is
-        later than the one before. Raises ValueError without a key."""
+        """Return ``frame``, whose header must be marked as signed, with its signature; ``link``: 0…255.
+
+        Each stamp is later than the previous one. Raises ValueError without a key.
+        """
         if self.key is None:
             raise ValueError("there is no key to sign with")
         self.newest = min(self.newest + 1, LATEST)
@@ -91,7 +100,7 @@ class Signing:
         return data + self.key.signature(data)
 
     def check(self, frame: Frame) -> Refusal | None:
-        """Why ``frame`` does not count; None if it does, and then it does not a second time."""
+        """Return why ``frame`` is refused, or None if it is accepted; a second copy is refused."""
         if self.key is None:
             return None
         refusal = self._judged(frame, self.key)
@@ -113,7 +122,8 @@ class Signing:
             return Refusal.OLD
         if not hmac.compare_digest(key.signature(data[:-6]), data[-6:]):
             return Refusal.FORGED
-        # Only now: or whoever forges a stamp of tomorrow would lock out the true sender until then.
+        # Stored only after the signature is verified. Otherwise a forged stamp of tomorrow would lock out the
+        # true sender until then.
         self._remember(stream, stamp)
         self.newest = max(self.newest, stamp)
         return None
@@ -121,7 +131,7 @@ class Signing:
     def _remember(self, stream: tuple[int, int, int], stamp: int) -> None:
         streams = self._streams
         if stream not in streams and len(streams) >= STREAMS:
-            # The one that has been silent for longest; should it speak again, it has to be later than that.
+            # Drop the stream with the oldest stamp; if it resumes, its stamps must be later than that one.
             silent = min(streams, key=streams.__getitem__)
             self._floor = max(self._floor, streams.pop(silent))
         streams[stream] = stamp

@@ -1,5 +1,6 @@
-"""How far a vehicle may be from where it says that it is, in 4 bytes of TUNNEL: sent beside its
-GLOBAL_POSITION_INT, which has no field for that, while there is something to say.
+"""Uncertainty radius of a vehicle's reported position, in 4 bytes of TUNNEL.
+
+It is sent beside GLOBAL_POSITION_INT, which has no field for it, while there is an uncertainty to report.
 
 Little endian: kind 1, reserved 1 (0), radius 2 (cm, 0…65 535).
 """
@@ -11,23 +12,27 @@ from struct import Struct
 from mavlink_bridge.errors import PlanWireError
 
 PAYLOAD_TYPE = 0xDC03
-"""TUNNEL.payload_type; above 32767 is free for private use."""
+"""TUNNEL.payload_type; values above 32767 are free for private use."""
 KIND = 1
 _LAYOUT = Struct("<BBH")
 _MOST = 0xFFFF
 
 
 def pack(radius: float) -> bytes:
-    """A ``radius`` in m, rounded up; what is further than the wire reaches is said as that. Raises
-    PlanWireError for what is none."""
+    """Encode a ``radius`` in m, rounded up and limited to the largest value of the wire.
+
+    Raises PlanWireError for a negative radius and for NaN.
+    """
     if not radius >= 0.0:
         raise PlanWireError(f"{radius} m are no distance")
     return _LAYOUT.pack(KIND, 0, _MOST if radius * 100.0 >= _MOST else -int(-radius * 100.0 // 1))
 
 
 def unpack(data: bytes) -> float:
-    """The radius (m) in a TUNNEL payload, which may be longer than what is known of it. Raises PlanWireError
-    for anything else."""
+    """Decode the radius (m) in a TUNNEL payload, which may have further bytes behind the known ones.
+
+    Raises PlanWireError for anything else.
+    """
     if len(data) < _LAYOUT.size or data[0] != KIND:
         raise PlanWireError(f"{len(data)} bytes are no doubt")
     return float(_LAYOUT.unpack_from(data)[2]) / 100.0

@@ -1,8 +1,8 @@
-"""SET_ATTITUDE_TARGET (82): what an attitude and a thrust ask for, as the acceleration that they mean.
+"""Conversion of SET_ATTITUDE_TARGET (82): attitude and thrust become the acceleration that they imply.
 
-The reference of the vehicle is a motion, so an attitude is flown as the motion that it leads to: its thrust
+The vehicle's reference is a motion, so an attitude is flown as the motion that results from it: its thrust
 axis gives the acceleration, its yaw the heading. Air drag, which would end that motion on a real vehicle, is
-left to the speed limit.
+not modelled here; the speed limit bounds the motion instead.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from sitl.values.setpoints import ACCELERATION, VELOCITY, Reading, Refusal, Setp
 
 GRAVITY: Final = 9.80665
 HOVERING: Final = 0.5
-"""The thrust at which it hovers: PX4's MPC_THR_HOVER, and the middle of ArduPilot's range of climb rates."""
+"""Thrust value of hovering: PX4's MPC_THR_HOVER, and the middle of ArduPilot's range of climb rates."""
 STEEPEST: Final = math.radians(45.0)
-"""Of the tilt that is followed."""
+"""Largest tilt that is followed (rad)."""
 
 # ATTITUDE_TARGET_TYPEMASK
 _IGNORE_YAW_RATE: Final = 0x04
@@ -28,15 +28,17 @@ _QUICKEST: Final = 100.0
 
 
 def climbing(message: SetpointAttitude, climb: float, sink: float) -> Reading:
-    """As ArduPilot reads it: thrust is a climb rate, 0.5 for none, 1 for ``climb`` and 0 for ``sink``
-    (m/s)."""
+    """Read the message as ArduPilot does, with thrust as a climb rate.
+
+    Thrust 0.5 means no climb, 1 means ``climb`` and 0 means ``sink`` (m/s).
+    """
     fault = _fault(message)
     if fault is not None:
         return fault
     up, yaw = _thrust_axis(message), _yaw(message)
     share = 2.0 * (message.thrust - HOVERING)
     rate = share * (climb if share > 0.0 else sink)
-    # Thrust is raised in a turn so that the height stays.
+    # Thrust is raised while tilted, so that the height stays.
     lean = GRAVITY / up[2]
     return Setpoint(
         (ACCELERATION, ACCELERATION, VELOCITY),
@@ -48,7 +50,7 @@ def climbing(message: SetpointAttitude, climb: float, sink: float) -> Reading:
 
 
 def thrusting(message: SetpointAttitude) -> Reading:
-    """As PX4 reads it: thrust is thrust, 0.5 that of hovering."""
+    """Read the message as PX4 does: thrust is thrust, and 0.5 is hover thrust."""
     fault = _fault(message)
     if fault is not None:
         return fault
@@ -75,7 +77,7 @@ def _fault(message: SetpointAttitude) -> Refusal | None:
 
 
 def _thrust_axis(message: SetpointAttitude) -> Vector:
-    """Where thrust points: north, east, *up*; of unit length, no further from up than ``STEEPEST``."""
+    """Return the unit thrust axis (north, east, *up*), tilted by at most ``STEEPEST``."""
     w, x, y, z = message.attitude
     scale = 2.0 / (w * w + x * x + y * y + z * z)
     north, east = -scale * (w * y + x * z), scale * (w * x - y * z)
@@ -89,7 +91,7 @@ def _thrust_axis(message: SetpointAttitude) -> Vector:
 
 
 def _yaw(message: SetpointAttitude) -> float:
-    """rad, clockwise from north."""
+    """Return the yaw (rad, clockwise from north)."""
     w, x, y, z = message.attitude
     return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 

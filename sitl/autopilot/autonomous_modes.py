@@ -1,4 +1,4 @@
-"""Flights that lead themselves, without set-points: the mission, the way home, behind a leader."""
+"""Autonomous flights, without set-points: missions, returning home and following a leader."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MODES: Final = frozenset((Mode.MISSION, Mode.RETURN, Mode.FOLLOW))
 
 
 class Journeys:
-    """What flies in the modes of ``MODES``."""
+    """Executor of the modes in ``MODES``."""
 
     def __init__(
         self, itinerary: Itinerary, returning: Returning, following: Following, guidance: Guidance
@@ -27,13 +27,13 @@ class Journeys:
         self._returning = returning
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other settings from now on."""
+        """Use new settings from now on."""
         self.itinerary.configure(config)
         self._returning.configure(config)
         self.following.configure(config.follow)
 
     def begin(self, mode: Mode, here: Estimate) -> None:
-        """Set out from ``here``."""
+        """Start ``mode`` from ``here``."""
         if mode is Mode.RETURN:
             self._returning.begin(here)
         elif mode is Mode.FOLLOW:
@@ -44,12 +44,12 @@ class Journeys:
             self.itinerary.pause()
 
     def end(self) -> None:
-        """The motors have stopped."""
+        """Reset after the motors have stopped."""
         self.itinerary.landed()
         self._returning.end()
 
     def advance(self, mode: Mode, now: int, here: Estimate) -> Event | None:
-        """Fly on at ``now`` (µs), if this is one of ``MODES``."""
+        """Continue the flight at ``now`` (µs), if ``mode`` is one of ``MODES``."""
         if self._guidance.paused:
             return None
         if mode is Mode.MISSION:

@@ -1,4 +1,4 @@
-"""Commands: COMMAND_LONG (76) or COMMAND_INT (75) in, a verb of the commander, COMMAND_ACK (77) out."""
+"""Command protocol: COMMAND_LONG (76) or COMMAND_INT (75) in, a commander's method, COMMAND_ACK (77) out."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ _RELATIVE: Final = (3, 6)
 
 
 class Order(NamedTuple):
-    """A command, whichever message brought it. ``relative``: its altitude counts from home (True), from mean
-    sea level (False), unsaid (None). ``integer``: it came as COMMAND_INT, with latitude and longitude in
-    degE7."""
+    """One command, independent of the message that carried it.
+
+    ``relative``: whether its altitude counts from home (True), from mean sea level (False), or is unspecified
+    (None). ``integer``: it came as COMMAND_INT, with latitude and longitude in degE7.
+    """
 
     params: tuple[float, ...]
     relative: bool | None
@@ -42,26 +44,26 @@ class Order(NamedTuple):
 
     @property
     def nowhere(self) -> bool:
-        """Whether an integer latitude or longitude says *as it is*."""
+        """Whether an integer latitude or longitude means "unchanged"."""
         return self.integer and NOWHERE in self.params[4:6]
 
 
 class Verdict(NamedTuple):
-    """What becomes of a command: a MAV_RESULT for COMMAND_ACK, and for STATUSTEXT why not."""
+    """Result of a command: a MAV_RESULT for COMMAND_ACK, and the reason for a refusal for STATUSTEXT."""
 
     result: int
     reason: str
 
 
 Handler = Callable[[Order], Denial | None]
-"""Obeys one command, or says why not."""
+"""Executes one command, or returns the reason for refusing it."""
 
 
 class Orders:
-    """Obeys commands. A retried command finds that what it asks is already so, and changes nothing."""
+    """Executor of commands. A retried command finds its effect already in place and changes nothing."""
 
     def __init__(self, commander: Commander, flavour: Flavour, more: Mapping[int, Handler]) -> None:
-        """``more``: those who obey the commands that are not about flight, by MAV_CMD."""
+        """``more`` maps further MAV_CMDs, which do not concern flight, to their handlers."""
         self._commander = commander
         self._flavour = flavour
         self._handlers: dict[int, Handler] = {
@@ -73,7 +75,7 @@ class Orders:
         }
 
     def obey(self, message: CommandLong | CommandInt, now: int) -> Verdict:
-        """Act on a command addressed to this vehicle that arrived at ``now`` (µs)."""
+        """Execute a command addressed to this vehicle that arrived at ``now`` (µs)."""
         handler = self._handlers.get(message.command)
         if handler is None:
             return Verdict(UNSUPPORTED, f"Command {message.command} is not supported")
@@ -81,7 +83,7 @@ class Orders:
         return Verdict(ACCEPTED, "") if denial is None else Verdict(*denial)
 
     def set_mode(self, custom_mode: int, base_mode: int, now: int) -> Verdict:
-        """As SET_MODE (11), which has the mode in one number."""
+        """Execute SET_MODE (11), which has the mode in one number, at ``now`` (µs)."""
         main, sub = self._flavour.split(custom_mode)
         denial = self._set_mode(Order((base_mode, main, sub), None, now))
         return Verdict(ACCEPTED, "") if denial is None else Verdict(*denial)

@@ -1,5 +1,7 @@
-"""Armed state, flight mode, and what changes them: a command, the ground, or time. It decides; the guidance
-flies."""
+"""Armed state and flight mode, and their changes by commands, ground contact and time.
+
+The commander decides; the guidance flies.
+"""
 
 from __future__ import annotations
 
@@ -16,15 +18,18 @@ from sitl.estimation.sensors import Estimate
 from sitl.telemetry.status_text import Voice
 from sitl.values.home import Home
 
-# PX4's position mode without sticks sinks with this speed (m/s).
+# Sink speed of PX4's position mode without sticks (m/s).
 _SINKING: Final = 0.6
-# What failsafes enter, by how grave it is; other modes are none of theirs.
+# Modes that failsafes enter, by severity; failsafes enter no other modes.
 _GRAVITY: Final = {Mode.HOLD: 1, Mode.RETURN: 2, Mode.LAND: 3}
 
 
 class Commander:
-    """The state of one vehicle. A verb returns None, also when what it asks is already so, or why it is
-    denied. ``doubts``: what speaks against arming, whatever the mode."""
+    """Armed state and flight mode of one vehicle.
+
+    A command method returns None if its request is executed or already fulfilled, or else the denial.
+    ``doubts`` returns the objections to arming that do not depend on the mode.
+    """
 
     def __init__(
         self,
@@ -37,7 +42,7 @@ class Commander:
         journeys: Journeys,
         voice: Voice,
     ) -> None:
-        """``estimate`` is the present state on demand."""
+        """``estimate`` returns the present estimate."""
         self._config = config
         self._flavour = flavour
         self._guidance = guidance
@@ -60,13 +65,13 @@ class Commander:
         self.mode = flavour.boot_mode
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other settings from now on."""
+        """Use new settings from now on."""
         if config.takeoff_height != self._config.takeoff_height:
             self._takeoff_height = config.takeoff_height
         self._config = config
 
     def status(self, now: int) -> Status:
-        """What decisions at ``now`` (µs) depend on."""
+        """Return the inputs of decisions at ``now`` (µs)."""
         stream = self._steering.stream
         return Status(
             self.armed,
@@ -85,10 +90,10 @@ class Commander:
         self.mode = self._flavour.after_takeoff
         self._guidance.hover(self._estimate().pose)
 
-    # What is asked
+    # Requests
 
     def arm(self, now: int, *, forced: bool) -> Denial | None:
-        """Allow the motors to turn. ``forced`` overrides every reason against it."""
+        """Allow the motors to turn. ``forced`` overrides every objection."""
         if self.armed:
             return None
         if not forced:
@@ -107,7 +112,7 @@ class Commander:
         return None
 
     def disarm(self, *, forced: bool) -> Denial | None:
-        """Stop the motors; in flight only if ``forced``, and then it falls."""
+        """Stop the motors; in flight only if ``forced``, and then the vehicle falls."""
         if self.armed and not self.landed and not forced:
             return Denial(FAILED, "Disarming refused: flying")
         if self.armed:
@@ -115,24 +120,27 @@ class Commander:
         return None
 
     def cut(self, why: str) -> None:
-        """Stop the motors, wherever it is."""
+        """Stop the motors in any state."""
         if self.armed:
             self._stop(why)
 
     def fail_safe(self, mode: Mode, now: int) -> None:
-        """Change to ``mode`` because something is wrong; on the ground there is nothing to do, and what is
-        graver is not left for it."""
+        """Change to ``mode`` as a failsafe.
+
+        Ignored on the ground, and while a mode at least as severe is active. Without a position it lands
+        instead.
+        """
         if not self.armed or self.landed or _GRAVITY.get(mode, 0) <= _GRAVITY.get(self.mode, 0):
             return
         self._switch(mode if self.ready else Mode.LAND, now)
 
     @property
     def level_speed(self) -> float:
-        """m/s, when nobody says another."""
+        """Default horizontal speed (m/s)."""
         return self._config.waypoint_speed
 
     def take_off(self, altitude: float, relative: bool | None, now: int) -> Denial | None:
-        """As NAV_TAKEOFF (22); arguments as for ``Flavour.takeoff``."""
+        """Execute NAV_TAKEOFF (22); the arguments are those of ``Flavour.takeoff``."""
         verdict = self._flavour.takeoff(altitude, relative, self._home.altitude, self.status(now))
         if isinstance(verdict, Denial):
             return verdict
@@ -160,27 +168,31 @@ class Commander:
         return None
 
     def mode_doubt(self, now: int) -> str | None:
-        """What speaks against arming in the present mode at ``now`` (µs), where the pre-arm check counts
-        that."""
+        """Return the objection to arming in the present mode at ``now`` (µs).
+
+        Return None if armed, or if the firmware's pre-arm check does not include the mode.
+        """
         if self.armed or not self._flavour.checks_mode:
             return None
         return self._flavour.arming_denial(self.status(now))
 
     @property
     def follows(self) -> bool:
-        """Whether a leader leads it."""
+        """Whether the vehicle follows a leader."""
         return self.armed and not self.landed and self.mode is Mode.FOLLOW
 
     def steered(self, now: int) -> None:
-        """A usable set-point came: PX4 goes on with OFFBOARD if nothing but their silence had ended it."""
+        """Handle a usable set-point: PX4 resumes OFFBOARD if only a lack of set-points had ended it."""
         if self._lost and self.armed:
             self._switch(Mode.GUIDED, now)
 
-    # What happens
+    # Events
 
     def watch(self, now: int, on_ground: bool, located: bool) -> None:
-        """Notice what time and the ground brought about until ``now`` (µs); ``located``: the estimator says
-        that it has a position."""
+        """Handle the effects of time and ground contact until ``now`` (µs).
+
+        ``located``: the estimator has a position.
+        """
         self.ready = located and now >= self._ready_at
         if not on_ground:
             self.landed = False
@@ -205,7 +217,7 @@ class Commander:
             self._stop("Disarmed: on the ground for too long")
 
     def start_mission(self, now: int) -> Denial | None:
-        """As MISSION_START (300): enter its mode, and arm if this firmware does."""
+        """Execute MISSION_START (300): enter the mission mode, and arm if this firmware does."""
         denial = self.enter(Mode.MISSION, now)
         if denial is None and self._flavour.start_arms:
             return self.arm(now, forced=False)
@@ -253,7 +265,7 @@ class Commander:
             self._guidance.land(_SINKING)
 
     def _look(self, now: int, located: bool) -> None:
-        """Flying without a position: land while there is height to lose, whoever steers."""
+        """Land if the position stays lost in flight, whichever controller is active."""
         if located or self.landed:
             self._blind_since = None
             return
@@ -264,12 +276,12 @@ class Commander:
             self._switch(Mode.LAND, now)
 
     def _touch(self, now: int) -> None:
-        """On the ground, and not yet taken for landed."""
+        """Handle ground contact until it counts as landed."""
         activity = self._guidance.activity
         if activity is Activity.TAKEOFF:
             return
         if activity is Activity.LAND:
-            # Thrust is cut at once, so that it does not bounce while it is being sure.
+            # Thrust is cut at once, so that the vehicle does not bounce until the landing is confirmed.
             self._guidance.idle()
         if self._touched_at is None:
             self._touched_at = now

@@ -1,12 +1,12 @@
-"""What the vehicle is given to track: the guidance's motion with its jerk, as the autopilot's belief has it.
+"""References of the controller: the guidance's motion with its jerk, in terms of the estimate.
 
-An autopilot closes its position loop on its estimate. The physics closes it on the truth, to the bit; so what
-the estimate is off by is taken from the reference instead. For an estimate x̂ = x + e the loop that drives
-x̂ − x_d to zero is the one that drives x − (x_d − e) to zero: with position, velocity and yaw so shifted the
-vehicle flies exactly as if the controller had seen the estimate. A wrong attitude tilts the thrust that was
-meant to be straight, which is an acceleration: to first order −θ × (a − g), θ being the attitude error as a
-rotation vector and a − g the specific force asked for. Body rates are not shifted: the rate loop's gyros are
-noisy far above what the motors follow, and their bias is part of the yaw error.
+An autopilot closes its position loop on its estimate. The physics closes it on the truth, to the bit; so the
+estimate's error is subtracted from the reference instead. For an estimate x̂ = x + e the loop that drives x̂
+− x_d to zero is the one that drives x − (x_d − e) to zero: with position, velocity and yaw so shifted the
+vehicle flies exactly as if the controller had received the estimate. A wrong attitude tilts the thrust that
+was meant to be vertical, which is an acceleration: to first order −θ × (a − g), θ being the attitude error as
+a rotation vector and a − g the requested specific force. Body rates are not shifted: the noise of the rate
+loop's gyros lies far above the motors' bandwidth, and their bias is part of the yaw error.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from sitl.vehicle.ground import GRAVITY
 from sitl.vehicle.multirotor import Reference, VehicleState
 
 _JERK_TIME: Final = 0.1
-"""Time constant of the jerk that is read from a stream of accelerations (s)."""
+"""Time constant of the jerk that is derived from a stream of accelerations (s)."""
 _TURN_TIME: Final = 0.03
-"""Time constant of the yaw acceleration that is read from a stream of yaw rates (s)."""
+"""Time constant of the yaw acceleration that is derived from a stream of yaw rates (s)."""
 
 
 class Course:
-    """Makes references (site NED) from the guidance (local NED).
+    """Generator of references (site NED) from the guidance (local NED).
 
-    Set-points carry neither jerk nor yaw acceleration. Without jerk the controller sees no turning of the
-    thrust axis ahead and lags in curves; without yaw acceleration a weak yaw control lags behind every turn.
-    Both are read from the motion, low-pass filtered so that a jump does not become a jolt.
+    Set-points carry neither jerk nor yaw acceleration. Without jerk the controller does not anticipate
+    rotation of the thrust axis and lags in curves; without yaw acceleration a weak yaw control lags in every
+    turn. Both are derived from the motion, low-pass filtered so that a step does not cause a jolt.
     """
 
     def __init__(self, guidance: Guidance, origin: Origin) -> None:
@@ -50,8 +50,10 @@ class Course:
 
     @property
     def reference(self) -> Reference | None:
-        """What the autopilot is asked to track now, without the derivatives that are read from it; None when
-        nothing is. A firmware's response follows it late."""
+        """Requested reference, without the derivatives that are computed from it; None if there is none.
+
+        With a firmware's response the motion lags behind it.
+        """
         guidance = self._guidance
         if guidance.activity is Activity.IDLE:
             return None
@@ -60,7 +62,7 @@ class Course:
         return Reference(motion[0], motion[1], motion[2], yaw=yaw, yaw_rate=guidance.yaw_rate)
 
     def next(self, step: int) -> Reference | None:
-        """What to track for the next ``step`` µs, when all before has been flown."""
+        """Return the reference of the next ``step`` µs, once all earlier ones have been flown."""
         guidance, origin = self._guidance, self._origin
         if guidance.activity is Activity.IDLE:
             self._elapsed = 0
@@ -99,7 +101,7 @@ class Course:
 
 
 def believed(reference: Reference, off: Deviation) -> Reference:
-    """The reference on the truth that is ``reference`` on an estimate that is ``off``."""
+    """Return the reference on the truth that equals ``reference`` on an estimate with the error ``off``."""
     return reference._replace(
         position=reference.position - off.position,
         velocity=reference.velocity - off.velocity,
@@ -109,27 +111,27 @@ def believed(reference: Reference, off: Deviation) -> Reference:
 
 
 class Level(NamedTuple):
-    """How a reference asks for no horizontal force; from the vehicle and its controller, over mass."""
+    """Constants of vehicle and controller, over mass, for references without horizontal force."""
 
     mass: float  # kg
-    drag: float  # 1/s, what the controller cancels of a velocity
+    drag: float  # 1/s, drag coefficient that the controller cancels
     k_x: float  # 1/s²
     k_v: float  # 1/s
 
     @classmethod
     def of(cls, vehicle: VehicleConfig) -> Self:
-        """That of a vehicle."""
+        """Return the constants of a vehicle."""
         numbers = airframe(vehicle)
         m = numbers.mass
         return cls(m, numbers.cancelled_drag / m, numbers.k_x / m, numbers.k_v / m)
 
     def unlocated(self, reference: Reference, off: Deviation, state: VehicleState) -> Reference:
-        """A reference for an estimator without horizontal position and velocity: height and heading as they
-        are, and otherwise level, as it believes. So the vehicle drifts to where the air goes.
+        """Return a reference for an estimator without horizontal position and velocity.
 
-        With no error to correct there is only what the controller would cancel: drag, and the force that it
-        has learnt. That the vehicle accelerates all the same must not turn the thrust: jerk and snap take
-        back what the controller makes of an acceleration that it did not ask for.
+        Height and heading are kept; otherwise the vehicle flies level in terms of its estimate, and so drifts
+        with the air. Without an error to correct, the controller would cancel only drag and the force that it
+        has learnt. The resulting acceleration of the vehicle must not turn the thrust: jerk and snap cancel
+        the controller's response to an acceleration that was not requested.
         """
         shifted = believed(reference, off)
         position, velocity = shifted.position.copy(), shifted.velocity.copy()
@@ -147,7 +149,7 @@ class Level(NamedTuple):
 
 
 def _tilting(acceleration: list[float], off: Deviation) -> FloatArray:
-    """θ × (a − g), (3,) m/s²."""
+    """Return θ × (a − g), (3,) m/s²."""
     x, y, z = off.rotation.tolist()
     a, b, c = acceleration[0], acceleration[1], acceleration[2] - GRAVITY
     return np.array((y * c - z * b, z * a - x * c, x * b - y * a))

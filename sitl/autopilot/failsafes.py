@@ -1,5 +1,4 @@
-"""What the vehicle watches by itself, and what follows: its battery and its fence. Also what speaks against
-arming."""
+"""Battery and fence failsafes, and the checks before arming."""
 
 from __future__ import annotations
 
@@ -16,7 +15,7 @@ from sitl.telemetry.status_text import Voice
 from sitl.vehicle.battery import Battery, Charge
 
 _PERIOD: Final = 100_000
-# µs; ArduPilot says again and again why it cannot be armed.
+# µs between two reports of the objections to arming; ArduPilot repeats them.
 _AGAIN: Final = 30_000_000
 _ACTIONS: Final = {"hold": Mode.HOLD, "return": Mode.RETURN, "land": Mode.LAND}
 _WORDS: Final = {
@@ -27,7 +26,7 @@ _WORDS: Final = {
 
 
 class Failsafes:
-    """To be asked to ``watch`` when ``next_due`` (µs) has come."""
+    """Monitor of battery and fence. Call ``watch`` when ``next_due`` (µs) has come."""
 
     def __init__(
         self,
@@ -54,17 +53,17 @@ class Failsafes:
 
     @property
     def breached(self) -> bool:
-        """Whether it is beyond its fence."""
+        """Whether the vehicle is beyond its fence."""
         return self._breach is not Breach.NONE
 
     def fence_status(self, source: Source) -> FenceStatus:
-        """FENCE_STATUS (162)."""
+        """Return FENCE_STATUS (162)."""
         return FenceStatus(
             source, self._breached_at, self.breached, self._breaches & 0xFFFF, int(self._breach)
         )
 
     def doubts(self) -> list[str]:
-        """What speaks against arming, beside what the mode may have against it."""
+        """Return the objections to arming, except those that depend on the mode."""
         found = [] if self._commander.ready else ["no position yet"]
         if self._battery is not None and self._battery.charge.remaining <= 0.0:
             found.append("battery empty")
@@ -75,7 +74,7 @@ class Failsafes:
         return found
 
     def watch(self, now: int) -> None:
-        """At ``now`` (µs)."""
+        """Check battery and fence at ``now`` (µs)."""
         self.next_due = now + _PERIOD
         if self._battery is not None:
             self._watch_battery(self._battery.charge, now)
@@ -89,12 +88,12 @@ class Failsafes:
             self.say_doubts(now)
 
     def say_doubts(self, now: int) -> None:
-        """One text for each, at ``now`` (µs)."""
+        """Send one text per objection to arming at ``now`` (µs)."""
         of_mode = self._commander.mode_doubt(now)
         for doubt in [*([of_mode] if of_mode else []), *self.doubts()]:
             self._voice.warn(f"{self._flavour.doubt_prefix}{doubt}")
 
-    # Within
+    # Internals
 
     def _watch_battery(self, charge: Charge, now: int) -> None:
         commander = self._commander

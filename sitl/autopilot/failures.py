@@ -1,4 +1,4 @@
-"""MAV_CMD_INJECT_FAILURE (420): what fails because someone wants to see what follows."""
+"""Injection of failures by MAV_CMD_INJECT_FAILURE (420), for tests of their consequences."""
 
 from __future__ import annotations
 
@@ -20,11 +20,14 @@ _OK, _OFF = 0, 1
 
 
 class Failures:
-    """Obeys if the configuration says so (PX4: SYS_FAILURE_EN). GPS and motors go off and come back, a
-    battery is empty at once; other units and kinds of failure are not simulated."""
+    """Handler of failure injection, active if the configuration allows it (PX4: SYS_FAILURE_EN).
+
+    GPS and motors can fail and recover, a battery empties at once. Other units and kinds of failure are not
+    simulated.
+    """
 
     def __init__(self, plant: Plant, battery: Battery | None, config: Callable[[], AutopilotConfig]) -> None:
-        """``config``: the present one."""
+        """``config`` returns the present configuration."""
         self._plant = plant
         self._battery = battery
         self._config = config
@@ -52,7 +55,7 @@ class Failures:
             self._plant.sensors.gps.regain()
 
     def _motor(self, instance: float, left: float) -> Denial | None:
-        """``instance`` 1 is the first motor, 0 all."""
+        """Set the remaining speed of motor ``instance``: 1 is the first motor, 0 all."""
         count = len(self._plant.vehicle.config.rotors)
         if not math.isfinite(instance) or not 0 <= instance <= count:
             return Denial(DENIED, f"Failure refused: there are {count} motors")

@@ -1,4 +1,4 @@
-"""Fences: where the vehicle must not be, and which of them it has crossed."""
+"""Fences: the limits of flight, and the detection of breaches."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from sitl.autopilot.missions.plans import Plans
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 
-# MAV_CMD_NAV_FENCE: corners of a polygon to stay in and out of, circles likewise
+# MAV_CMD_NAV_FENCE: vertices of inclusion and exclusion polygons, inclusion and exclusion circles
 _STAY_IN, _STAY_OUT, _CIRCLE_IN, _CIRCLE_OUT = 5001, 5002, 5003, 5004
 Point = tuple[float, float]
 
 
 class Breach(IntEnum):
-    """FENCE_BREACH."""
+    """Values of FENCE_BREACH."""
 
     NONE = 0
     TOO_LOW = 1
@@ -28,9 +28,11 @@ class Breach(IntEnum):
 
 
 class Rules(NamedTuple):
-    """What a firmware makes of it. ``any_area``: within one of the areas to stay in is enough (PX4), else
-    within all of them; ``areas``: whether they count; ``floor``, ``height`` and ``radius`` (m) are infinite
-    where there is no limit."""
+    """Interpretation of fences by a firmware.
+
+    ``any_area``: it is enough to be inside one inclusion area (PX4), else it must be inside all. ``areas``:
+    whether areas count. ``floor``, ``height`` and ``radius`` (m) are infinite where there is no limit.
+    """
 
     enabled: bool
     any_area: bool
@@ -42,14 +44,14 @@ class Rules(NamedTuple):
 
 
 class _Area(NamedTuple):
-    """A polygon, or a circle around its only corner; local NED, m."""
+    """Polygon, or circle around its only corner; local NED, m."""
 
     corners: tuple[Point, ...]
     radius: float
     stay_in: bool
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether (x, y) is within."""
+        """Return whether (x, y) (m) is inside."""
         if self.radius:
             return math.dist(self.corners[0], (x, y)) <= self.radius
         inside = False
@@ -64,7 +66,7 @@ _NO_ITEMS: Final[tuple[Item, ...]] = ()
 
 
 class Fences:
-    """The fence of ``plans``, and a cylinder around home."""
+    """Fence of ``plans``, and a cylinder around home."""
 
     def __init__(self, plans: Plans, origin: Origin, home: Home) -> None:
         self._plans = plans
@@ -75,11 +77,11 @@ class Fences:
 
     @property
     def uploaded(self) -> bool:
-        """Whether there are areas."""
+        """Whether fence areas have been uploaded."""
         return bool(self._plans.items(Type.FENCE))
 
     def breach(self, position: Vector, rules: Rules) -> Breach:
-        """Which limit ``position`` (m, local NED) is beyond."""
+        """Return the limit that ``position`` (m, local NED) exceeds."""
         x, y, z = position
         if -z - self._home.height > rules.height:
             return Breach.TOO_HIGH

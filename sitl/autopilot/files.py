@@ -1,5 +1,7 @@
-"""MAVLink FTP (FILE_TRANSFER_PROTOCOL, 110) of a vehicle without files: every request is answered at once, so
-that clients which prefer files go on to messages."""
+"""MAVLink FTP (FILE_TRANSFER_PROTOCOL, 110) of a vehicle without files.
+
+Every request is answered at once, so that clients which prefer files fall back to messages.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ _OF_SESSIONS: Final = (5, 7, 15)
 
 
 def answer(message: FileTransfer, source: Source) -> FileTransfer | None:
-    """The answer to a request; None to what is an answer itself."""
+    """Return the answer to a request; None if the message is an answer itself."""
     sequence, session, opcode, *_ = _HEADER.unpack_from(message.payload)
     if opcode >= _ACK:
         return None

@@ -1,5 +1,7 @@
-"""The follow modes: beside or behind someone who tells where he is, by FOLLOW_TARGET (144) or
-GLOBAL_POSITION_INT (33)."""
+"""Follow modes: station keeping relative to a leader that reports its position.
+
+The leader sends FOLLOW_TARGET (144) or GLOBAL_POSITION_INT (33).
+"""
 
 from __future__ import annotations
 
@@ -13,22 +15,25 @@ from sitl.values.home import Home
 from sitl.values.origin import Origin
 from sitl.values.setpoints import POSITION, ZERO, Pose, Setpoint, rotated
 
-# Slower than that (m/s) it has no course.
+# Speed (m/s) below which the leader has no course.
 _MOVING: Final = 0.3
-# Nearer than this (m) there is no bearing to turn to.
+# Distance (m) below which there is no bearing to turn to.
 _NEAR: Final = 1.0
-# PX4 has no limit of its own; what is further off (m) is no leader but damage.
+# PX4 has no limit of its own; a leader at a greater distance (m) is treated as corrupt data.
 _FARTHEST: Final = 1000.0
 _FIRM: Final = (POSITION, POSITION, POSITION)
 
 
 class Following:
-    """Keeps station on the one who is heard; without one it holds."""
+    """Station keeping on the leader; without one the vehicle holds."""
 
     def __init__(
         self, guidance: Guidance, origin: Origin, home: Home, config: FollowConfig, *, px4: bool
     ) -> None:
-        """``px4``: FOLLOW_TARGET alone counts, and the place is one of distance, angle and height."""
+        """Set the leader's protocol by ``px4``.
+
+        If set, only FOLLOW_TARGET counts, and the station is given by distance, angle and height.
+        """
         self._guidance = guidance
         self._origin = origin
         self._home = home
@@ -40,25 +45,28 @@ class Following:
         self._system = round(config.system)
 
     def configure(self, config: FollowConfig) -> None:
-        """Other settings from now on."""
+        """Use new settings from now on."""
         if config != self._config:
             self._config = config
             self._system = round(config.system)
             self._offset = None
 
     def choose(self, system: int) -> None:
-        """As DO_FOLLOW (32): this one from now on."""
+        """Execute DO_FOLLOW (32): follow ``system`` from now on."""
         self._system = system
         self._offset = None
 
     def begin(self) -> None:
-        """Hold until the one is heard."""
+        """Hold until the leader's position arrives."""
         self._guidance.hold()
         self._offset = None
         self._heard = -math.inf
 
     def receive(self, message: FollowTarget | GlobalPosition, here: Pose, now: int) -> None:
-        """Someone says where he is, at ``now`` (µs); followed if it is the one."""
+        """Follow a position report received at ``now`` (µs).
+
+        A report is ignored if it does not come from the leader, or if the leader is out of range.
+        """
         if not self._is_meant(message):
             return
         self._system = self._system or message.source.system
@@ -73,7 +81,7 @@ class Following:
         self._guidance.track(setpoint, now, None, here, now)
 
     def advance(self, now: int) -> None:
-        """To be called in each step at ``now`` (µs)."""
+        """Hold if the leader is lost; call this in each step at ``now`` (µs)."""
         lost = now - self._heard > self._config.patience * 1e6
         if lost and self._guidance.activity is Activity.TRACK:
             self._guidance.hold()
@@ -84,7 +92,10 @@ class Following:
         return self._system in (0, message.source.system)
 
     def _motion(self, message: FollowTarget | GlobalPosition) -> tuple[Vector, Vector]:
-        """Position (m) and velocity (m/s), local NED. Heights count from each one's home, as by default."""
+        """Return position (m) and velocity (m/s), local NED.
+
+        Heights count from each vehicle's own home, as by default.
+        """
         x, y, z = self._origin.local(message.latitude, message.longitude, message.altitude)
         if isinstance(message, GlobalPosition):
             z = -(self._home.height + message.relative_altitude)

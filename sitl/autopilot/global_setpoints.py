@@ -1,4 +1,4 @@
-"""SET_POSITION_TARGET_GLOBAL_INT (86): the same as a set-point in the vehicle's own local NED."""
+"""Conversion of SET_POSITION_TARGET_GLOBAL_INT (86) to a set-point in the vehicle's own local NED."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from sitl.values.home import Home
 from sitl.values.origin import Origin
 from sitl.values.setpoints import IGNORE_POSITION, LOCAL_NED, ZERO, Reading, Refusal, Stop
 
-# MAV_FRAME, with and without _INT: above mean sea level, above home. Above terrain is not there: no terrain.
+# MAV_FRAME with and without _INT: above mean sea level, above home. Frames above terrain are not supported,
+# because there is no terrain.
 _ABOVE_SEA: Final = (0, 5)
 _ABOVE_HOME: Final = (3, 6)
 _POLE, _DATE_LINE = 900_000_000, 1_800_000_000
 
 
 def localised(message: SetpointGlobal, origin: Origin, home: Home, *, stops: bool) -> SetpointLocal | Reading:
-    """``message`` as a SET_POSITION_TARGET_LOCAL_NED (84) in frame 1, or why it cannot be one.
+    """Return ``message`` as SET_POSITION_TARGET_LOCAL_NED (84) in frame 1, or the reason against it.
 
-    ``stops``: a frame that is not understood means *stop*, as for ArduPilot; else the set-point is refused,
-    as PX4 does. Without a position the frame does not matter: velocities are along north, east and down.
+    ``stops``: an unknown frame means *stop*, as for ArduPilot; else the set-point is refused, as PX4 does.
+    Without a position the frame does not matter: velocities are along north, east and down.
     """
     position = ZERO
     if message.type_mask & IGNORE_POSITION != IGNORE_POSITION:
@@ -45,8 +46,8 @@ def localised(message: SetpointGlobal, origin: Origin, home: Home, *, stops: boo
 
 
 def _position(message: SetpointGlobal, origin: Origin, home: Home) -> Vector:
-    """m, local NED. An altitude that is no number stays none, for who reads the set-point to find."""
+    """Return the position (m, local NED). A NaN altitude stays NaN; the set-point's check finds it."""
     above = home.altitude if message.frame in _ABOVE_HOME else 0.0
     x, y, z = origin.local(message.x / 1e7, message.y / 1e7, origin.altitude)
-    # The Earth's curve bends level ground away: at equal altitude z is not zero.
+    # The Earth's curvature: at equal altitude z is not zero.
     return x, y, z - (message.altitude + above - origin.altitude)

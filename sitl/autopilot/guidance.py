@@ -1,7 +1,7 @@
-"""What the autopilot is doing, as a reference to track: stand, take off, follow set-points, hold, land.
+"""Guidance: the current activity as a reference to track (stand, take off, follow set-points, hold, land).
 
-All in the vehicle's own local NED. Every motion goes through the shaper, so that none of them begins with a
-step; and from there, if the configuration says so, through a firmware's response.
+All values are in the vehicle's own local NED. Every motion passes the shaper, so that none begins with a
+step, and then, if the configuration says so, a model of a firmware's response.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _REACHED: Final = (0.05, 0.1)  # m, m/s
 
 
 class Activity(Enum):
-    """What the guidance is busy with. IDLE: no reference, motors off or idling."""
+    """Current activity of the guidance. IDLE: no reference, motors off or idling."""
 
     IDLE = "idle"
     TAKEOFF = "takeoff"
@@ -37,10 +37,11 @@ _INTERRUPTIBLE: Final = (Activity.GO, Activity.TRACK, Activity.HOLD)
 
 
 class Guidance:
-    """One reference, moved on in steps of some ms.
+    """One reference, advanced in steps of some ms.
 
-    ``motion`` (SI, local NED) and ``yaw``, ``yaw_rate`` are what to track now. ``timed_out`` becomes true
-    when set-points stop for longer than they may: it brakes and holds where it comes to rest.
+    ``motion`` (SI, local NED) and ``yaw``, ``yaw_rate`` are the present reference. ``timed_out`` becomes true
+    when no set-point has come within the time limit: the vehicle then brakes and holds where it comes to
+    rest.
     """
 
     def __init__(self, config: AutopilotConfig) -> None:
@@ -58,11 +59,11 @@ class Guidance:
         self.timed_out = False
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other settings from now on."""
+        """Use new settings from now on."""
         limits = config.max_speed, config.max_acceleration, config.max_jerk
         gentle = config.gentle_acceleration, config.max_jerk
         self._config = config
-        # The way that is being flown keeps its own speed.
+        # The leg being flown keeps its own speed.
         going = self._limits.get(Activity.GO, Limits(config.waypoint_speed, *gentle))
         self._limits = {
             Activity.GO: Limits(going.speed, *gentle),
@@ -76,7 +77,7 @@ class Guidance:
 
     @property
     def motion(self) -> Motion:
-        """Position, velocity, acceleration."""
+        """Position, velocity and acceleration to track now."""
         if self._response is not None:
             return self._response.motion
         shaper = self._shaper
@@ -84,54 +85,59 @@ class Guidance:
 
     @property
     def asked(self) -> Motion:
-        """What set-points ask for now; where none do, the motion."""
+        """Motion requested by set-points now, or the motion itself if there are none."""
         return self._asked if self._asked is not None and self._chased else self.motion
 
     @property
     def yaw(self) -> float:
+        """Yaw to track now (rad)."""
         return self._heading.yaw
 
     @property
     def yaw_rate(self) -> float:
+        """Yaw rate to track now (rad/s)."""
         return self._heading.yaw_rate
 
     @property
     def reached(self) -> bool:
-        """Whether a takeoff is where it leads, and all but at rest; what lags behind it comes along."""
+        """Whether a takeoff has reached its height and is nearly at rest.
+
+        A firmware's response that lags behind the shaper is not considered.
+        """
         gap = self._setpoint.position[2] - self._shaper.position[2]
         return abs(gap) < _REACHED[0] and math.hypot(*self._shaper.velocity) < _REACHED[1]
 
     def wanted(self, now: int) -> Setpoint:
-        """The set-point that is followed, extrapolated to ``now`` (µs) and within the limits."""
+        """Return the followed set-point, extrapolated to ``now`` (µs) and within the limits."""
         config = self._config
         age = (now - self._received) * 1e-6
         if self.activity is Activity.GO:
             return self._setpoint
         if self._chased:
-            # ArduPilot carries a set-point forward until its time-out; PX4 leaves it as it came.
+            # ArduPilot extrapolates a set-point until its time-out; PX4 keeps it unchanged.
             return self._setpoint.after(age if config.flavour == "ardupilot" else 0.0, math.inf)
         return self._setpoint.after(age, config.thrusting).limited(config.max_speed, config.max_acceleration)
 
     def idle(self) -> None:
-        """No reference."""
+        """Track no reference."""
         self.activity = Activity.IDLE
         self._interrupted = None
 
     def takeoff(self, height: float, here: Pose) -> None:
-        """Straight up to ``height`` (m above the origin)."""
+        """Climb vertically to ``height`` (m above the origin)."""
         self._leave_ground(here)
         x, y, _ = self._shaper.position
         self._begin(Activity.TAKEOFF, Setpoint((POSITION, POSITION, POSITION), (x, y, -height)))
 
     def go(self, position: Vector, speed: float, yaw: float | None, here: Pose) -> None:
-        """To ``position`` (m) at up to ``speed`` (m/s), looking to ``yaw`` (rad; None: as it looks now)."""
+        """Fly to ``position`` (m) at up to ``speed`` (m/s), facing ``yaw`` (rad; None keeps the yaw)."""
         self._leave_ground(here)
         gentle = self._config.gentle_acceleration, self._config.max_jerk
         self._limits[Activity.GO] = Limits(speed, *gentle)
         self._begin(Activity.GO, Setpoint((POSITION, POSITION, POSITION), position, yaw=yaw))
 
     def track(self, setpoint: Setpoint, received: int, timeout: int | None, here: Pose, now: int) -> None:
-        """Follow ``setpoint``, which is for the time ``received`` (µs), until ``timeout`` µs after that."""
+        """Follow ``setpoint``, valid at the time ``received`` (µs), until ``timeout`` µs after that."""
         self._leave_ground(here)
         self._received = received
         self._deadline = _FOR_EVER if timeout is None else received + timeout
@@ -141,26 +147,29 @@ class Guidance:
         self._begin(Activity.TRACK, setpoint)
         if self._chased:
             return
-        # A trajectory that is being passed through takes effect at once, not at the end of the next step.
+        # A trajectory takes effect at once, not at the end of the next step.
         self._shaper.advance(self.wanted(now), self._limits[Activity.TRACK], 0.0)
 
     def hasten(self, speed: float) -> None:
-        """From now on at up to ``speed`` (m/s) to where it goes."""
+        """Limit the speed of the current flight to a destination to ``speed`` (m/s) from now on."""
         if self.activity is Activity.GO or (self._interrupted and self._interrupted[0] is Activity.GO):
             self._limits[Activity.GO] = self._limits[Activity.GO]._replace(speed=speed)
 
     def look(self, yaw: float) -> None:
-        """To ``yaw`` (rad), until something else says where to look."""
+        """Turn to ``yaw`` (rad), until something else sets the yaw."""
         self._setpoint = self._setpoint._replace(yaw=yaw, yaw_rate=None)
 
     @property
     def paused(self) -> bool:
-        """Whether it stays on ``pause``."""
+        """Whether a ``pause`` is in effect."""
         return self._interrupted is not None
 
     def pause(self) -> bool:
-        """Brake and stay. ``go_on`` goes on with what it does now, or what ``track`` is told meanwhile.
-        False where there is nothing to interrupt."""
+        """Brake and hold.
+
+        ``go_on`` resumes the present activity, or the latest set-point received by ``track`` in the meantime.
+        Returns False if there is nothing to interrupt.
+        """
         if self._interrupted is None and self.activity in _INTERRUPTIBLE:
             interrupted = self.activity, self._setpoint
             self.hold()
@@ -168,22 +177,22 @@ class Guidance:
         return self.paused
 
     def go_on(self) -> None:
-        """End of ``pause``."""
+        """End ``pause``."""
         if self._interrupted is not None:
             activity, setpoint = self._interrupted
             self._begin(activity, setpoint)
 
     def hover(self, here: Pose) -> None:
-        """Stay ``here``, where it is at rest in the air."""
+        """Hold ``here``, at rest in the air."""
         self._leave_ground(here)
         self.hold()
 
     def hold(self) -> None:
-        """Brake, and stay where that ends."""
+        """Brake, and hold at the stopping point."""
         self._begin(Activity.HOLD, _STAY)
 
     def settle(self) -> None:
-        """Stay where the takeoff led."""
+        """Hold at the end of the takeoff."""
         self.activity = Activity.HOLD
 
     def land(self, speed: float) -> None:
@@ -191,9 +200,9 @@ class Guidance:
         self._begin(Activity.LAND, _STAY._replace(velocity=(0.0, 0.0, speed)))
 
     def relocate(self, position: Vector, velocity: Vector) -> None:
-        """The frame has slipped: what is being tracked is now here, and goes on from here.
+        """Move the tracked reference to ``position`` (m) and ``velocity`` (m/s) after the frame has slipped.
 
-        A takeoff still leads straight up. A set-point stays what it says, and is chased within the limits.
+        A takeoff still leads straight up. A set-point keeps its value, and is approached within the limits.
         """
         if self.activity is Activity.IDLE:
             return
@@ -206,8 +215,11 @@ class Guidance:
             self._response.relocate(position, velocity)
 
     def advance(self, now: int, step: int, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
-        """Move the reference from ``now`` to ``now + step`` (µs), in air that moves with ``wind`` (m/s); the
-        estimated position moves by ``drift`` (m/s) more than the estimated velocity says."""
+        """Advance the reference from ``now`` to ``now + step`` (µs).
+
+        ``wind`` (m/s) is the velocity of the air. The estimated position moves by ``drift`` (m/s) more than
+        the estimated velocity indicates.
+        """
         activity = self.activity
         if activity is Activity.IDLE:
             return
@@ -226,7 +238,7 @@ class Guidance:
         if response is not None and self._chased:
             self._asked = wanted.position, wanted.velocity, wanted.acceleration
             response.advance(self._asked, dt, wind, drift)
-            # What comes after the stream begins where the firmware has got to.
+            # The activity after the stream begins where the firmware's response is now.
             shaper.position, shaper.velocity, shaper.acceleration = response.desired
             return
         shaper.advance(wanted, self._limits[self.activity], dt)
@@ -234,8 +246,11 @@ class Guidance:
             response.advance((shaper.position, shaper.velocity, shaper.acceleration), dt, wind, drift)
 
     def _expire(self, last: Setpoint) -> None:
-        """Set-points come no more: brake and hold. ArduPilot forgets what velocity it was told, but not the
-        position, which stops where it has got to; the vehicle goes back there."""
+        """Brake and hold after set-points have ceased.
+
+        ArduPilot discards the commanded velocity but keeps the position, extrapolated to the time-out; the
+        vehicle returns to it.
+        """
         persists = self._response is not None and self._config.flavour == "ardupilot"
         if persists and last.levels[0] == POSITION:
             self._shaper.restart(last.position)
@@ -244,7 +259,7 @@ class Guidance:
 
     @property
     def _chased(self) -> bool:
-        """Whether the firmware's own position controller has the set-points, as they are."""
+        """Whether the firmware's own position controller receives the set-points unshaped."""
         return (
             self._response is not None
             and self.activity is Activity.TRACK
@@ -253,7 +268,7 @@ class Guidance:
 
     @property
     def _resting(self) -> bool:
-        """Whether nothing would move; a response goes on for ever, ever slower."""
+        """Whether nothing would move; a firmware's response never comes fully to rest."""
         return self._shaper.at_rest and self._heading.yaw_rate == 0.0 and self._response is None
 
     def _begin(self, activity: Activity, setpoint: Setpoint) -> None:

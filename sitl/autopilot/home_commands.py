@@ -1,5 +1,4 @@
-"""Home and origin as others set them: DO_SET_HOME (179), SET_HOME_POSITION (243), SET_GPS_GLOBAL_ORIGIN
-(48)."""
+"""Home and origin commands: DO_SET_HOME (179), SET_HOME_POSITION (243), SET_GPS_GLOBAL_ORIGIN (48)."""
 
 from __future__ import annotations
 
@@ -19,13 +18,16 @@ from sitl.values.home import Home
 from sitl.values.origin import Origin
 
 SET_HOME: Final = 179
-# A home further off (m) is a mistake.
+# Greatest accepted distance of home (m); a larger one is an error.
 _FAR: Final = 100_000.0
 
 
 class Homing:
-    """Moves ``home``, and tells it whenever it moved. The origin of a filter that has one stays, as on a real
-    ArduPilot; who wants to set it is told where it is."""
+    """Handler that moves ``home``, and reports it after every change.
+
+    The origin of a filter that has one is fixed, as on a real ArduPilot; a request to set it is answered with
+    the present origin.
+    """
 
     def __init__(
         self,
@@ -36,7 +38,7 @@ class Homing:
         ready: Callable[[], bool],
         voice: Voice,
     ) -> None:
-        """``ready``: whether there is a position."""
+        """``ready`` returns whether there is a position."""
         self._home = home
         self._origin = origin
         self._telemetry = telemetry
@@ -46,19 +48,22 @@ class Homing:
         self.commands: dict[int, Handler] = {SET_HOME: self._set_home}
 
     def set_home(self, message: SetHomePosition, now: int) -> None:
-        """SET_HOME_POSITION (243)."""
+        """Handle SET_HOME_POSITION (243)."""
         denial = self._move(message.latitude, message.longitude, message.altitude)
         if denial is not None:
             self._voice.complain(denial.reason, now)
 
     def set_origin(self, _message: SetGpsGlobalOrigin, now: int) -> None:
-        """SET_GPS_GLOBAL_ORIGIN (48)."""
+        """Handle SET_GPS_GLOBAL_ORIGIN (48): refuse it and report the present origin."""
         self._voice.complain("Origin refused: it is set already", now)
         self._telemetry.request(ORIGIN)
 
     def _set_home(self, order: Order) -> Denial | None:
-        """Parameter 1: here; else parameters 5 to 7, degrees and metres above mean sea level, or as the frame
-        says."""
+        """Set home to the present position if parameter 1 is 1, else to parameters 5 to 7.
+
+        These are in degrees and metres above mean sea level, unless the frame of a COMMAND_INT makes the
+        altitude relative to home.
+        """
         if order.params[0] == 1.0:
             if not self._ready():
                 return Denial(TEMPORARILY_REJECTED, "Home refused: no position yet")

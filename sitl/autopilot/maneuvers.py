@@ -1,4 +1,4 @@
-"""Commands that move a flying vehicle, or hold it up: DO_REPOSITION and its kind."""
+"""Commands that move, stop or hold a flying vehicle, such as DO_REPOSITION."""
 
 from __future__ import annotations
 
@@ -27,16 +27,19 @@ PAUSE: Final = 193
 CHECK: Final = 401
 
 _CHANGE_MODE: Final = 1
-# SPEED_TYPE: air and ground, which are one without wind in the plan; up, down.
+# SPEED_TYPE: air and ground speed, which are equal because plans ignore wind; up, down.
 _LEVEL, _UP, _DOWN = (0.0, 1.0), 2.0, 3.0
-# DO_CHANGE_SPEED: no change, the usual one.
+# DO_CHANGE_SPEED: no change, default speed.
 _SAME, _USUAL = -1.0, -2.0
 _FASTEST: Final = 100.0
 _LAST: Final = (90.0, 180.0)
 
 
 class Maneuvers:
-    """``commands`` by MAV_CMD. What a firmware does not have it answers with UNSUPPORTED, as the real one."""
+    """Handlers of these commands: ``commands`` by MAV_CMD.
+
+    Commands that a firmware does not support are answered with UNSUPPORTED, as by the real one.
+    """
 
     def __init__(
         self,
@@ -50,7 +53,7 @@ class Maneuvers:
         estimate: Callable[[], Estimate],
         say_doubts: Callable[[int], None],
     ) -> None:
-        """``say_doubts``: what speaks against arming at a time (µs), as texts."""
+        """``say_doubts`` sends the objections to arming at a time (µs) as texts."""
         self._commander = commander
         self._flavour = flavour
         self._guidance = guidance
@@ -94,7 +97,7 @@ class Maneuvers:
         return None
 
     def _change_speed(self, order: Order) -> Denial | None:
-        """Until another mode is entered."""
+        """Change the horizontal speed until another mode is entered."""
         kind, speed = order.params[:2]
         if speed == _SAME:
             return None
@@ -123,7 +126,7 @@ class Maneuvers:
         return None
 
     def _turn(self, order: Order) -> Denial | None:
-        """CONDITION_YAW: parameter 1 the angle (degrees), 3 the direction, 4 whether it is relative."""
+        """Execute CONDITION_YAW: parameter 1 angle (degrees), 3 direction, 4 whether it is relative."""
         angle, _, direction, relative = order.params[:4]
         if not (0.0 <= angle <= 360.0 and relative in (0.0, 1.0)):
             return Denial(DENIED, "Yaw refused: the angle must be 0 to 360 degrees")
@@ -136,8 +139,11 @@ class Maneuvers:
         return None
 
     def _reposition(self, order: Order) -> Denial | None:
-        """Parameter 1 the speed (m/s), 2 bit 0 whether the mode may change, 4 the yaw (rad), 5 to 7 the
-        place."""
+        """Execute DO_REPOSITION.
+
+        Parameter 1 is the speed (m/s), bit 0 of parameter 2 whether the mode may change, parameter 4 the yaw
+        (rad), parameters 5 to 7 the place.
+        """
         commander, guided = self._commander, self._flavour.repositioning
         if not commander.ready:
             return Denial(TEMPORARILY_REJECTED, "Reposition refused: no position yet")
@@ -157,7 +163,7 @@ class Maneuvers:
         return None
 
     def _target(self, order: Order) -> tuple[float, float, float] | Denial:
-        """m, local NED. PX4 takes what is not a number for *as it is*."""
+        """Return the target (m, local NED) or the denial. PX4 takes a NaN coordinate as "unchanged"."""
         latitude, longitude, altitude = order.place
         here = self._estimate().position
         if order.relative is None and self._flavour.stops:
@@ -167,7 +173,7 @@ class Maneuvers:
         elif not (abs(latitude) <= _LAST[0] and abs(longitude) <= _LAST[1]) or latitude == longitude == 0.0:
             return Denial(DENIED, "Reposition refused: no such place on the globe")
         else:
-            # Where level ground is: the Earth's curve bends it away.
+            # Height of level ground there, which the Earth's curvature lowers.
             x, y, level = self._origin.local(latitude, longitude, self._origin.altitude)
         if not math.isfinite(altitude) and not self._flavour.stops:
             return x, y, here[2]
@@ -183,5 +189,5 @@ class Maneuvers:
         return speed if mode is self._commander.mode else self._commander.level_speed
 
     def _yaw(self, asked: float) -> float | None:
-        """PX4's parameter 4; ArduPilot keeps its heading."""
+        """Return PX4's parameter 4 (rad); None for ArduPilot, which keeps its heading."""
         return asked if not self._flavour.stops and math.isfinite(asked) else None

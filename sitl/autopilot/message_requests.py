@@ -1,4 +1,4 @@
-"""What is to be told: commands and messages that ask for other messages."""
+"""Commands and messages that request other messages."""
 
 from __future__ import annotations
 
@@ -21,13 +21,16 @@ REQUEST: Final = 512
 CAPABILITIES: Final = 520
 
 _LAST_ID: Final = 0xFFFF
-# µs, half an hour: more does not fit into MESSAGE_INTERVAL.
+# µs, half an hour: the largest interval that fits into MESSAGE_INTERVAL.
 _LONGEST: Final = 0x7FFFFFFF
 
 
 class Requests:
-    """Obeys the commands that ask for messages: SET_MESSAGE_INTERVAL (511), GET_MESSAGE_INTERVAL (510),
-    REQUEST_MESSAGE (512), and the older 410 and 520; and REQUEST_DATA_STREAM (66)."""
+    """Handler of message requests.
+
+    It executes SET_MESSAGE_INTERVAL (511), GET_MESSAGE_INTERVAL (510), REQUEST_MESSAGE (512), the older 410
+    and 520, and REQUEST_DATA_STREAM (66).
+    """
 
     def __init__(self, source: Source, flavour: Flavour, telemetry: Telemetry, outbox: list[Message]) -> None:
         self._source = source
@@ -37,7 +40,7 @@ class Requests:
 
     @property
     def commands(self) -> dict[int, Handler]:
-        """Who obeys what, by MAV_CMD."""
+        """Handlers by MAV_CMD."""
         return {
             SET_INTERVAL: self._set_interval,
             GET_INTERVAL: self._get_interval,
@@ -47,13 +50,15 @@ class Requests:
         }
 
     def stream(self, message: RequestDataStream, now: int) -> None:
-        """REQUEST_DATA_STREAM (66), which only ArduPilot still knows: the rate of a whole group."""
+        """Handle REQUEST_DATA_STREAM (66), ArduPilot only: set the rate of a whole group."""
         if self._flavour.groups_streams:
             self.set_rate(message.stream, message.rate if message.start else 0, now)
 
     def set_rate(self, stream: int, rate: float | None, now: int) -> None:
-        """All messages of a MAV_DATA_STREAM at ``rate`` (Hz), as far as it is granted; 0 for none, None for
-        the usual one."""
+        """Send all messages of a MAV_DATA_STREAM at ``rate`` (Hz), limited to the firmware's highest rate.
+
+        0 stops them, None restores the default rate.
+        """
         if rate is None:
             interval = 0
         else:

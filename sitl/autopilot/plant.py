@@ -1,4 +1,4 @@
-"""The vehicle in its air, and what its autopilot believes of it: guidance in, motion and estimate out."""
+"""Vehicle in its air, with its estimator: it takes the guidance and gives motion and estimate."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from sitl.values.setpoints import ZERO
 from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.multirotor import Reference, VehicleState
 
-# The reference is renewed at least this often (µs), as real position loops run at 50 to 100 Hz; the vehicle's
-# controller extrapolates it in between.
+# The reference is renewed at least this often (µs), because real position loops run at 50 to 100 Hz; the
+# vehicle's controller extrapolates it in between.
 _RENEWAL: Final = 10_000
 
 
 class Plant:
-    """Moves the vehicle and the guidance that leads it, in strides on a fixed grid from time 0.
+    """Simulation of the vehicle and its guidance, in strides on a fixed grid from time 0.
 
-    ``sensors`` is the estimator, ``course`` what is tracked.
+    ``sensors`` is the estimator, ``course`` generates the tracked reference.
     """
 
     def __init__(
@@ -41,8 +41,10 @@ class Plant:
         patience: float,
         seed: int,
     ) -> None:
-        """At rest at ``origin``, or as high above it as ``config`` says. ``patience`` and ``seed`` as for
-        ``Sensors``."""
+        """Start at rest at ``origin``, or at the height above it in ``config``.
+
+        ``patience`` and ``seed`` are those of ``Sensors``.
+        """
         ground = float(origin.position[2]) + vehicle.rest_height
         start = origin.motion_to_site([(0.0, 0.0, -config.start_height)])[0]
         flying = config.start_height > 0.0
@@ -67,11 +69,13 @@ class Plant:
         self._trace_start = 0
 
     def move(self, now: int, *, armed: bool) -> None:
-        """All physics steps that end by ``now`` (µs, not decreasing), under a reference that is renewed on a
-        fixed grid. Without one the motors stand still, or idle when ``armed``."""
+        """Run all physics steps that end by ``now`` (µs, not decreasing).
+
+        The reference is renewed on a fixed grid. Without one the motors stand still, or idle when ``armed``.
+        """
         vehicle, guidance, period, stride = self.vehicle, self._guidance, self._period, self._stride
         if not armed:
-            # Whatever was asked for: nothing turns the motors of a vehicle that is not armed.
+            # A disarmed vehicle's motors never turn, whatever the guidance requests.
             guidance.idle()
         self._trace_start = self._steps
         self._trace.clear()
@@ -93,12 +97,12 @@ class Plant:
 
     @property
     def time(self) -> int:
-        """µs, of the last physics step."""
+        """End time of the last physics step (µs)."""
         return self._steps * self._period
 
     @property
     def state(self) -> VehicleState:
-        """The true state after the last physics step; read once, so leave it as it is."""
+        """True state after the last physics step; it is cached, so do not modify it."""
         if self._truth is None:
             self._truth = self.vehicle.state
         return self._truth
@@ -109,7 +113,7 @@ class Plant:
         return self.vehicle.air
 
     def estimate(self) -> Estimate:
-        """What is believed of it."""
+        """Return the estimated state."""
         if self._belief is None:
             self._belief = self.sensors.estimate(self.state)
         return self._belief
@@ -128,22 +132,22 @@ class Plant:
 
     @property
     def trace_times(self) -> npt.NDArray[np.int64]:
-        """When (n,) it was there (µs)."""
+        """Times (n,) of the positions in ``trace`` (µs)."""
         return np.arange(self._trace_start + 1, self._steps + 1, dtype=np.int64) * self._period
 
-    # Events and faults, from the next stride on
+    # Events and faults, effective from the next stride on
 
     def begin(self, now: int) -> None:
-        """The goal event (µs)."""
+        """Mark the goal event at ``now`` (µs)."""
         if self._weather is not None:
             self._weather.begin(now)
 
     def lose_gps(self) -> None:
-        """No more GPS."""
+        """Stop GPS."""
         self.sensors.lose_gps(self.time, self.state)
 
     def shift_gps(self, offset: Vector) -> None:
-        """GPS is off by ``offset`` (m, local NED) in all."""
+        """Set the total GPS error to ``offset`` (m, local NED)."""
         self.sensors.shift_gps(offset, self.time, self.state)
 
     # Within a stride
@@ -158,11 +162,11 @@ class Plant:
         return weather.wind(now, self._ground - float(self.state.position[2]), (u, v, w))
 
     def _local(self, wind: Vector) -> Vector:
-        """A velocity in the site's NED, in the vehicle's own."""
+        """Convert a velocity from site NED to the vehicle's local NED."""
         return wind if wind == ZERO else self._origin.vector_to_local(np.array(wind))
 
     def _believed(self, reference: Reference) -> Reference:
-        """The reference that makes the physics fly as on the estimate."""
+        """Return the reference that makes the physics fly as on the estimate."""
         off = self.sensors.deviation(self.state)
         if self.sensors.gps.located:
             return believed(reference, off)

@@ -1,4 +1,4 @@
-"""One message in, its answer out: who is meant, and who takes care of it."""
+"""Reception of messages: it checks the addressee, dispatches each message and sends the answer."""
 
 from __future__ import annotations
 
@@ -29,8 +29,11 @@ from sitl.telemetry.status_text import Voice
 
 
 class Reception:
-    """Hands messages for this vehicle to ``orders``, ``steering`` and ``services``, answers TIMESYNC (111)
-    and PING (4) itself, and leaves alone what is for others. Answers go to ``outbox``."""
+    """Dispatcher of messages for this vehicle to ``orders``, ``steering``, ``following`` and ``services``.
+
+    It answers TIMESYNC (111) and PING (4) itself, and ignores messages for other systems. Answers go to
+    ``outbox``.
+    """
 
     def __init__(
         self,
@@ -44,8 +47,11 @@ class Reception:
         services: Mapping[type[Any], Callable[[Any, int], None]],
         set_mode_ack: int,
     ) -> None:
-        """``services``: who handles a message that arrived at some time (µs), by its type.
-        ``set_mode_ack``: the command that COMMAND_ACK names when SET_MODE (11) was obeyed."""
+        """Set the handlers.
+
+        ``services`` maps a type of message to its handler, which takes a message and its time of arrival
+        (µs). ``set_mode_ack`` is the command that COMMAND_ACK names in answer to SET_MODE (11).
+        """
         self._source = source
         self._outbox = outbox
         self._voice = voice
@@ -57,7 +63,7 @@ class Reception:
         self._set_mode_ack = set_mode_ack
 
     def handle(self, message: Message, now: int, estimate: Estimate) -> None:
-        """Act on a message that arrived at ``now`` (µs since boot), when ``estimate`` was believed."""
+        """Handle a message that arrived at ``now`` (µs since boot), with the ``estimate`` of that time."""
         match message:
             case SetpointLocal() | SetpointGlobal() | SetpointAttitude():
                 if self._is_mine(message.target_system, message.target_component):
@@ -102,7 +108,7 @@ class Reception:
         handle = self._services.get(type(message))
         if handle is None:
             return
-        # Not every message says a component; each of these says a system.
+        # Not every message has a target component; each of these has a target system.
         component: int = getattr(message, "target_component", 0)
         if self._is_mine(getattr(message, "target_system", -1), component):
             handle(message, now)

@@ -1,4 +1,4 @@
-"""Where a vehicle is that is sent set-points: at them (``exact``), or where a ``firmware`` flies it."""
+"""Response of a vehicle to set-points: ``exact``, or that of a ``firmware``'s position controller."""
 
 from __future__ import annotations
 
@@ -12,33 +12,38 @@ from sitl.config.autopilot import AutopilotConfig
 
 
 class Response(Protocol):
-    """A firmware's position controller on an airframe; local NED."""
+    """Position controller of a firmware on an airframe; local NED."""
 
     @property
     def motion(self) -> Motion:
-        """The vehicle's."""
+        """Motion of the vehicle."""
 
     @property
     def desired(self) -> Motion:
-        """That of the trajectory that the firmware makes of the set-points; when they end it goes on from
-        there."""
+        """Motion of the trajectory that the firmware derives from the set-points.
+
+        The activity after the set-points continues from it.
+        """
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other parameters from now on."""
+        """Use new parameters from now on."""
 
     def restart(self, position: Vector) -> None:
-        """Rest at ``position``, with nothing learnt."""
+        """Rest at ``position``, with integrals reset."""
 
     def relocate(self, position: Vector, velocity: Vector) -> None:
-        """The estimate has jumped: the vehicle is here, and goes on from here."""
+        """Handle a jump of the estimate to ``position`` and ``velocity``, and continue from there."""
 
     def advance(self, wanted: Motion, dt: float, wind: Vector = ..., drift: Vector = ...) -> None:
-        """Move by ``dt`` seconds after ``wanted``, which is valid at the end of them, in air that moves with
-        ``wind`` (m/s). The estimated position moves by ``drift`` (m/s) more than the velocity says."""
+        """Advance by ``dt`` seconds towards ``wanted``, which is valid at their end.
+
+        ``wind`` (m/s) is the velocity of the air. The estimated position moves by ``drift`` (m/s) more than
+        the velocity indicates.
+        """
 
 
 def response_of(config: AutopilotConfig) -> Response | None:
-    """The response that the settings name; None for the exact one."""
+    """Return the response that the settings name; None for the exact one."""
     if config.response == "exact":
         return None
     return ArduPilotResponse.of(config) if config.flavour == "ardupilot" else Px4Response(config.px4)

@@ -1,4 +1,4 @@
-"""The way home: up, over, a pause, and down."""
+"""Return to home: climb, fly over home, pause, land."""
 
 from __future__ import annotations
 
@@ -25,8 +25,11 @@ class _Stage(Enum):
 
 
 class Returning:
-    """RTL of both firmwares: first to the return height, or as high as it is; then over home; then it
-    lands."""
+    """RTL of both firmwares.
+
+    The vehicle climbs to the return height, or keeps its height if that is greater, flies over home, and
+    lands.
+    """
 
     def __init__(self, guidance: Guidance, home: Home, config: AutopilotConfig) -> None:
         self._guidance = guidance
@@ -37,22 +40,22 @@ class Returning:
         self._until = 0
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other settings from now on."""
+        """Use new settings from now on."""
         self._config = config
 
     def begin(self, here: Estimate) -> None:
-        """From ``here``."""
+        """Start the return from ``here``."""
         north, east, down = here.position
         height = max(self._home.height + self._config.return_height, -down)
         self._go((north, east, -height), self._config.waypoint_climb, None, here)
         self._stage = _Stage.CLIMB
 
     def end(self) -> None:
-        """Nothing is on its way any more."""
+        """Reset: no return is in progress."""
         self._stage = _Stage.IDLE
 
     def advance(self, now: int, here: Estimate) -> None:
-        """Fly on: to be called in each step at ``now`` (µs)."""
+        """Continue the return; call this in each step at ``now`` (µs)."""
         if self._stage is _Stage.PAUSE:
             if now >= self._until and self._config.return_pause >= 0.0:
                 self._guidance.land(self._config.land_speed)

@@ -1,5 +1,4 @@
-"""What an autopilot keeps over a restart. The node reads and writes no file: it is given this, and gives
-it."""
+"""State that an autopilot keeps over a restart; the node itself reads and writes no file."""
 
 from __future__ import annotations
 
@@ -10,10 +9,11 @@ from sitl.autopilot.missions.items import Item
 
 
 class Saved(BaseModel):
-    """``parameters`` that are not as at first, by name; ``plans``: mission, fence and rally points;
-    ``signed_until``: the newest stamp of a signed message (10 µs since 2015).
+    """Persistent state of an autopilot.
 
-    As JSON: ``model_dump_json`` and ``model_validate_json``, which refuses what is damaged.
+    ``parameters``: values that differ from the initial ones, by name; ``plans``: mission, fence and rally
+    points; ``signed_until``: the newest timestamp of a signed message (10 µs since 2015). The JSON functions
+    are ``model_dump_json`` and ``model_validate_json``, which refuses damaged data.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")

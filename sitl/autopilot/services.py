@@ -1,5 +1,7 @@
-"""All that an autopilot does beside flying: parameters, requests, files, home. One place that knows who takes
-care of which message and which command."""
+"""Services of an autopilot beside flying: parameters, requests, files, home.
+
+The module maps messages and commands to their handlers.
+"""
 
 from __future__ import annotations
 
@@ -30,15 +32,17 @@ from sitl.autopilot.parameters.values import Values
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import Voice
 
-# MAV_CMD_PREFLIGHT_STORAGE, and its first parameter
+# MAV_CMD_PREFLIGHT_STORAGE, DO_FENCE_ENABLE; first parameter of the former
 STORAGE: Final = 245
 FENCE_ENABLE: Final = 207
 _READ, _WRITE, _RESET = 0.0, 1.0, 2.0
 
 
 class Services:
-    """``handlers`` by type of message, ``commands`` by MAV_CMD; ``next_due`` (µs): before it there is nothing
-    to do."""
+    """Services: ``handlers`` by type of message, ``commands`` by MAV_CMD.
+
+    ``next_due`` (µs): nothing is due before it.
+    """
 
     def __init__(
         self,
@@ -88,11 +92,11 @@ class Services:
 
     @property
     def next_due(self) -> int:
-        """µs."""
+        """Time before which no ``work`` is due (µs)."""
         return min(self.parameters.next_due, self._missions.transfer.next_due)
 
     def work(self, now: int) -> None:
-        """Do what is due at ``now`` (µs)."""
+        """Do the work due at ``now`` (µs)."""
         for part in (self.parameters, self._missions.transfer):
             if now >= part.next_due:
                 part.work(now)
@@ -106,12 +110,12 @@ class Services:
         self._stream(self._now)
 
     def _stream(self, now: int, *, resets: bool = False) -> None:
-        """Give the groups of messages the rates that ArduPilot's SR0_ parameters say, where they changed."""
+        """Apply ArduPilot's SR0_ parameters to the rates of their message groups, where they changed."""
         for group, rate in self._rates.items():
             wanted = self._values.named(f"SR0_{group}")
             if wanted != rate:
                 self._rates[group] = wanted
-                # 0 is how it began: what flows then flows again.
+                # 0 is the initial value: a reset to it restores the default rates.
                 usual = wanted == 0.0 and resets
                 self._requests.set_rate(STREAMS[group], None if usual else wanted, now)
 
@@ -121,7 +125,7 @@ class Services:
             self._outbox.append(answer)
 
     def _enable_fence(self, order: Order) -> Denial | None:
-        """DO_FENCE_ENABLE, as ArduPilot has it: parameter 1 is FENCE_ENABLE."""
+        """Execute ArduPilot's DO_FENCE_ENABLE: parameter 1 is FENCE_ENABLE."""
         number = self._values.number("FENCE_ENABLE")
         if number is None or order.params[0] not in (0.0, 1.0):
             return Denial(DENIED, "Fence refused: parameter 1 must be 0 or 1")
@@ -131,7 +135,7 @@ class Services:
         return None
 
     def _store(self, order: Order) -> Denial | None:
-        """PREFLIGHT_STORAGE: what is set is kept anyhow; all can be made as at first."""
+        """Execute PREFLIGHT_STORAGE: values are always kept; a reset restores the initial ones."""
         wish = order.params[0]
         if wish == _RESET:
             self._values.reset()

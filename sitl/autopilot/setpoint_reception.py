@@ -1,7 +1,7 @@
-"""Set-points: read, timed, followed or answered.
+"""Reception of set-points: each is read, timestamped, and followed or refused.
 
-A set-point that is not followed is answered with STATUSTEXT (253), the same reason at most once a second, and
-the vehicle goes on as before, or brakes where the firmware understands "stop".
+A refused set-point is answered with STATUSTEXT (253), at most once a second for the same reason. The vehicle
+then continues unchanged, or brakes where the firmware understands "stop".
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from sitl.values.origin import Origin
 from sitl.values.setpoints import POSITION, Pose, Reading, Setpoint, Stop
 
 _SECOND: Final = 1_000_000
-# A set-point takes off when it is this far above, or rises with this speed or acceleration (m, m/s, m/s²).
+# Rise (m), climb rate (m/s) or acceleration (m/s²) above which a set-point lifts the vehicle off the ground.
 _RISING: Final = (0.2, 0.1, 0.1)
-# A pause as long as this (µs) begins a new stream.
+# Pause (µs) after which a set-point begins a new stream.
 _PAUSE: Final = 2 * _SECOND
 
 
 class Stream(NamedTuple):
-    """The newest usable set-point, when it came and when the one before (µs)."""
+    """Newest usable set-point, with its time of arrival and that of its predecessor (µs)."""
 
     setpoint: Setpoint | None = None
     newest: float = -math.inf
     older: float = -math.inf
 
     def age(self, now: int) -> float:
-        """Seconds since the newest; ∞ before the first."""
+        """Return the seconds since the newest set-point; ∞ before the first."""
         return (now - self.newest) / _SECOND
 
     @property
@@ -44,12 +44,12 @@ class Stream(NamedTuple):
 
 
 class Steering:
-    """Turns set-point messages into what the guidance follows."""
+    """Converter of set-point messages into set-points for the guidance."""
 
     def __init__(
         self, flavour: Flavour, guidance: Guidance, origin: Origin, home: Home, voice: Voice
     ) -> None:
-        """``origin`` and ``home`` are what places on the globe and heights count from."""
+        """``origin`` and ``home`` are the references of global positions and heights."""
         self._flavour = flavour
         self._guidance = guidance
         self._origin = origin
@@ -64,8 +64,10 @@ class Steering:
         here: Pose,
         now: int,
     ) -> bool:
-        """Act on one set-point addressed to this vehicle that arrived at ``now`` (µs); whether it is one that
-        can be flown."""
+        """Handle one set-point addressed to this vehicle that arrived at ``now`` (µs).
+
+        Return whether it can be flown.
+        """
         reading = self._read(message, here)
         if not isinstance(reading, Setpoint):
             denial = self._flavour.steering_denial(status)
@@ -82,7 +84,7 @@ class Steering:
         return True
 
     def resume(self, here: Pose, now: int) -> None:
-        """Follow the newest set-point of a stream that began before it was allowed to steer, or hold."""
+        """Follow the newest set-point of a stream that began before it could take effect, or hold."""
         setpoint = self.stream.setpoint
         if self._flavour.stream_first and setpoint is not None:
             self._follow(setpoint, here, now)
@@ -105,7 +107,7 @@ class Steering:
 
 
 def _rises(setpoint: Setpoint, here: Pose) -> bool:
-    """Whether a set-point leads off the ground."""
+    """Return whether a set-point leads off the ground."""
     level = setpoint.levels[2]
     z = (setpoint.position, setpoint.velocity, setpoint.acceleration)[level][2]
     return (here.position[2] if level == POSITION else 0.0) - z > _RISING[level]

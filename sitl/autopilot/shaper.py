@@ -1,11 +1,11 @@
-"""From what is asked to what can be flown: references whose speed, acceleration and jerk are bounded.
+"""Shaping of references: their speed, acceleration and jerk are bounded, so that they can be flown.
 
-The geometric controller must never see a step. ``Shaper`` is a point mass that chases the set-point: far away
-it keeps to a speed limit, near by it brakes on v² = 2 a d, and at the end it converges exponentially. It
-serves destinations, velocities, accelerations and moving set-points alike. A set-point that is a trajectory
-(position and velocity on all axes, within limits) is passed through unchanged once the point mass has caught
-up with it, and stays so until it jumps by more than the release distance or speed: then the point mass chases
-it again from where it is.
+The geometric controller must never receive a step. ``Shaper`` is a point mass that approaches the set-point:
+far away it keeps to a speed limit, closer it brakes on v² = 2 a d, and at the end it converges exponentially.
+It serves destinations, velocities, accelerations and moving set-points alike. A set-point that is a
+trajectory (position and velocity on all axes, within limits) is passed through unchanged once the point mass
+has converged to it, until it jumps by more than the release distance or speed: then the point mass approaches
+it again from its present motion.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sitl.values.setpoints import ACCELERATION, POSITION, ZERO, Setpoint
 
 _POSITION_RATE: Final = 2.0  # 1/s, of the final convergence
 _VELOCITY_RATE: Final = 4.0  # 1/s
-# Of the acceleration limit, what braking is planned with; the rest corrects.
+# Share of the acceleration limit with which braking is planned; the rest is for corrections.
 _BRAKING: Final = 0.6
 _CAPTURE: Final = (0.05, 0.2)  # m, m/s
 _RELEASE: Final = (0.5, 1.0)  # m, m/s
@@ -30,7 +30,7 @@ _TURN: Final = 2.0 * math.pi
 
 
 class Limits(NamedTuple):
-    """Bounds on the norm of speed (m/s), acceleration (m/s²) and jerk (m/s³)."""
+    """Limits of the norms of speed (m/s), acceleration (m/s²) and jerk (m/s³)."""
 
     speed: float
     acceleration: float
@@ -38,8 +38,10 @@ class Limits(NamedTuple):
 
 
 class Shaper:
-    """A point mass in one inertial frame: ``position``, ``velocity``, ``acceleration`` (SI) chase a
-    set-point."""
+    """Point mass that approaches a set-point.
+
+    ``position``, ``velocity`` and ``acceleration`` (SI) are in one inertial frame.
+    """
 
     def __init__(self, position: Vector = ZERO) -> None:
         self.restart(position)
@@ -53,11 +55,11 @@ class Shaper:
 
     @property
     def at_rest(self) -> bool:
-        """Whether it has stopped, as far as a controller could tell."""
+        """Whether it has stopped, within tolerances that a controller cannot detect."""
         return math.hypot(*self.velocity) < _AT_REST[0] and math.hypot(*self.acceleration) < _AT_REST[1]
 
     def advance(self, wanted: Setpoint, limits: Limits, dt: float) -> None:
-        """Move by ``dt`` seconds; ``wanted`` is valid at the end of them."""
+        """Advance by ``dt`` seconds; ``wanted`` is valid at their end."""
         if wanted.complete and self._follows(wanted, dt):
             self.position, self.velocity, self.acceleration = (
                 wanted.position,
@@ -68,7 +70,7 @@ class Shaper:
         self._integrate(self._demand(wanted, limits, dt), limits.jerk * dt, dt)
 
     def _follows(self, wanted: Setpoint, dt: float) -> bool:
-        """Whether the set-point may be passed through, with hysteresis between capture and release."""
+        """Return whether the set-point may be passed through, with hysteresis between capture and release."""
         distance, speed = _RELEASE if self.captured else _CAPTURE
         half = 0.5 * dt * dt
         (x, y, z), (vx, vy, vz), (ax, ay, az) = self.position, self.velocity, self.acceleration
@@ -81,17 +83,17 @@ class Shaper:
         return self.captured
 
     def _demand(self, wanted: Setpoint, limits: Limits, dt: float) -> Vector:
-        """The acceleration that brings the point mass onto the set-point, limited in norm."""
+        """Return the acceleration that brings the point mass onto the set-point, limited in norm."""
         lx, ly, lz = wanted.levels
         x, y, z = self.position
         vx, vy, vz = self.velocity
         gx, gy, gz = wanted.position
-        # An axis told its acceleration only keeps the velocity it has: no feedback but the speed limit.
+        # An axis controlled by acceleration alone keeps its velocity: no feedback but the speed limit.
         ux, uy, uz = wanted.velocity
         ux = vx if lx == ACCELERATION else ux
         uy = vy if ly == ACCELERATION else uy
         uz = vz if lz == ACCELERATION else uz
-        # The gap at the beginning of the step, as the point mass is there.
+        # The gap at the beginning of the step, the time of the point mass's state.
         ex = gx - ux * dt - x if lx == POSITION else 0.0
         ey = gy - uy * dt - y if ly == POSITION else 0.0
         ez = gz - uz * dt - z if lz == POSITION else 0.0
@@ -122,7 +124,7 @@ class Shaper:
         )
 
     def _integrate(self, demand: Vector, most: float, dt: float) -> None:
-        """Let the acceleration go to ``demand`` by at most ``most``; constant acceleration over the step."""
+        """Change the acceleration towards ``demand`` by at most ``most``, then integrate it over the step."""
         ax, ay, az = self.acceleration
         dx, dy, dz = _clipped((demand[0] - ax, demand[1] - ay, demand[2] - az), most)
         ax, ay, az = ax + dx, ay + dy, az + dz
@@ -135,7 +137,7 @@ class Shaper:
 
 
 class Heading:
-    """A yaw (rad, clockwise from north) whose rate (rad/s) and angular acceleration (rad/s²) are bounded."""
+    """Yaw (rad, clockwise from north) with bounded rate (rad/s) and angular acceleration (rad/s²)."""
 
     def __init__(self, rate: float, acceleration: float) -> None:
         self._rate, self._acceleration = rate, acceleration
@@ -147,8 +149,10 @@ class Heading:
         self.yaw_rate = 0.0
 
     def advance(self, yaw: float | None, yaw_rate: float | None, dt: float) -> None:
-        """Turn the short way to ``yaw``, which itself turns at ``yaw_rate``; None for both means: stop
-        turning."""
+        """Turn the short way to ``yaw`` (rad), which itself turns at ``yaw_rate`` (rad/s).
+
+        None for both means: stop turning.
+        """
         wanted = yaw_rate or 0.0
         error = 0.0 if yaw is None else math.remainder(yaw - wanted * dt - self.yaw, _TURN)
         if error == 0.0 and wanted == 0.0 and self.yaw_rate == 0.0:
@@ -166,8 +170,10 @@ class Heading:
 
 
 def _approach(distance: float, rate: float, braking: float, speed: float) -> tuple[float, float]:
-    """Approach law s(d): linear near by, √(2 a (d − d₀)) further out, then the speed limit. Returns s/d and
-    s'(d)."""
+    """Return s/d and s'(d) of the approach law s(d).
+
+    The law is linear near zero, √(2 a (d − d₀)) further out, then the speed limit.
+    """
     near = braking / (rate * rate)
     if distance <= near:
         return (rate, rate) if rate * distance <= speed else (speed / distance, 0.0)

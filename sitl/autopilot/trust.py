@@ -1,4 +1,4 @@
-"""Whom the autopilot believes: SETUP_SIGNING (256), and a word to those whose messages do not count."""
+"""Signing of messages: SETUP_SIGNING (256), and warnings to senders whose messages are rejected."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from mavlink_bridge.messages import SetupSigning, Source
 from mavlink_bridge.wire.signing import LATEST, Signing
 from sitl.telemetry.status_text import Voice
 
-# µs between two words about messages that do not count.
+# µs between two warnings about rejected messages.
 _PAUSE: Final = 5_000_000
 
 
 class Trust:
-    """Hands keys to ``signing``. As with the real ones only a message for this vehicle alone counts, and none
-    in flight; and where there is a key already, its owner alone may change it, as all else has to be signed.
+    """Handler that passes keys to ``signing``.
 
-    The key is not kept over a restart: it would lie in clear in a file that is no key file.
+    As on real firmwares, a key message must address this vehicle alone, and none is accepted while armed. If
+    a key is already set, only its owner can change it, because all messages must then be signed. The key is
+    not kept over a restart: it would be stored in clear text in a file that is no key file.
     """
 
     def __init__(
@@ -28,7 +29,7 @@ class Trust:
         armed: Callable[[], bool],
         voice: Voice,
     ) -> None:
-        """Without ``signing`` every message counts, and no key is taken."""
+        """Without ``signing`` every message is accepted, and no key."""
         self._source = source
         self._signing = signing
         self._obeys = setup == "obeyed"
@@ -38,7 +39,7 @@ class Trust:
         self._next = 0
 
     def set_up(self, message: SetupSigning, now: int) -> None:
-        """SETUP_SIGNING (256) that arrived at ``now`` (µs). There is no answer to it but a text."""
+        """Handle SETUP_SIGNING (256) that arrived at ``now`` (µs). The only answer is a text."""
         if message.target_system != self._source.system:
             return
         reason = self._reason(message)
@@ -63,7 +64,7 @@ class Trust:
         return None
 
     def watch(self, now: int) -> None:
-        """Say now and then why messages do not count, or their sender would never know."""
+        """Report at intervals why messages are rejected; their senders get no other indication."""
         signing = self._signing
         if signing is None or signing.latest is None or now < self._next:
             return

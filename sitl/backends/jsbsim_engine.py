@@ -1,6 +1,6 @@
-"""JSBSim itself, with one vehicle in it: motor commands and wind in, what is measured of the motion out.
+"""Engine of the JSBSim backend with one vehicle: it takes motor commands and wind and gives measured motion.
 
-JSBSim is imported when the first engine is made: the extra ``sitl`` brings it, where there is a wheel.
+JSBSim is imported when the first engine is made. It comes with the extra ``sitl``, where a wheel exists.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ MEASURED: Final = (
     *(f"moments/{axis}-total-lbsft" for axis in "lmn"),
     "forces/fbz-gear-lbs",
 )
-"""What is read after each step, before the motors' speeds."""
+"""Properties read after each step, before the motors' speeds."""
 GROUND: Final = len(MEASURED) - 1
-"""Where the push of the ground is: gear/wow does not count points without wheels."""
+"""Index of the ground's force: gear/wow does not count contact points without wheels."""
 
 _AIR: Final = ("north", "east", "down")
 
@@ -54,26 +54,31 @@ _QUIET: Final = "JSBSIM_DEBUG"
 
 
 class Air(NamedTuple):
-    """What of the air is JSBSim's own doing."""
+    """Effects of the air that JSBSim simulates itself."""
 
-    w20: float = 0.0  # m/s, wind at 20 feet behind its turbulence (MIL-F-8785C); 0 for none
-    severity: int = 0  # of its table for more than 1000 feet above the sea: 3 light, 4 moderate, 6 severe
+    w20: float = 0.0  # m/s, wind at 20 feet of its turbulence (MIL-F-8785C); 0 for none
+    severity: int = 0  # for its table above 1000 feet over the sea: 3 light, 4 moderate, 6 severe
     seed: int = 0
-    isa: bool = False  # density falls with height, and thrust and drag with it
+    isa: bool = False  # density, and with it thrust and drag, falls with height
 
 
 STILL: Final = Air()
 
 
 class Engine:
-    """A JSBSim instance. ``measured`` (len(MEASURED) + n,) is what was read after the last step, in JSBSim's
-    feet and pounds, then the motors' speeds (rad/s); ``place`` (12,) is a place row of ``jsbsim_pilot``."""
+    """JSBSim instance.
+
+    ``measured`` (len(MEASURED) + n,) holds the properties after the last step, in JSBSim's feet and pounds,
+    then the motors' speeds (rad/s). ``place`` (12,) is a place row of ``jsbsim_pilot``.
+    """
 
     def __init__(
         self, config: VehicleConfig, place: Place, state: FloatArray, ground: float, air: Air
     ) -> None:
-        """At the motion and the motor speeds of a ``state`` row (as in ``sitl.vehicle.pipeline``; site NED).
-        The ground is level at z = ``ground`` (m) there. Raises BackendError."""
+        """Start with the motion and motor speeds of a ``state`` row of ``sitl.vehicle.pipeline`` (site NED).
+
+        The ground is level at z = ``ground`` (m) there. Raises BackendError.
+        """
         n = len(config.rotors)
         self._name = config.name
         self._fdm = _loaded(config, isa=air.isa)
@@ -92,13 +97,16 @@ class Engine:
         self._begin(place, state, ground, motors)
         self._stir(air)
         self._read()
-        # JSBSim finds a latitude to within 0.1 mm only; what is asked for is where it began.
+        # JSBSim finds a latitude only to within 0.1 mm; the origin is set so that the start is where
+        # requested.
         origin = FOOT * self.measured[0:3] - state[0:3] @ place.axes
         self.place = np.concatenate((origin, place.axes.ravel()))
 
     def step(self, commanded: list[float], wind: list[float]) -> None:
-        """One physics step with the motors held at ``commanded`` (n,) (rad/s), in a wind (m/s, NED) that
-        JSBSim's own turbulence is added to."""
+        """Run one physics step with the motors held at ``commanded`` (n,) (rad/s).
+
+        JSBSim adds its own turbulence to ``wind`` (m/s, NED). Raises BackendError.
+        """
         for node, speed in zip(self._commands, commanded, strict=True):
             node.set_double_value(speed)
         for node, part in zip(self._wind, wind, strict=True):
@@ -108,12 +116,12 @@ class Engine:
         self._read()
 
     def leave(self, rotor: int, left: float) -> None:
-        """From now on a rotor has the part ``left`` (0…1) of its motor's speed."""
+        """Limit a rotor to the fraction ``left`` (0…1) of its motor's speed from now on."""
         self._left[rotor].set_double_value(left)
 
     @property
     def time(self) -> float:
-        """Seconds since the start."""
+        """Simulation time since the start (s)."""
         return float(self._fdm.get_sim_time())
 
     @property
@@ -126,8 +134,8 @@ class Engine:
         self.measured[:] = [node.get_double_value() for node in self._readings]
         standing = bool(self.measured[GROUND] != 0.0)
         if standing is not self._standing:
-            # Friction is worked out as what stops the vehicle in one step of Euler's. Given to a method that
-            # carries accelerations on, the vehicle slides for ever.
+            # JSBSim computes friction as the force that stops the vehicle in one Euler step. With an
+            # integrator that uses earlier accelerations, the vehicle slides for ever.
             for node in self._rates:
                 node.set_double_value(_EULER if standing else _ADAMS_BASHFORTH_3)
             self._standing = standing
@@ -157,7 +165,7 @@ class Engine:
             raise BackendError(f"JSBSim does not take the start of {self._name}: {here}")
 
     def _stir(self, air: Air) -> None:
-        """After the start, which sets the wind back."""
+        """Set the turbulence, after the start, which resets the wind."""
         self._set("simulation/randomseed", float(air.seed))
         self._set("atmosphere/turb-type", _MILSPEC if air.w20 else 0.0)
         self._set("atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps", air.w20 / FOOT)
@@ -167,7 +175,10 @@ class Engine:
         self._node(name).set_double_value(value)
 
     def _node(self, name: str) -> Any:
-        """A property that is there: JSBSim makes a new one of a name that it does not know."""
+        """Return an existing property; raise BackendError if it does not exist.
+
+        JSBSim itself creates a property for an unknown name.
+        """
         node = self._fdm.get_property_manager().get_node(name)
         if node is None:
             raise BackendError(f"this JSBSim has no property {name}; allowed is version 1.2.3 or newer")
@@ -175,14 +186,14 @@ class Engine:
 
 
 def _loaded(config: VehicleConfig, *, isa: bool) -> Any:
-    """A JSBSim with the model of a vehicle, and nothing printed."""
+    """Return a JSBSim with the model of a vehicle, without console output."""
     import jsbsim
 
     with tempfile.TemporaryDirectory(prefix="outrider-jsbsim-") as folder, _silence():
         root = Path(folder)
         for name in ("engine", "systems"):
             (root / name).mkdir()
-        # A name that is a file's whatever the vehicle is called.
+        # A valid file name, whatever the vehicle's name.
         model = root / "aircraft" / "vehicle"
         model.mkdir(parents=True)
         (model / "vehicle.xml").write_text(aircraft(config, isa=isa), encoding="utf-8")
@@ -194,7 +205,7 @@ def _loaded(config: VehicleConfig, *, isa: bool) -> Any:
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """JSBSim reads how much to say from the environment, when it is made."""
+    """Suppress JSBSim's output; JSBSim reads the debug level from the environment when it is created."""
     before = os.environ.get(_QUIET)
     os.environ[_QUIET] = "0"
     try:

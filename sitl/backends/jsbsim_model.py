@@ -1,11 +1,11 @@
-"""A vehicle as a JSBSim model: the aircraft file, written from a ``VehicleConfig``.
+"""Vehicle as a JSBSim model: the aircraft file, generated from a ``VehicleConfig``.
 
-It is whole by itself. What it is given are the properties ``rotor-i/command-rad_sec``, the speeds asked of
-the motors, and ``rotor-i/left``, what each rotor has left of its motor's speed. Motor lag, thrust, torque,
-rotor drag and rolling moment are JSBSim functions, so that they feel JSBSim's own air; the rigid body,
-gravity, the turning Earth and the ground are JSBSim's.
+The file is complete. Its inputs are the properties ``rotor-i/command-rad_sec``, the commanded speeds of the
+motors, and ``rotor-i/left``, the remaining fraction of each rotor's speed. Motor lag, thrust, torque, rotor
+drag and rolling moment are JSBSim functions, so that JSBSim's own air acts on them; the rigid body, gravity,
+the rotating Earth and the ground are JSBSim's.
 
-Functions work in SI and end in pounds and feet, as ``<aerodynamics>`` wants them. Places are in JSBSim's
+Functions work in SI and end in pounds and feet, as ``<aerodynamics>`` requires. Locations are in JSBSim's
 structural frame, x aft, y right, z up, with the centre of mass at its origin.
 """
 
@@ -19,14 +19,14 @@ from sitl.vehicle.config import Rotor, VehicleConfig
 from sitl.vehicle.ground import GRAVITY
 
 FOOT: Final = 0.3048
-"""m."""
+"""One foot (m)."""
 POUND: Final = 0.45359237 * 9.80665
-"""N."""
+"""One pound-force (N)."""
 
 _STIFFEST: Final = 50.0
-"""Most that the landing gear's own frequency is to be (rad/s): a weight that sinks in by 4 mm."""
+"""Upper limit of the landing gear's natural frequency (rad/s): a static deflection of 4 mm."""
 _STIFFEST_PER_STEP: Final = 0.4
-"""Most that it turns in one physics step (rad), which JSBSim's explicit integration can follow."""
+"""Upper limit of its phase per physics step (rad), for JSBSim's explicit integration."""
 _LEGS: Final = 4
 _AT_REST: Final = 1e-3
 _TIP_SHARE: Final = 0.1
@@ -34,24 +34,24 @@ _TIP_SHARE: Final = 0.1
 
 
 def command_property(rotor: int) -> str:
-    """Where the speed asked of a motor goes (rad/s)."""
+    """Return the property of a motor's commanded speed (rad/s)."""
     return f"rotor-{rotor}/command-rad_sec"
 
 
 def motor_property(rotor: int) -> str:
-    """The speed of a motor (rad/s)."""
+    """Return the property of a motor's speed (rad/s)."""
     return f"rotor-{rotor}/motor-rad_sec"
 
 
 def left_property(rotor: int) -> str:
-    """What a rotor has left of its motor's speed (0…1)."""
+    """Return the property of the remaining fraction (0…1) of a rotor's speed."""
     return f"rotor-{rotor}/left"
 
 
 def aircraft(config: VehicleConfig, *, isa: bool = False) -> str:
-    """The text of the aircraft file.
+    """Return the text of the aircraft file.
 
-    With ``isa`` thrust, torque and drag are in proportion to the density of JSBSim's atmosphere, and the
+    With ``isa`` thrust, torque and drag are proportional to the density of JSBSim's atmosphere, and the
     vehicle's numbers are those at sea level; else they hold everywhere, as in our own physics.
     """
     root = Element("fdm_config", name=config.name, version="2.0", release="BETA")
@@ -79,23 +79,22 @@ def _value(parent: Element, tag: str, value: float, unit: str | None = None) -> 
 
 
 def _place(parent: Element, body: tuple[float, float, float], **attributes: str) -> None:
-    """A location (m), given forward-right-down."""
+    """Add a location (m), given forward-right-down."""
     place = SubElement(parent, "location", {"unit": "M", **attributes})
     for axis, part in zip("xyz", (-body[0], body[1], -body[2]), strict=True):
         _value(place, axis, part)
 
 
-# The ground
+# Ground
 
 
 def _ground_reactions(root: Element, config: VehicleConfig) -> None:
-    """Legs that carry the weight with the centre of mass at the height of rest, and rotor tips for who falls
-    over."""
+    """Add legs that carry the weight at the rest height, and rotor tips for a vehicle that falls over."""
     reactions = SubElement(root, "ground_reactions")
     frequency = min(_STIFFEST, _STIFFEST_PER_STEP / (config.physics_period * 1e-6))
     stiffness = config.mass * frequency**2
     damping = 2.0 * config.mass * frequency
-    # Each spring gives way under the weight by as much as its foot stands lower.
+    # Each spring deflects under the weight by as much as its foot is lower.
     foot = config.rest_height + GRAVITY / frequency**2
     for leg in range(_LEGS):
         angle = math.tau * (leg + 0.5) / _LEGS
@@ -122,7 +121,7 @@ def _contact(
     damping: float,
     config: VehicleConfig,
 ) -> None:
-    """A point that touches the ground: stiffness in N/m, damping in N s/m."""
+    """Add a point that touches the ground: stiffness in N/m, damping in N s/m."""
     contact = SubElement(reactions, "contact", type="STRUCTURE", name=name)
     _place(contact, body)
     _value(contact, "static_friction", config.ground_friction)
@@ -136,8 +135,10 @@ def _contact(
 
 
 def _motors(root: Element, config: VehicleConfig) -> None:
-    """First-order lag, solved exactly for a command that is held: ω ← c + e^(−h/τ) (ω − c). A motor that is
-    told to stop ends at zero instead of creeping through denormal numbers."""
+    """Add the motors: first-order lag, solved exactly for a held command, ω ← c + e^(−h/τ) (ω − c).
+
+    A motor commanded to stop ends at zero instead of decaying through denormal numbers.
+    """
     system = SubElement(root, "system", name="motors")
     step = config.physics_period * 1e-6
     rising, falling = (math.exp(-step / tau) for tau in (config.tau_up, config.tau_down))
@@ -155,9 +156,11 @@ def _motors(root: Element, config: VehicleConfig) -> None:
 
 
 def _aerodynamics(root: Element, config: VehicleConfig, *, isa: bool) -> None:
-    """The rotors' wrench, the RotorS model as in ``sitl.vehicle.rotors``: thrust k_f ω² along −b3, torque
-    k_m times it, and −c ω v⊥ for drag and for the rolling moment, v⊥ being the velocity of the hub through
-    the air."""
+    """Add the rotors' wrench, the RotorS model as in ``sitl.vehicle.rotors``.
+
+    Thrust is k_f ω² along −b3, torque is k_m times thrust, and −c ω v⊥ gives drag and rolling moment, where
+    v⊥ is the velocity of the hub through the air.
+    """
     aerodynamics = SubElement(root, "aerodynamics")
     density: tuple[str, ...] = ("atmosphere/sigma",) if isa else ()
     sums: dict[str, list[Element]] = {axis: [] for axis in ("X", "Y", "Z", "ROLL", "PITCH", "YAW")}
@@ -175,7 +178,7 @@ def _aerodynamics(root: Element, config: VehicleConfig, *, isa: bool) -> None:
 def _rotor(
     aerodynamics: Element, index: int, rotor: Rotor, config: VehicleConfig, density: tuple[str, ...]
 ) -> dict[str, list[Element]]:
-    """Define the functions of one rotor; its terms (N, N m) in the sums of the axes."""
+    """Define the functions of one rotor and return its terms (N, N m) in the sums of the axes."""
     x, y, z = rotor.position
     name = f"rotor-{index}"
 
@@ -185,7 +188,7 @@ def _rotor(
 
     speed = define("speed-rad_sec", _of("product", left_property(index), motor_property(index)))
     thrust = define("thrust-N", _of("product", config.k_f, speed, speed, *density))
-    # The air is the same all over the vehicle: JSBSim's turning of it (p-aero-rad_sec) is left out.
+    # The air is uniform over the vehicle: the rotation of JSBSim's air (p-aero-rad_sec) is not used.
     p, q, r = (f"velocities/{rate}-rad_sec" for rate in "pqr")
     hub_x = define("hub-u-m_sec", _hub("u", _of("product", z, q), _of("product", -y, r)))
     hub_y = define("hub-v-m_sec", _hub("v", _of("product", x, r), _of("product", -z, p)))
@@ -215,12 +218,12 @@ def _rotor(
 
 
 def _hub(axis: str, *turning: Element) -> Element:
-    """A component (m/s) of a hub's velocity through the air."""
+    """Return a component (m/s) of a hub's velocity through the air."""
     return _of("sum", _of("product", FOOT, f"velocities/{axis}-aero-fps"), *turning)
 
 
 def _of(operation: str, *arguments: str | float | Element) -> Element:
-    """A JSBSim operation on properties, numbers and other operations."""
+    """Return a JSBSim operation on properties, numbers and other operations."""
     element = Element(operation)
     for argument in arguments:
         if isinstance(argument, str):

@@ -1,4 +1,4 @@
-"""A vehicle that JSBSim moves, with our controller at its motors."""
+"""Vehicle with JSBSim's physics and our controller."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from sitl.vehicle.pipeline import COMMAND_SIZE, LANDED
 class JsbsimVehicle:
     """One vehicle over JSBSim's Earth, as a ``Physics``.
 
-    In each step the controller sees the motion that JSBSim has come to, and JSBSim moves on under its
-    commands: there is no delay between them but the motors' own lag.
+    In each step the controller takes the present motion of JSBSim, and JSBSim advances under its commands:
+    the only delay between them is the motors' own lag.
     """
 
     def __init__(
@@ -40,8 +40,10 @@ class JsbsimVehicle:
         gravity: float = GRAVITY,
         air: Air = STILL,
     ) -> None:
-        """At a ``state`` row, as ``vehicle.initial_states`` makes it, over a ``ground`` at that z (m, NED).
-        ``gravity`` (m/s²) is what the controller reckons with; JSBSim has its own. Raises BackendError."""
+        """Start at a ``state`` row, as made by ``vehicle.initial_states``, over ``ground`` (z, m, NED).
+
+        ``gravity`` (m/s²) is the controller's value; JSBSim has its own. Raises BackendError.
+        """
         self.config = config
         self._airframe = airframe_record(airframe(config, gravity))
         self._state = state.copy()
@@ -58,8 +60,11 @@ class JsbsimVehicle:
         *,
         idle: bool = False,
     ) -> FloatArray:
-        """As ``Physics`` says. JSBSim takes the wind as of the NED of where the vehicle is, which 1 km from
-        the site's origin is tilted by 0.16 mrad."""
+        """Advance as defined by ``Physics``.
+
+        JSBSim takes the wind in the NED of the vehicle's place, which 1 km from the site's origin is tilted
+        by 0.16 mrad.
+        """
         command, state, engine = self._command, self._state, self._engine
         write_command(command, reference, idle, wind, self._ground)
         if not np.all(np.isfinite(command)):
@@ -79,19 +84,19 @@ class JsbsimVehicle:
         return track
 
     def fail_rotor(self, index: int, left: float) -> None:
-        """As ``Physics`` says."""
+        """Fail a rotor as defined by ``Physics``."""
         checked_rotor(self.config, index, left)
         self._state[-len(self.config.rotors) + index] = left
         self._engine.leave(index, left)
 
     @property
     def measured(self) -> FloatArray:
-        """What JSBSim said after the last step, a row of ``jsbsim_engine``; an own copy."""
+        """Copy of JSBSim's measurements after the last step, a row of ``jsbsim_engine``."""
         return self._engine.measured.copy()
 
     @property
     def state(self) -> VehicleState:
-        """The true state after the last step."""
+        """True state after the last step."""
         return state_of(self._state)
 
     @property

@@ -1,4 +1,4 @@
-"""What an autopilot needs of a vehicle in its air, whoever works out how it moves."""
+"""Interface of the physics of a vehicle in its air, as required by an autopilot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PhysicsName = Literal["own", "jsbsim"]
 
 
 class BackendError(RuntimeError):
-    """A physics engine that cannot be used, or has failed in flight."""
+    """Failure of a physics engine, in flight or before it can be used."""
 
 
 class Physics(Protocol):
@@ -23,25 +23,27 @@ class Physics(Protocol):
 
     @property
     def config(self) -> VehicleConfig:
-        """What the vehicle is made of."""
+        """Configuration of the vehicle."""
 
     def advance(
         self, steps: int, reference: Reference | None, wind: ArrayLike = ..., *, idle: bool = False
     ) -> FloatArray:
-        """Advance by ``steps`` physics steps; the true positions (steps, 3) (m, NED) after each of them.
+        """Advance by ``steps`` physics steps; return the true positions (steps, 3) (m, NED) after each.
 
-        The reference holds for the beginning of the first step. None stops the motors, or with ``idle``
-        leaves them turning slowly. ``wind`` (3,) is the velocity of the air (m/s, NED). Raises
-        NotFiniteError for what is not finite, having moved nothing, and BackendError.
+        The reference is valid at the beginning of the first step. None stops the motors, or with ``idle``
+        lets them turn slowly. ``wind`` (3,) is the velocity of the air (m/s, NED). Raises NotFiniteError for
+        inputs that are not finite, before anything has moved, and BackendError.
         """
 
     def fail_rotor(self, index: int, left: float) -> None:
-        """From now on the rotor ``index`` (0…n−1) turns at the part ``left`` (0…1) of its motor's speed;
-        nothing tells the controller. Raises IndexError and ValueError."""
+        """Limit the rotor ``index`` (0…n−1) to the fraction ``left`` (0…1) of its motor's speed from now on.
+
+        The controller receives no indication. Raises IndexError and ValueError.
+        """
 
     @property
     def state(self) -> VehicleState:
-        """The true state after the last step; own copies."""
+        """True state after the last step; own copies."""
 
     @property
     def on_ground(self) -> bool:

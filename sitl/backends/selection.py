@@ -1,4 +1,4 @@
-"""Makes the physics of a vehicle that its configuration asks for."""
+"""Selection of a vehicle's physics backend by its configuration."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from sitl.vehicle.multirotor import Vehicle, initial_states
 
 _STREAM: Final = 0x4A
 _CURVES: Final[dict[Severity, int]] = {"light": 3, "moderate": 4, "severe": 6}
-"""Curves of figure 7 of MIL-F-8785C, which JSBSim takes above 1000 feet."""
+"""Curves of figure 7 of MIL-F-8785C, which JSBSim uses above 1000 feet."""
 
 
 class Start(NamedTuple):
-    """Where and how a vehicle begins."""
+    """Initial place and state of a vehicle."""
 
     position: FloatArray  # (3,) m, site NED
     yaw: float  # rad, site NED
@@ -37,9 +37,9 @@ def physics(
     seed: int,
     system_id: int,
 ) -> Physics:
-    """The vehicle in ``site``; ``seed`` (≥ 0) and ``system_id`` make JSBSim's turbulence.
+    """Return the vehicle in ``site``; ``seed`` (≥ 0) and ``system_id`` seed JSBSim's turbulence.
 
-    Raises ValueError for a place to hover that is on the ground or a weather that this physics cannot make,
+    Raises ValueError for a hover position on the ground or weather that this physics does not support,
     ModuleNotFoundError without JSBSim, and BackendError.
     """
     if name == "own":
@@ -58,7 +58,7 @@ def physics(
 
 
 def severity(w20: float) -> int:
-    """The curve of the severity whose wind at 20 feet is nearest to ``w20`` (m/s); 0 for none."""
+    """Return the curve of the severity whose wind at 20 feet is nearest to ``w20`` (m/s); 0 for none."""
     if w20 == 0.0:
         return 0
     return min((abs(W20[name] - w20), curve) for name, curve in _CURVES.items())[1]

@@ -1,4 +1,4 @@
-"""The settings of what a vehicle does by itself: when its battery is low, at its fence, behind a leader."""
+"""Settings of autonomous behaviour: battery failsafe, fence, following a leader."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 
 class BatteryFailsafeConfig(BaseModel):
-    """When a battery is low, and what follows. PX4 goes by the share that is left, ArduPilot by voltage."""
+    """Battery failsafe: thresholds and actions. PX4 uses the remaining charge, ArduPilot the voltage."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -23,7 +23,7 @@ class BatteryFailsafeConfig(BaseModel):
 
 
 class FenceConfig(BaseModel):
-    """What counts as a breach beside the uploaded areas, and what follows. None: as the firmware has it."""
+    """Fence: conditions of a breach beside uploaded areas, and the action. None: the firmware's default."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -41,7 +41,10 @@ class FenceConfig(BaseModel):
 
 
 class FollowConfig(BaseModel):
-    """Whom to follow, and from where. ArduPilot's ``FOLL_`` and PX4's ``FLW_TGT_`` parameters."""
+    """Leader to follow, and the station relative to it.
+
+    The settings are ArduPilot's ``FOLL_`` and PX4's ``FLW_TGT_`` parameters.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

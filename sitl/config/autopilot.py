@@ -1,4 +1,4 @@
-"""The settings of one emulated autopilot: who it is, where it starts, what it streams, how it flies alone."""
+"""Settings of one emulated autopilot: identity, starting place, telemetry rates, autonomous behaviour."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ Seconds = Annotated[float, Field(ge=0.0, le=3600.0)]
 
 
 class TelemetryRates(BaseModel):
-    """Messages per second that flow from the start, 0 for none; SET_MESSAGE_INTERVAL (511) changes them.
+    """Messages per second sent from the start, 0 for none; SET_MESSAGE_INTERVAL (511) changes them.
 
-    Real ArduCopter streams only HEARTBEAT and STATUSTEXT until asked. Here all that a companion needs flows.
+    A real ArduCopter streams only HEARTBEAT and STATUSTEXT until requested. By default these rates provide
+    all that a companion needs.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -136,7 +137,7 @@ class AutopilotConfig(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _as_the_firmware(cls, data: Any) -> Any:
-        """WPNAV_SPEED and MPC_XY_CRUISE differ by the firmware, and so does the speed that is not given."""
+        """Set ArduPilot's default speed if none is given: WPNAV_SPEED and MPC_XY_CRUISE differ."""
         if isinstance(data, dict) and data.get("flavour", "ardupilot") == "ardupilot":
             return {"waypoint_speed": 10.0, **data}
         return data

@@ -15,7 +15,7 @@ Tilt = Annotated[float, Field(gt=0.0, le=math.radians(89.5), allow_inf_nan=False
 
 
 class ArduPilotGains(BaseModel):
-    """What ArduCopter's GUIDED mode flies set-points with."""
+    """Position controller of ArduCopter's GUIDED mode."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -34,8 +34,10 @@ class ArduPilotGains(BaseModel):
 
 
 class Speeds(NamedTuple):
-    """Of ArduCopter's corrections (m/s): the same parameters as those of its missions, WPNAV_SPEED, _UP and
-    _DN."""
+    """Speed limits of ArduCopter's corrections (m/s).
+
+    They are the parameters of its missions: WPNAV_SPEED, WPNAV_SPEED_UP and WPNAV_SPEED_DN.
+    """
 
     level: float = 10.0
     up: float = 2.5
@@ -43,7 +45,7 @@ class Speeds(NamedTuple):
 
 
 class Px4Gains(BaseModel):
-    """What PX4's OFFBOARD mode flies set-points with."""
+    """Position controller of PX4's OFFBOARD mode."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

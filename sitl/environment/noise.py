@@ -1,9 +1,8 @@
-"""Random processes on a fixed time grid, discretised exactly: whatever the step, variance and correlation are
-those of the continuous process.
+"""Random processes on a fixed time grid, discretised exactly.
 
-Every state has variance one, so that whoever uses a process gives it its size, and may let time constants
-change while it runs without making it stronger or weaker. Such a step is z ← F z + G w with w white of
-variance one and G Gᵀ = I − F Fᵀ.
+Variance and correlation are those of the continuous process, whatever the step. Every state has variance one,
+so that the caller scales it, and time constants may change during a run without a change of strength. Such a
+step is z ← F z + G w with w white of variance one and G Gᵀ = I − F Fᵀ.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ class OnePole(NamedTuple):
 class TwoPoles(NamedTuple):
     """One step of z = (x, ẋ/ω) with the poles −a and −b, ω² = ab; x and ẋ are uncorrelated, and ẋ exists.
 
-    The elements of F and of the lower triangle G.
+    The fields are the elements of F and of the lower triangle G.
     """
 
     f11: float
@@ -34,7 +33,7 @@ class TwoPoles(NamedTuple):
     g22: float
 
     def step(self, x: float, rate: float, first: float, second: float) -> tuple[float, float]:
-        """The next (x, ẋ/ω), with two independent draws of variance one."""
+        """Return the next (x, ẋ/ω), with two independent draws of variance one."""
         return (
             self.f11 * x + self.f12 * rate + self.g11 * first,
             self.f21 * x + self.f22 * rate + self.g21 * first + self.g22 * second,
@@ -42,21 +41,23 @@ class TwoPoles(NamedTuple):
 
 
 def one_pole(share: float) -> OnePole:
-    """The step of a process whose time constant is 1/``share`` steps."""
+    """Return the step of a process whose time constant is 1/``share`` steps."""
     return OnePole(math.exp(-share), math.sqrt(-math.expm1(-2.0 * share)))
 
 
 def two_poles(first: float, second: float) -> TwoPoles:
-    """The step of a process with the poles ``first`` and ``second`` over the step (a·dt and b·dt, > 0; equal
-    is allowed)."""
+    """Return the step of a process with the poles ``first`` and ``second`` over the step.
+
+    They are a·dt and b·dt, > 0; equal poles are allowed.
+    """
     apart = second - first
     decayed = math.exp(-first)
-    # (e^(−first) − e^(−second)) / (second − first), also where both are (nearly) the same.
+    # (e^(−first) − e^(−second)) / (second − first), also for (nearly) equal poles.
     slope = decayed * (-math.expm1(-apart) / apart if apart else 1.0)
     omega = math.sqrt(first * second)
     f11, f12 = decayed + first * slope, omega * slope
     f21, f22 = -f12, decayed - second * slope
-    # Rounding may leave a tiny negative variance where hardly anything changes in a step.
+    # Rounding may leave a tiny negative variance if the state hardly changes in a step.
     g11 = math.sqrt(max(0.0, 1.0 - f11 * f11 - f12 * f12))
     g21 = -(f11 * f21 + f12 * f22) / g11 if g11 else 0.0
     g22 = math.sqrt(max(0.0, 1.0 - f21 * f21 - f22 * f22 - g21 * g21))

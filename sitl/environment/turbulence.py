@@ -1,4 +1,4 @@
-"""Dryden turbulence at low altitude, as MIL-F-8785C has it (3.7.1.2 the Dryden form, 3.7.3 its scales).
+"""Dryden turbulence at low altitude, after MIL-F-8785C (3.7.1.2 the Dryden form, 3.7.3 its scales).
 
     Φ_u(Ω) = σ_u² 2L_u/π · 1/(1 + (L_u Ω)²)
     Φ_v(Ω) = σ_v² L_v/π · (1 + 3(L_v Ω)²)/(1 + (L_v Ω)²)²         w likewise, with L_w and σ_w
@@ -6,8 +6,8 @@
     L_w = h, L_u = L_v = h/(0.177 + 0.000823 h)^1.2               h in feet, from 10 to 1000
     σ_w = 0.1 W20, σ_u = σ_v = σ_w/(0.177 + 0.000823 h)^0.4       W20: wind at 20 feet
 
-The field is frozen and passes by with the speed of the vehicle through the air (Taylor), or with W20 where
-that is more: what makes this turbulence is a wind of W20, and a hovering vehicle feels it too.
+The field is frozen and passes the vehicle with the vehicle's airspeed (Taylor), or with W20 if that is
+greater: the cause of this turbulence is a wind of W20, which also acts on a hovering vehicle.
 """
 
 from __future__ import annotations
@@ -26,19 +26,18 @@ W20: Final[dict[Severity, float]] = {"none": 0.0, "light": 7.717, "moderate": 15
 """Wind at 20 feet (m/s): 15, 30 and 45 knots."""
 
 PERIOD: Final = 10_000
-"""µs between samples."""
+"""Time between samples (µs)."""
 
 _DT: Final = PERIOD * 1e-6
 _FOOT: Final = 0.3048
 _LOWEST, _HIGHEST = 10.0, 1000.0  # feet
 _BLOCK: Final = 100
-# The numerator 1 + √3 L/V s makes of a state of variance one an output of variance 4.
+# The numerator 1 + √3 L/V s turns a state of variance one into an output of variance 4.
 _ROOT: Final = math.sqrt(3.0)
 
 
 class Scales(NamedTuple):
-    """Lengths (m) and standard deviations (m/s) along and across the wind (``horizontal``) and of the
-    vertical component."""
+    """Lengths (m) and standard deviations (m/s) along and across the wind (``horizontal``), and vertical."""
 
     horizontal_length: float
     vertical_length: float
@@ -47,7 +46,7 @@ class Scales(NamedTuple):
 
 
 def scales(height: float, w20: float) -> Scales:
-    """Those ``height`` (m) above the ground, for a wind ``w20`` (m/s) at 20 feet; MIL-F-8785C 3.7.3."""
+    """Return the scales at ``height`` (m above the ground) for ``w20`` (m/s); MIL-F-8785C 3.7.3."""
     feet = min(max(height / _FOOT, _LOWEST), _HIGHEST)
     base = 0.177 + 0.000823 * feet
     vertical = 0.1 * w20
@@ -55,15 +54,14 @@ def scales(height: float, w20: float) -> Scales:
 
 
 class Turbulence:
-    """Gusts (m/s) along the wind, across it to the right, and down: ``components``, which change every
-    ``PERIOD``.
+    """Gusts along the wind, across it to the right, and down: ``components`` (m/s).
 
-    The filters' states have variance one, so that what comes out has the variance of where it is, however
-    height and speed change on the way.
+    They change every ``PERIOD``. The filters' states have variance one, so that the output has the variance
+    of the present place, however height and speed change on the way.
     """
 
     def __init__(self, w20: float, random: np.random.Generator) -> None:
-        """In its steady state at time 0."""
+        """Start in the steady state at time 0."""
         self._w20 = w20
         self._random = random
         self._along, v0, v1, w0, w1 = random.standard_normal(5).tolist()
@@ -73,8 +71,7 @@ class Turbulence:
         self.components: Vector = self._output(scales(0.0, w20))
 
     def advance(self, now: int, height: float, airspeed: float) -> None:
-        """Go on to ``now`` (µs, not decreasing), ``height`` m above ground, passed by with ``airspeed``
-        (m/s)."""
+        """Advance to ``now`` (µs, not decreasing), at ``height`` m above ground and ``airspeed`` (m/s)."""
         samples = now // PERIOD - self._sample
         if samples <= 0:
             return

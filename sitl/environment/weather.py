@@ -1,7 +1,7 @@
-"""The air that a vehicle flies in: a mean wind, single gusts, turbulence.
+"""Air around a vehicle: a mean wind, single gusts, turbulence.
 
-All of it is the velocity of the air, where it goes. The configuration speaks fleet-local ENU as scenarios do;
-what comes out is NED in the site's frame as the physics wants it.
+All values are the velocity of the air, in the direction of its motion. The configuration uses fleet-local
+ENU, as scenarios do; the result is NED in the site's frame, as the physics requires.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Gust(BaseModel):
     velocity: EnuVelocity = Field(description="at its peak, in the middle, on top of the wind (m/s, ENU)")
 
     def share(self, time: float) -> float:
-        """Part of its velocity, ``time`` seconds after the goal event."""
+        """Return the fraction of its velocity, ``time`` seconds after the goal event."""
         since = time - self.at_s
         if not 0.0 < since < self.length_s:
             return 0.0
@@ -40,7 +40,7 @@ class Gust(BaseModel):
 
 
 class WeatherConfig(BaseModel):
-    """What the air does; as it stands, nothing."""
+    """Wind, gusts, turbulence and density of the air; by default the air is still."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -65,14 +65,14 @@ class WeatherConfig(BaseModel):
 
     @property
     def needs_jsbsim(self) -> str:
-        """The setting that only JSBSim can make; empty if there is none."""
+        """First setting that only JSBSim supports; empty if there is none."""
         if self.turbulence_by == "jsbsim":
             return "turbulence_by: jsbsim"
         return "atmosphere: isa" if self.atmosphere == "isa" else ""
 
     @property
     def w20(self) -> float:
-        """The wind at 20 feet (m/s) that makes the turbulence; 0 for none."""
+        """Wind at 20 feet (m/s) that causes the turbulence; 0 for none."""
         return W20[self.turbulence] if isinstance(self.turbulence, str) else self.turbulence
 
     @property
@@ -82,17 +82,19 @@ class WeatherConfig(BaseModel):
 
 
 class Weather:
-    """The air around one vehicle, but for turbulence that JSBSim makes. ``still``: there is never any wind;
-    ``turbulent``: it depends on where the vehicle is."""
+    """Air around one vehicle, without the turbulence of JSBSim.
+
+    ``still``: there is never any wind; ``turbulent``: the wind depends on the vehicle's place.
+    """
 
     def __init__(self, config: WeatherConfig, seed: int, system_id: int) -> None:
-        """``seed`` (≥ 0) and ``system_id`` make the turbulence, which is a different one for each vehicle."""
+        """``seed`` (≥ 0) and ``system_id`` seed the turbulence, which differs between vehicles."""
         east, north, up = config.wind
         self._mean = (north, east, -up)
         self._gusts = config.gusts
         self._begun: int | None = None
         level = math.hypot(north, east)
-        # Along the wind; where there is none, north is as good as any.
+        # Direction along the wind; without wind, north is as good as any.
         self._ahead = (north / level, east / level) if level else (1.0, 0.0)
         self._turbulence = (
             Turbulence(config.w20, np.random.default_rng([seed, system_id, _STREAM]))
@@ -103,12 +105,15 @@ class Weather:
         self.turbulent = self._turbulence is not None
 
     def begin(self, now: int) -> None:
-        """The goal event (µs): gusts count from here."""
+        """Mark the goal event at ``now`` (µs); gusts are timed from it."""
         self._begun = now
 
     def wind(self, now: int, height: float = 0.0, velocity: Vector = ZERO) -> Vector:
-        """Velocity of the air (m/s, site NED) at ``now`` (µs, not decreasing) around a vehicle ``height`` m
-        above the ground that moves with ``velocity`` (m/s, site NED); both matter to turbulence only."""
+        """Return the velocity of the air (m/s, site NED) at ``now`` (µs, not decreasing).
+
+        ``height`` (m above the ground) and ``velocity`` (m/s, site NED) are those of the vehicle; they affect
+        only turbulence.
+        """
         north, east, down = self._mean
         if self._turbulence is not None:
             u, v, w = velocity

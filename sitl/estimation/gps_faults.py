@@ -1,13 +1,13 @@
-"""What the loss of GPS and a jump of GPS do to an estimate, as ArduPilot's EKF3 and PX4's EKF2 do it.
+"""Effects of a loss and of a jump of GPS on an estimate, as in ArduPilot's EKF3 and PX4's EKF2.
 
 *Loss*: the filter coasts on its accelerometers, and its horizontal error grows with the square of time; the
-barometer keeps the height. Nothing is said about it for as long as the filter trusts itself (EKF3: 7 s
-without position, posRetryTimeNoVel; EKF2: EKF2_NOAID_TOUT 5 s); then it has no position any more. When GPS
-comes back in time the error is filtered away; later the filter resets to it in one jump.
+barometer keeps the height. The filter reports nothing while it trusts itself (EKF3: 7 s without position,
+posRetryTimeNoVel; EKF2: EKF2_NOAID_TOUT 5 s); then it has no position any more. If GPS returns before that,
+the error is filtered away; later the filter resets to GPS in one jump.
 
-*Jump*: within the gate it is followed at the filter's own pace. Beyond, GPS is refused, until the filter
-gives in and resets to it after 7 s (both filters), with a jump of the estimate. Its velocity is not shifted,
-so the estimated velocity is not either.
+*Jump*: within the gate the filter follows it at its own pace. Beyond the gate the filter rejects GPS, and
+resets to it after 7 s (both filters), with a jump of the estimate. The velocity of GPS is not shifted, so the
+estimated velocity is not either.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ import numpy as np
 from mavlink_bridge.messages import Vector
 from sitl.values.setpoints import ZERO
 
-# σ of the acceleration that is wrong while coasting (m/s²): bias and tilt that the filter has not found.
+# σ of the acceleration error while coasting (m/s²): residual bias and tilt of the filter.
 _COASTING: Final = 0.05
-# How fast a filter follows GPS (s).
+# Time constant with which a filter follows GPS (s).
 _PACE: Final = 1.0
 # Innovation gate: 5 σ (EKF2_GPS_P_GATE) of 0.5 m GPS and as much of the filter's own (m).
 _GATE: Final = 3.5
-# s; EKF3's posRetryTimeNoVel and EKF2's reset_timeout_max are the same.
+# Time after which a filter resets to rejected GPS (s); EKF3's posRetryTimeNoVel and EKF2's reset_timeout_max
+# are the same.
 _GIVES_IN: Final = 7.0
-# What is left of an error when it is over (m, m/s).
+# Error below which a fault counts as over (m, m/s).
 _NOTHING: Final = 1e-4
 
 
 class Positioning:
-    """The part of an estimate's error that GPS is to blame for, moved on in steps of ``dt`` seconds.
+    """Part of an estimate's error that GPS causes, advanced in steps of ``dt`` seconds.
 
-    ``position`` and ``velocity`` (m, m/s, local NED) are that error; ``located``: whether the filter says
-    that it has a position; ``fixed``: whether there is GPS; ``resets`` counts the jumps of the estimate;
-    ``nominal``: all of this is as if nothing had ever happened, until something does. ``strain``: innovation
-    of a position over its gate; from 1 on GPS is refused. ``spread``: σ (m) of what coasting has added so
-    far, as the filter itself sees it.
+    ``position`` and ``velocity`` (m, m/s, local NED) are that error; ``located``: whether the filter reports
+    a position; ``fixed``: whether there is GPS; ``resets`` counts the jumps of the estimate; ``nominal``: no
+    fault has any effect now. ``strain``: innovation of a position over its gate; from 1 on GPS is rejected.
+    ``spread``: σ (m) that coasting has added so far, as estimated by the filter.
     """
 
     def __init__(self, patience: float, dt: float, random: np.random.Generator) -> None:
@@ -60,37 +60,41 @@ class Positioning:
 
     @property
     def position(self) -> Vector:
+        """Error of the position (m, local NED)."""
         x, y, z = self._offset
         return x + self._drift[0], y + self._drift[1], z
 
     @property
     def velocity(self) -> Vector:
+        """Error of the velocity (m/s, local NED)."""
         return self._speed[0], self._speed[1], 0.0
 
     @property
     def strain(self) -> float:
+        """Innovation of a position over its gate; from 1 on GPS is rejected."""
         return 0.0 if self.nominal or self._goes else self._gap / _GATE
 
     @property
     def spread(self) -> float:
+        """σ (m) that coasting has added so far, as estimated by the filter."""
         return 0.0 if self.fixed else 0.5 * _COASTING * self._coasted**2
 
-    # What happens to GPS, from the next step on
+    # Faults of GPS, effective from the next step on
 
     def lose(self) -> None:
-        """No more GPS."""
+        """Stop GPS."""
         self._goes, self.nominal = True, False
 
     def regain(self) -> None:
-        """GPS again."""
+        """Restore GPS."""
         self._goes = False
 
     def shift(self, offset: Vector) -> None:
-        """GPS is off by ``offset`` (m, local NED) in all; zero ends it."""
+        """Set the total GPS error to ``offset`` (m, local NED); zero ends it."""
         self._target, self.nominal = offset, False
 
     def step(self) -> None:
-        """Move on by one step of time."""
+        """Advance by one step of ``dt``."""
         if self.nominal:
             return
         if self._goes:
@@ -115,7 +119,7 @@ class Positioning:
         self.located = self._coasted < self._patience
 
     def _return(self) -> None:
-        """Let what coasting left fade, or vanish with a reset."""
+        """Reduce the error left by coasting, or remove it with a reset."""
         self.fixed = True
         if not self.located:
             self.located = True
@@ -130,7 +134,7 @@ class Positioning:
             self._drift = self._speed = (0.0, 0.0)
 
     def _follow(self) -> None:
-        """Go after GPS, or refuse to."""
+        """Follow GPS, or reject it."""
         (gx, gy, gz), (x, y, z) = self._target, self._offset
         self._gap = gap = math.hypot(gx - x, gy - y, gz - z)
         if gap > _GATE:

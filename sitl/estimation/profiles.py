@@ -1,9 +1,10 @@
-"""How wrong an autopilot's estimate is: the sensor profiles, as one table.
+"""Sensor profiles: the errors of an autopilot's estimate, as one table.
 
-The numbers describe the *output* of the estimator, not its sensors: what ATTITUDE and LOCAL_POSITION_NED say.
-σ is a standard deviation, τ a correlation time. Sources: the project's measured figures for an EKF-like
-output (position σ 0.3–0.5 m with τ 30–60 s and 0.02 m white, velocity 0.05–0.1 m/s, roll and pitch 0.5°, yaw
-1–2°, rates 0.01–0.02 rad/s); RTK σ 0.02 m by definition of the profile; the rest as the descriptions say.
+The numbers describe the *output* of the estimator, not its sensors: the values of ATTITUDE and
+LOCAL_POSITION_NED. σ is a standard deviation, τ a correlation time. Sources: the project's measured figures
+for an EKF-like output (position σ 0.3–0.5 m with τ 30–60 s and 0.02 m white, velocity 0.05–0.1 m/s, roll and
+pitch 0.5°, yaw 1–2°, rates 0.01–0.02 rad/s); RTK σ 0.02 m by definition of the profile; the rest as the
+descriptions say.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class SensorProfile(BaseModel):
 
     @property
     def exact(self) -> bool:
-        """Whether nothing about the motion is wrong or late."""
+        """Whether the motion is estimated without error or delay."""
         errors = (
             self.horizontal_drift,
             self.vertical_drift,
@@ -76,12 +77,12 @@ class SensorProfile(BaseModel):
 
     @property
     def worst_axis(self) -> float:
-        """σ of the error of a position on the axis where it is largest (m)."""
+        """Largest σ of a position error along one axis (m)."""
         return math.hypot(max(self.horizontal_drift, self.vertical_drift), self.position_white)
 
     @property
     def deviation(self) -> float:
-        """σ of the error of a position as a distance (m): of all three axes together."""
+        """σ of a position error as a distance (m): all three axes together."""
         white = 3.0 * self.position_white**2
         return math.sqrt(2.0 * self.horizontal_drift**2 + self.vertical_drift**2 + white)
 
@@ -116,8 +117,8 @@ PROFILES: Final[dict[ProfileName, SensorProfile]] = {
         delay=10_000,
         gaps_per_minute=3.0,
     ),
-    # PX4 1.16.1's EKF2 in its simulation SIH, as recorded flights of ten vehicles say: its position wanders
-    # by 0.4 m, at 0.23 m/s, within seconds; the velocity is all but true.
+    # PX4 1.16.1's EKF2 in its simulation SIH, after recorded flights of ten vehicles: its position wanders by
+    # 0.4 m, at 0.23 m/s, within seconds; the velocity is nearly true.
     "sih": SensorProfile(
         horizontal_drift=0.4,
         vertical_drift=0.3,
@@ -133,4 +134,8 @@ PROFILES: Final[dict[ProfileName, SensorProfile]] = {
         delay=10_000,
     ),
 }
-"""velocity: with the drift's own σ/√(τ·onset), 0.004 (rtk) and 0.042 m/s (gnss), it makes 0.02 and 0.058."""
+"""Sensor profiles by name.
+
+Total velocity error: with the drift's own σ/√(τ·onset), 0.004 (rtk) and 0.042 m/s (gnss), ``velocity`` makes
+0.02 and 0.058 m/s.
+"""

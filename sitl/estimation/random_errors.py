@@ -1,7 +1,8 @@
-"""The random errors of an estimate, sample by sample on the estimator's own clock of 100 Hz.
+"""Random errors of an estimate, per sample of the estimator's clock of 100 Hz.
 
-Position wanders as a two-pole Gauss–Markov process, so that the wandering has a speed, and the velocity
-carries that same speed: the two do not contradict each other. What is asked does not move anything on.
+The position wanders as a two-pole Gauss–Markov process, so that the wandering has a speed, and the velocity
+error contains that speed unless the profile excludes it: the two are then consistent. Reading the errors does
+not advance them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from sitl.estimation.profiles import SensorProfile
 from sitl.values.setpoints import ZERO
 
 PERIOD: Final = 10_000
-"""µs between samples: both filters run at 100 Hz."""
+"""Time between samples (µs): both filters run at 100 Hz."""
 
 _DT: Final = PERIOD * 1e-6
 _BLOCK: Final = 100
@@ -28,8 +29,11 @@ Array = npt.NDArray[np.float64]
 
 
 class Errors(NamedTuple):
-    """Estimate minus truth: position (m) and velocity (m/s) in local NED, roll, pitch and yaw (rad), body
-    rates (rad/s, FRD). ``drift``: how fast (m/s) the position wanders that the velocity does not tell."""
+    """Estimate minus truth.
+
+    Position (m) and velocity (m/s) in local NED, roll, pitch and yaw (rad), body rates (rad/s, FRD).
+    ``drift``: speed (m/s) of the position's wandering that the velocity does not contain.
+    """
 
     position: Vector
     velocity: Vector
@@ -41,10 +45,10 @@ class Errors(NamedTuple):
 
 
 class Wandering:
-    """The errors of one profile from one generator; ``advance`` to a sample, then read ``errors``."""
+    """Errors of one profile from one generator; ``advance`` to a sample, then read ``errors``."""
 
     def __init__(self, profile: SensorProfile, random: np.random.Generator) -> None:
-        """In its steady state from the first sample on."""
+        """Start in the steady state at the first sample."""
         p = profile
         poles = two_poles(_DT / p.drift_time, _DT / p.drift_onset)
         self._turn = np.array([[poles.f11, poles.f12], [poles.f21, poles.f22]])
@@ -68,7 +72,7 @@ class Wandering:
         self._sample = 0
 
     def advance(self, sample: int) -> None:
-        """Go to a sample; back is not possible."""
+        """Advance to ``sample``; going back is not possible."""
         while sample - self._first >= _BLOCK:
             self._first += _BLOCK
             self._rows = self._block()
@@ -76,12 +80,12 @@ class Wandering:
 
     @property
     def errors(self) -> Errors:
-        """Those of the present sample."""
+        """Errors of the present sample."""
         x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, *drift = self._rows[self._sample].tolist()
         return Errors((x, y, z), (vx, vy, vz), roll, pitch, yaw, (p, q, r), (drift[0], drift[1], drift[2]))
 
     def _block(self) -> Array:
-        """The next rows (_BLOCK, 15) of errors."""
+        """Return the next rows (_BLOCK, 15) of errors."""
         draws = self._random.standard_normal((_BLOCK, _DRAWS))
         kicks = self._kick @ draws[:, :6].reshape(_BLOCK, 2, 3)
         nudges = self._gain * draws[:, 6 : 6 + _ONE_POLES]

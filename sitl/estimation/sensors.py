@@ -1,8 +1,9 @@
-"""What an autopilot believes about its own motion: the output of an estimator such as EKF3 or EKF2.
+"""State estimation: the output of an estimator such as EKF3 or EKF2.
 
-Position, velocity, attitude and body rates are those of some milliseconds ago and wrong as the profile says,
-plus what GPS does to them. Nothing moves on by being asked: ``advance`` is called on the physics' own grid,
-and the errors change on a fixed grid of 100 Hz. The profile ``truth`` believes what is so, and costs nothing.
+Position, velocity, attitude and body rates are delayed by some milliseconds and have the errors of the
+profile and of GPS faults. Reading the estimate advances nothing: ``advance`` is called on the physics' own
+grid, and the errors change on a fixed grid of 100 Hz. The profile ``truth`` returns the true state at no
+cost.
 """
 
 from __future__ import annotations
@@ -27,8 +28,11 @@ _FLAWLESS: Final = Errors(ZERO, ZERO, 0.0, 0.0, 0.0, ZERO)
 
 
 class Estimate(NamedTuple):
-    """Position (m) and velocity (m/s) in the own local NED; Euler angles (rad) of the FRD body against it;
-    body rates (rad/s, FRD)."""
+    """Estimated motion.
+
+    Position (m) and velocity (m/s) in the own local NED; Euler angles (rad) of the FRD body relative to it;
+    body rates (rad/s, FRD).
+    """
 
     position: Vector
     velocity: Vector
@@ -39,13 +43,15 @@ class Estimate(NamedTuple):
 
     @property
     def pose(self) -> Pose:
-        """Where it is and where it looks."""
+        """Position and yaw."""
         return Pose(self.position, self.yaw)
 
 
 class Deviation(NamedTuple):
-    """Estimate minus truth in the site's NED: position (3,) m, velocity (3,) m/s, attitude as a small
-    rotation vector (3,) rad about the site's axes."""
+    """Estimate minus truth in the site's NED.
+
+    Position (3,) m, velocity (3,) m/s, attitude as a small rotation vector (3,) rad about the site's axes.
+    """
 
     position: FloatArray
     velocity: FloatArray
@@ -53,8 +59,10 @@ class Deviation(NamedTuple):
 
 
 class Sensors:
-    """The estimator of one vehicle. ``gps`` is its positioning; ``exact``: the estimate is the truth, and
-    ``advance`` need not be called."""
+    """Estimator of one vehicle.
+
+    ``gps`` is its positioning; ``exact``: the estimate is the truth, and ``advance`` need not be called.
+    """
 
     def __init__(
         self,
@@ -65,8 +73,11 @@ class Sensors:
         seed: int,
         system_id: int,
     ) -> None:
-        """``state`` at time 0; ``patience`` (s): how long the filter coasts without GPS. ``seed`` (≥ 0) and
-        ``system_id`` make the errors."""
+        """Start with the true ``state`` at time 0.
+
+        ``patience`` (s): how long the filter coasts without GPS. ``seed`` (≥ 0) and ``system_id`` seed the
+        errors.
+        """
         random, gaps, losses = (np.random.default_rng([seed, system_id, _STREAM, part]) for part in range(3))
         self._origin = origin
         self._delay = profile.delay
@@ -80,20 +91,23 @@ class Sensors:
 
     @property
     def exact(self) -> bool:
-        """Whether what is believed is so."""
+        """Whether the estimate is the truth."""
         return self._flawless and self.gps.nominal
 
     @property
     def drift(self) -> Vector:
-        """How fast (m/s, local NED) the position wanders that the estimated velocity does not tell."""
+        """Velocity (m/s, local NED) of the position's wandering that is not in the estimated velocity."""
         return self._errors.drift
 
     def silent(self, now: int) -> bool:
-        """Whether position messages fail to come at ``now`` (µs, never decreasing)."""
+        """Return whether position messages drop out at ``now`` (µs, never decreasing)."""
         return self._gaps.holds(now)
 
     def advance(self, time: int, state: VehicleState) -> None:
-        """The true ``state`` at ``time`` (µs, increasing). To be called after every move unless ``exact``."""
+        """Advance to ``time`` (µs, increasing) with its true ``state``.
+
+        Call this after every move unless ``exact``.
+        """
         past = self._past
         past.append((time, state))
         seen = time - self._delay
@@ -108,7 +122,7 @@ class Sensors:
             self._wandering.advance(sample)
 
     def estimate(self, state: VehicleState) -> Estimate:
-        """What is believed now, when ``state`` is the truth."""
+        """Return the present estimate; ``state`` is the truth."""
         if self.exact:
             return _seen(self._origin, state)
         seen, errors, gps = _seen(self._origin, self._delayed), self._errors, self.gps
@@ -122,9 +136,9 @@ class Sensors:
         )
 
     def deviation(self, state: VehicleState) -> Deviation:
-        """By how much what is believed now is off, when ``state`` is the truth.
+        """Return the error of the present estimate; ``state`` is the truth.
 
-        Delay counts in position and velocity only: attitude control runs on the gyros, at the rate at which
+        The delay affects position and velocity only: attitude control runs on the gyros, at the rate at which
         they are read.
         """
         errors, gps, then = self._errors, self.gps, self._delayed
@@ -140,15 +154,15 @@ class Sensors:
             np.array((c * errors.roll - s * errors.pitch, s * errors.roll + c * errors.pitch, errors.yaw)),
         )
 
-    # What happens to GPS, from the next step on
+    # Faults of GPS, effective from the next step on
 
     def lose_gps(self, time: int, state: VehicleState) -> None:
-        """No more GPS; ``state`` is the truth at ``time`` (µs), the last that was moved to."""
+        """Stop GPS; ``state`` is the truth at ``time`` (µs), that of the last move."""
         self._wake(time, state)
         self.gps.lose()
 
     def shift_gps(self, offset: Vector, time: int, state: VehicleState) -> None:
-        """GPS is off by ``offset`` (m, local NED) in all; ``state`` as for ``lose_gps``."""
+        """Set the total GPS error to ``offset`` (m, local NED); other arguments as for ``lose_gps``."""
         self._wake(time, state)
         self.gps.shift(offset)
 
@@ -163,7 +177,7 @@ class Sensors:
 
     @property
     def _delayed(self) -> VehicleState:
-        """The state of ``delay`` ago, linear between those that were told."""
+        """State of ``delay`` ago, interpolated linearly between the recorded states."""
         time = self._time - self._delay
         before, a = self._past[0]
         if before >= time or len(self._past) == 1:
@@ -174,7 +188,7 @@ class Sensors:
 
 
 class _Gaps:
-    """Short times in which nothing comes: their beginnings a Poisson process, their lengths uniform."""
+    """Drop-outs of messages: their starts are a Poisson process, their lengths uniform."""
 
     def __init__(self, profile: SensorProfile, random: np.random.Generator) -> None:
         self._pause = 60e6 / profile.gaps_per_minute if profile.gaps_per_minute else math.inf
@@ -185,7 +199,7 @@ class _Gaps:
             self._next()
 
     def holds(self, now: int) -> bool:
-        """Whether ``now`` (µs, never decreasing) lies in one."""
+        """Return whether ``now`` (µs, never decreasing) lies in a drop-out."""
         if self._pause == math.inf:
             return False
         while now >= self._end:
@@ -198,9 +212,9 @@ class _Gaps:
 
 
 def _seen(origin: Origin, state: VehicleState) -> Estimate:
-    """A true state in the own local frame.
+    """Return a true state in the own local frame.
 
-    The tilt between site and local plane (0.16 mrad per km) is left out of roll and pitch.
+    The tilt between site and local plane (0.16 mrad per km) is neglected in roll and pitch.
     """
     w, x, y, z = state.attitude.tolist()
     p, q, r = state.body_rates.tolist()

@@ -1,5 +1,7 @@
-"""Who answers to AUTOPILOT_VERSION (148): the versions of the firmware that is emulated, as recorded of it,
-without what is not emulated."""
+"""Answer to a request for AUTOPILOT_VERSION (148).
+
+The versions are those recorded of the emulated firmware; capabilities that are not emulated are left out.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +10,8 @@ from typing import Final
 from mavlink_bridge.messages import AutopilotVersion, Source
 
 # MAV_PROTOCOL_CAPABILITY: missions as float and int, parameters, COMMAND_INT, set-points as attitude, in
-# local NED and on the globe, MAVLink 2, flight termination, fence, rally points. Files, terrain and the
-# calibration of compasses are not there.
+# local NED and on the globe, MAVLink 2, flight termination, fence, rally points. Files, terrain and compass
+# calibration are not supported.
 _BOTH: Final = 0x1 | 0x2 | 0x4 | 0x8 | 0x40 | 0x80 | 0x100 | 0x800 | 0x2000 | 0x4000 | 0x8000
 _BYTEWISE: Final = 0x10
 
@@ -19,8 +21,11 @@ _NAME: Final = b"outrider"
 
 
 def version(source: Source, flavour: str) -> AutopilotVersion:
-    """Its uid is made of the system id, so that each vehicle has its own; version control's eight bytes are
-    our name."""
+    """Return AUTOPILOT_VERSION (148) of ``flavour``.
+
+    The uid contains the system id, so that each vehicle has its own; the eight bytes of the version control
+    hash are our name.
+    """
     capabilities = _BOTH | (_BYTEWISE if flavour == "px4" else 0)
     uid = int.from_bytes(_NAME[:7] + bytes((source.system,)), "big")
     uid2 = (_NAME + bytes((source.system,))).ljust(18, b"\0")

@@ -1,4 +1,4 @@
-"""What the inertial sensors tell: RAW_IMU, HIGHRES_IMU, and the simulation's truth, SIMSTATE."""
+"""Messages of the inertial sensors: RAW_IMU, HIGHRES_IMU, and the simulation's truth, SIMSTATE."""
 
 from __future__ import annotations
 
@@ -21,10 +21,12 @@ _WARM: Final = 25.0
 
 
 def raw_imu(s: Snapshot) -> Message:
+    """Return RAW_IMU (27)."""
     return RawImu(s.source, s.time, _force(s), s.estimate.body_rates, _field(s))
 
 
 def highres_imu(s: Snapshot) -> Message:
+    """Return HIGHRES_IMU (105)."""
     altitude = s.origin.altitude - s.estimate.position[2]
     pressure = _SEA_LEVEL * math.exp(-altitude / _SCALE_HEIGHT)
     return HighresImu(
@@ -33,16 +35,20 @@ def highres_imu(s: Snapshot) -> Message:
 
 
 def sim_state(s: Snapshot) -> Message:
+    """Return SIMSTATE (164)."""
     truth = s.truth()
     w, x, y, z = truth.attitude.tolist()
     latitude, longitude, _ = s.origin.geodetic(s.origin.position_to_local(truth.position))
     p, q, r = truth.body_rates.tolist()
-    # The site's axes are turned against the local ones by some millionths.
+    # The site's axes are rotated against the local ones by some millionths.
     return SimState(s.source, *euler((w, x, y, z)), _force(s), (p, q, r), latitude, longitude)
 
 
 def _force(s: Snapshot) -> Vector:
-    """Of the rotors, which push along the axis of the body. Drag, a tenth of it at most, is not told."""
+    """Return the specific force of the rotors (m/s², FRD), which acts along the body's z axis.
+
+    Drag, a tenth of it at most, is left out.
+    """
     return 0.0, 0.0, -s.lift()
 
 

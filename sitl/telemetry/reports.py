@@ -1,6 +1,6 @@
-"""What each message of the autopilot's telemetry says: a snapshot in, a message out.
+"""Builders of the telemetry messages that companions need: a snapshot in, a message out.
 
-Here are those that companions live on; ``status_reports`` has the rest.
+``status_reports`` has the other messages.
 """
 
 from __future__ import annotations
@@ -65,20 +65,22 @@ _EKF_READY: Final = 0x1 | 0x2 | 0x4 | 0x8 | 0x10 | 0x20 | 0x100 | 0x200
 _EKF_WAITING: Final = 0x1 | 0x80 | 0x400
 # Without GPS for too long: attitude, vertical velocity and height by barometer, constant position assumed.
 _EKF_LOST: Final = 0x1 | 0x4 | 0x20 | 0x80
-# Innovation over gate of a filter that is well.
+# Innovation over gate of a healthy filter.
 _TESTED: Final = 0.05
 
 
 class Snapshot(NamedTuple):
-    """All that a message may tell. ``time`` since boot (µs); ``base_mode`` with the armed bit; ``target``
-    gives the set-point that is followed now, None when there is none. ``located``: the estimator has a
-    position or waits for its first; ``fixed``: there is GPS; ``strain``, ``spread``: those of
-    ``Positioning``; ``silent``: position messages fail to come.
-    ``waking`` 0…1: how far GPS and filter have come up, if that is shown; ``charge`` None without a battery;
-    ``throttle`` 0…1; ``unbreached``: MAV_SYS_STATUS_GEOFENCE where it is told; ``epoch``: Unix time of the
-    boot (µs), 0 if nobody knows; ``version`` is what AUTOPILOT_VERSION says; ``mission`` gives
-    MISSION_CURRENT, ``fence`` FENCE_STATUS. ``armable``: nothing speaks against arming, or it is armed.
-    ``lift``: what the rotors, or the ground, push with (m/s²); ``truth``: the true state, site NED."""
+    """Inputs of all telemetry messages.
+
+    ``time`` since boot (µs); ``base_mode`` with the armed bit; ``target`` returns the set-point that is
+    followed now, or None. ``located``: the estimator has a position or waits for its first; ``fixed``: there
+    is GPS; ``strain``, ``spread``: those of ``Positioning``; ``silent``: position messages drop out.
+    ``waking`` 0…1: start-up progress of GPS and filter, if that is shown; ``charge`` None without a battery;
+    ``throttle`` 0…1; ``unbreached``: MAV_SYS_STATUS_GEOFENCE where it is reported; ``epoch``: Unix time of
+    the boot (µs), 0 if unknown; ``version``: AUTOPILOT_VERSION; ``mission`` returns MISSION_CURRENT,
+    ``fence`` FENCE_STATUS. ``armable``: there is no objection to arming, or it is armed. ``lift``: specific
+    force of the rotors, or of the ground (m/s²); ``truth``: the true state, site NED.
+    """
 
     source: Source
     time: int
@@ -113,6 +115,7 @@ class Snapshot(NamedTuple):
 
 
 def heartbeat(s: Snapshot) -> Message:
+    """Return HEARTBEAT (0)."""
     idle = _STANDBY if s.ready else _CALIBRATING
     flying = _ACTIVE if s.located else _CRITICAL
     state = flying if s.armed else idle
@@ -120,6 +123,7 @@ def heartbeat(s: Snapshot) -> Message:
 
 
 def sys_status(s: Snapshot) -> Message:
+    """Return SYS_STATUS (1)."""
     known = _SENSORS | _GPS | _PREARM
     health = (known if s.ready else _SENSORS) & ~(0 if s.fixed else _GPS) | s.unbreached
     if not s.armable:
@@ -131,17 +135,20 @@ def sys_status(s: Snapshot) -> Message:
 
 
 def attitude(s: Snapshot) -> Message:
+    """Return ATTITUDE (30)."""
     e = s.estimate
     return Attitude(s.source, s.time, e.roll, e.pitch, e.yaw, e.body_rates)
 
 
 def local_position(s: Snapshot) -> Message | None:
+    """Return LOCAL_POSITION_NED (32), or None without a position or in a drop-out."""
     if not s.ready or s.silent:
         return None
     return LocalPosition(s.source, s.time, s.estimate.position, s.estimate.velocity)
 
 
 def global_position(s: Snapshot) -> Message | None:
+    """Return GLOBAL_POSITION_INT (33), or None without a position or in a drop-out."""
     if not s.ready or s.silent:
         return None
     e, origin = s.estimate, s.origin
@@ -152,12 +159,14 @@ def global_position(s: Snapshot) -> Message | None:
 
 
 def origin(s: Snapshot) -> Message | None:
+    """Return GPS_GLOBAL_ORIGIN (49), or None before the first position."""
     o = s.origin
     known = s.ready or not s.located
     return GpsGlobalOrigin(s.source, o.latitude, o.longitude, o.altitude, s.time) if known else None
 
 
 def position_target(s: Snapshot) -> Message | None:
+    """Return POSITION_TARGET_LOCAL_NED (85), or None if no set-point is followed."""
     target = s.target()
     if target is None:
         return None
@@ -177,12 +186,17 @@ def position_target(s: Snapshot) -> Message | None:
 
 
 def ekf_status(s: Snapshot) -> Message:
+    """Return EKF_STATUS_REPORT (193)."""
     good = _TESTED if s.located else 0.0
     return EkfStatus(s.source, estimator_flags(s), good, max(good, s.strain), _TESTED, _TESTED)
 
 
 def estimator_flags(s: Snapshot) -> int:
-    """ESTIMATOR_STATUS_FLAGS. While waking: attitude at once, the height at a third, velocities at two."""
+    """Return ESTIMATOR_STATUS_FLAGS.
+
+    While ``waking``: attitude at once, vertical velocity and height from a third, horizontal velocity and
+    relative position from two thirds.
+    """
     if s.ready or not s.located:
         return _EKF_READY if s.ready else _EKF_LOST
     if s.waking < 1 / 3:
@@ -191,8 +205,9 @@ def estimator_flags(s: Snapshot) -> int:
 
 
 def extended_sys_state(s: Snapshot) -> Message:
+    """Return EXTENDED_SYS_STATE (245)."""
     return ExtendedSysState(s.source, 0, s.landed_state)
 
 
 Build = Callable[[Snapshot], Message | None]
-"""One message; None when it has nothing to say yet."""
+"""Builds one message, or returns None if it has no content yet."""

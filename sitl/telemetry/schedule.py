@@ -1,4 +1,4 @@
-"""When the autopilot tells what: integer due times, one list of messages per step."""
+"""Schedule of telemetry: integer due times, one list of messages per step."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NEVER: Final = 1 << 62
 
 
 class _Stream:
-    """One message and when it is due (µs); ``usual`` is the configured interval, 0 for none."""
+    """One message and its due time (µs); ``usual`` is the configured interval, 0 for none."""
 
     __slots__ = ("build", "due", "interval", "usual")
 
@@ -27,11 +27,14 @@ class _Stream:
 
 
 class Telemetry:
-    """The streams of one autopilot. ``next_due`` (µs): before it there is nothing to send."""
+    """Streams of one autopilot. ``next_due`` (µs): nothing is due before it."""
 
     def __init__(self, rates: TelemetryRates, reports_ekf: bool) -> None:
-        """``reports_ekf``: as ArduPilot, EKF_STATUS_REPORT (193), RAW_IMU (27) and SIMSTATE (164); else as
-        PX4, ESTIMATOR_STATUS (230), HIGHRES_IMU (105) and ALTITUDE (141)."""
+        """``reports_ekf`` selects the streams of ArduPilot, else those of PX4.
+
+        ArduPilot's are EKF_STATUS_REPORT (193), RAW_IMU (27) and SIMSTATE (164); PX4's are ESTIMATOR_STATUS
+        (230), HIGHRES_IMU (105) and ALTITUDE (141).
+        """
         self._streams = {
             r.HEARTBEAT: _Stream(r.heartbeat, rates.heartbeat),
             r.SYS_STATUS: _Stream(r.sys_status, rates.sys_status),
@@ -61,20 +64,22 @@ class Telemetry:
             self._streams[n.HIGHRES_IMU] = _Stream(n.highres_imu, 0.0)
             self._streams[q.ALTITUDE] = _Stream(q.altitude, rates.altitude)
             self._streams[q.ESTIMATOR_STATUS] = _Stream(q.estimator_status, rates.estimator_status)
-        # Those that flow; most do not, and a step should not have to look at them.
+        # Active streams; most are inactive, and a step should not have to check them.
         self._flowing: list[_Stream] = []
         self._requested: list[int] = []
         self.next_due = _NEVER
 
     def start(self, now: int) -> None:
-        """Every stream is due at ``now``, and from then on at whole intervals."""
+        """Make every stream due at ``now`` (µs), and from then on at whole intervals."""
         for stream in self._streams.values():
             stream.due = now if stream.interval else _NEVER
         self._gather()
 
     def set_interval(self, message_id: int, interval: int, now: int) -> bool:
-        """As SET_MESSAGE_INTERVAL (511): µs, 0 for the usual one, −1 for none. False when there is no such
-        message."""
+        """Execute SET_MESSAGE_INTERVAL (511): µs, 0 for the default interval, −1 for none.
+
+        Return False if there is no such message.
+        """
         stream = self._streams.get(message_id)
         if stream is None:
             return False
@@ -86,23 +91,28 @@ class Telemetry:
         return True
 
     def interval(self, message_id: int) -> int:
-        """As MESSAGE_INTERVAL (244) says it: µs, −1 when it does not flow, 0 when there is no such
-        message."""
+        """Return the interval as in MESSAGE_INTERVAL (244).
+
+        It is in µs, −1 if the stream is inactive, 0 if there is no such message.
+        """
         stream = self._streams.get(message_id)
         return 0 if stream is None else stream.interval or -1
 
     def request(self, message_id: int) -> bool:
-        """Send one at the next opportunity, whatever its stream does. False when there is no such message."""
+        """Send one message at the next opportunity, independent of its stream.
+
+        Return False if there is no such message.
+        """
         if message_id not in self._streams:
             return False
-        # One answers all who ask before it goes out.
+        # One message answers all requests made before it is sent.
         if message_id not in self._requested:
             self._requested.append(message_id)
         self.next_due = 0
         return True
 
     def collect(self, now: int, snapshot: Snapshot) -> list[Message]:
-        """All that is due at ``now``. A stream that fell behind skips what it missed."""
+        """Return all messages due at ``now`` (µs). A late stream skips the messages that it missed."""
         builds = [self._streams[message_id].build for message_id in self._requested]
         self._requested.clear()
         for stream in self._flowing:

@@ -1,4 +1,4 @@
-"""What ground stations show beside the motion: GPS, battery, home, mission, version, estimator."""
+"""Builders of further telemetry for ground stations: GPS, battery, home, mission, version, estimator."""
 
 from __future__ import annotations
 
@@ -30,24 +30,27 @@ FENCE_STATUS: Final = 162
 ESTIMATOR_STATUS: Final = 230
 HOME: Final = 242
 
-# GPS_FIX_TYPE: none, in two and in three dimensions
+# GPS_FIX_TYPE: none, 2D and 3D
 _NO_FIX, _FIX_2D, _FIX_3D = 1, 2, 3
 _SATELLITES: Final = 12
 # MAV_BATTERY_TYPE lithium polymer, MAV_BATTERY_FUNCTION_ALL; MAV_BATTERY_CHARGE_STATE ok, low, critical
 _LIPO, _ALL, _OK, _LOW, _CRITICAL = 1, 1, 1, 2, 3
 _LOW_AT, _CRITICAL_AT = 0.15, 0.07
-# Beyond that the field of GPS_RAW_INT ends (m/s).
+# Limit of the speed field of GPS_RAW_INT (m/s).
 _FASTEST: Final = 655.0
 _NAN: Final = math.nan
 
 
 def system_time(s: Snapshot) -> Message:
+    """Return SYSTEM_TIME (2)."""
     return SystemTime(s.source, s.epoch + s.time if s.epoch else 0, s.time)
 
 
 def gps_raw(s: Snapshot) -> Message:
-    """The receiver is ready before the filter is: a fix in the plane at a third of the way, in space at two
-    thirds."""
+    """Return GPS_RAW_INT (24).
+
+    The receiver is ready before the filter: a 2D fix at one third of the start-up, a 3D fix at two thirds.
+    """
     fix = _FIX_3D if s.waking >= 2 / 3 else _FIX_2D if s.waking >= 1 / 3 else _NO_FIX
     if not s.fixed or fix == _NO_FIX:
         nowhere = (0.0, 0.0, 0.0, None, None, None, None, 0)
@@ -63,15 +66,18 @@ def gps_raw(s: Snapshot) -> Message:
 
 
 def attitude_quaternion(s: Snapshot) -> Message:
+    """Return ATTITUDE_QUATERNION (31)."""
     e = s.estimate
     return AttitudeQuaternion(s.source, s.time, quaternion(e.roll, e.pitch, e.yaw), e.body_rates)
 
 
 def mission_current(s: Snapshot) -> Message:
+    """Return MISSION_CURRENT (42)."""
     return s.mission()
 
 
 def vfr_hud(s: Snapshot) -> Message:
+    """Return VFR_HUD (74)."""
     e = s.estimate
     north, east, down = e.velocity
     altitude = s.origin.altitude - e.position[2]
@@ -80,6 +86,7 @@ def vfr_hud(s: Snapshot) -> Message:
 
 
 def altitude(s: Snapshot) -> Message | None:
+    """Return ALTITUDE (141), or None before the first position."""
     if not s.ready:
         return None
     height = -s.estimate.position[2]
@@ -88,6 +95,7 @@ def altitude(s: Snapshot) -> Message | None:
 
 
 def battery_status(s: Snapshot) -> Message | None:
+    """Return BATTERY_STATUS (147), or None without a battery."""
     c = s.charge
     if c is None:
         return None
@@ -99,19 +107,23 @@ def battery_status(s: Snapshot) -> Message | None:
 
 
 def autopilot_version(s: Snapshot) -> Message:
+    """Return AUTOPILOT_VERSION (148)."""
     return s.version
 
 
 def fence_status(s: Snapshot) -> Message:
+    """Return FENCE_STATUS (162)."""
     return s.fence(s.source)
 
 
 def estimator_status(s: Snapshot) -> Message:
+    """Return ESTIMATOR_STATUS (230)."""
     good = 0.05 if s.located else _NAN
-    # Its ratios are squares.
+    # The ratios of this message are squares.
     ratios = good, max(good, s.strain**2), 0.05, 0.05, _NAN, _NAN
     return EstimatorStatus(s.source, s.time, *ratios, 0.3 + s.spread, 0.3, estimator_flags(s))
 
 
 def home(s: Snapshot) -> Message | None:
+    """Return HOME_POSITION (242), or None before the first position."""
     return s.home.report(s.source, s.time) if s.ready or not s.located else None

@@ -1,4 +1,4 @@
-"""What the autopilot says to people: STATUSTEXT (253)."""
+"""Texts of the autopilot for people: STATUSTEXT (253)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _WARNING: Final = 4
 _INFO: Final = 6
 
 _SECOND: Final = 1_000_000
-# Complaints of a second: who makes up thousands of mistakes need not be told of each.
+# Limit of complaints per second, against senders that make thousands of mistakes.
 _MOST: Final = 32
 
 
 class Voice:
-    """Appends texts to ``outbox``."""
+    """Sender of texts, which it appends to ``outbox``."""
 
     def __init__(self, source: Source, outbox: list[Message]) -> None:
         self._source = source
@@ -24,15 +24,15 @@ class Voice:
         self._complaints: dict[str, int] = {}
 
     def inform(self, text: str) -> None:
-        """Something happened as it should."""
+        """Report normal events."""
         self._outbox.append(StatusText(self._source, _INFO, text))
 
     def warn(self, text: str) -> None:
-        """Something was refused or went wrong."""
+        """Report a refusal or a failure."""
         self._outbox.append(StatusText(self._source, _WARNING, text))
 
     def complain(self, text: str, now: int) -> None:
-        """Warn, but of the same thing at most once a second (``now`` in µs), and 32 times a second in all."""
+        """Warn, at most once a second for the same text (``now`` in µs), and 32 times a second in all."""
         complaints = self._complaints
         if now - complaints.get(text, -_SECOND) < _SECOND:
             return

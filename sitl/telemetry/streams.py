@@ -1,4 +1,4 @@
-"""How often messages go out to a ground station: by default, and by REQUEST_DATA_STREAM (66)."""
+"""Rates of messages to a ground station: the defaults, and the groups of REQUEST_DATA_STREAM (66)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sitl.telemetry import inertial_reports as n
 from sitl.telemetry import reports as r
 from sitl.telemetry import status_reports as q
 
-# A real ArduCopter tells nothing but HEARTBEAT until it is asked, at 4 Hz as a rule; not every script asks.
+# A real ArduCopter sends only HEARTBEAT until requested, usually at 4 Hz; but not every script requests.
 _ARDUPILOT: Final = TelemetryRates(
     sys_status=2.0,
     attitude=4.0,
@@ -27,7 +27,7 @@ _ARDUPILOT: Final = TelemetryRates(
     battery_status=1.0,
     home_position=0.5,
 )
-# As recorded of PX4 1.16, the fast ones slower: nobody who needs 50 Hz is short of asking.
+# As recorded of PX4 1.16, with the fast streams slower: a client that needs 50 Hz requests them anyway.
 _PX4: Final = TelemetryRates(
     sys_status=5.0,
     attitude=20.0,
@@ -56,18 +56,18 @@ GROUPS: Final[dict[int, tuple[int, ...]]] = {
     11: (q.VFR_HUD,),
     12: (q.SYSTEM_TIME, q.BATTERY_STATUS, r.EKF_STATUS),
 }
-"""By MAV_DATA_STREAM, what ArduCopter has in each of its groups, as far as we have it."""
+"""Message ids of ArduCopter's groups by MAV_DATA_STREAM, as far as they are supported."""
 
 
 def usual_rates(config: AutopilotConfig) -> TelemetryRates:
-    """What flows from the start."""
+    """Return the rates of messages from the start."""
     if config.streams == "quiet":
         return config.rates
     return _ARDUPILOT if config.flavour == "ardupilot" else _PX4
 
 
 def members(stream: int) -> tuple[int, ...]:
-    """The message ids of a data stream; of all for 0, none if it is unknown."""
+    """Return the message ids of a data stream: those of all streams for 0, none if it is unknown."""
     if stream == ALL:
         return tuple(message_id for group in GROUPS.values() for message_id in group)
     return GROUPS.get(stream, ())

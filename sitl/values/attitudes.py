@@ -10,7 +10,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """(w, x, y, z) of yaw, then pitch, then roll (rad), FRD body to NED."""
+    """Return (w, x, y, z) of yaw, then pitch, then roll (rad), FRD body to NED."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
@@ -23,7 +23,7 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def euler(attitude: Quaternion) -> Vector:
-    """Roll, pitch and yaw (rad)."""
+    """Return roll, pitch and yaw (rad)."""
     w, x, y, z = attitude
     roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
@@ -31,7 +31,7 @@ def euler(attitude: Quaternion) -> Vector:
 
 
 def to_body(attitude: Quaternion, vector: Vector) -> Vector:
-    """A vector in NED as the body has it."""
+    """Return a vector in NED in body axes (FRD)."""
     w, *axis = attitude
     x, y, z = axis
     a, b, c = vector

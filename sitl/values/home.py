@@ -1,4 +1,4 @@
-"""Where the vehicle returns to: HOME_POSITION (242)."""
+"""Home, the place to which the vehicle returns: HOME_POSITION (242)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ _NAN = float("nan")
 
 
 class Home:
-    """A place: ``position`` (m, own local NED) and ``latitude``, ``longitude`` (degrees), ``altitude`` (m
-    above mean sea level). At first the origin; the origin stays when home is moved."""
+    """Home position.
+
+    ``position`` (m, own local NED) and ``latitude``, ``longitude`` (degrees), ``altitude`` (m above mean sea
+    level). Home is at first the origin; the origin stays when home is moved.
+    """
 
     def __init__(self, origin: Origin) -> None:
         self._origin = origin
@@ -19,16 +22,16 @@ class Home:
 
     @property
     def height(self) -> float:
-        """m above the origin."""
+        """Height above the origin (m)."""
         return self.altitude - self._origin.altitude
 
     def move(self, latitude: float, longitude: float, altitude: float) -> None:
-        """To a place on the globe (degrees, m above mean sea level)."""
+        """Move home to a place on the globe (degrees, m above mean sea level)."""
         self.latitude, self.longitude, self.altitude = latitude, longitude, altitude
         self.position = self._origin.local(latitude, longitude, altitude)
 
     def report(self, source: Source, time: int) -> HomePosition:
-        """HOME_POSITION at ``time`` (µs since boot)."""
+        """Return HOME_POSITION at ``time`` (µs since boot)."""
         place = self.latitude, self.longitude, self.altitude
         unknown = (_NAN, _NAN, _NAN)
         return HomePosition(source, *place, self.position, (_NAN, *unknown), unknown, time)

@@ -1,5 +1,4 @@
-"""Where a vehicle's own local frame lies in the site, the one NED frame in which all vehicles of a simulation
-move.
+"""Position of a vehicle's own local frame in the site, the NED frame in which all vehicles move.
 
 site NED = NED of the site's ``FleetFrame``; local NED = NED at the vehicle's own GPS_GLOBAL_ORIGIN.
 """
@@ -16,7 +15,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Origin:
-    """An origin at whole degE7 and mm, so that the GPS_GLOBAL_ORIGIN (49) that is sent is exact.
+    """Origin at whole degE7 and mm, so that the transmitted GPS_GLOBAL_ORIGIN (49) is exact.
 
     p_site = R p_local + t: ``rotation`` R (3, 3), ``position`` t (3,) m, site NED; ``turn`` (rad) is the yaw
     in the site of the local north; ``site`` the site itself.
@@ -38,30 +37,30 @@ class Origin:
         self.turn = yaw_to_ned(frame.yaw_to_fleet(0.0))
 
     def motion_to_site(self, motion: npt.ArrayLike) -> Array:
-        """Rows (n ≥ 1, 3) of position, then free vectors: local NED → site NED."""
+        """Transform rows (n ≥ 1, 3) of a position, then free vectors: local NED → site NED."""
         moved: Array = np.array(motion).dot(self._axes)
         moved[0] += self.position
         return moved
 
     def vectors_to_site(self, vectors: npt.ArrayLike) -> Array:
-        """Free vectors (n, 3): local NED → site NED."""
+        """Transform free vectors (n, 3): local NED → site NED."""
         turned: Array = np.array(vectors).dot(self._axes)
         return turned
 
     def position_to_local(self, site: Array) -> Vector:
-        """A position (3,), m: site NED → local NED."""
+        """Transform a position (3,), m: site NED → local NED."""
         x, y, z = ((site - self.position) @ self.rotation).tolist()
         return x, y, z
 
     def vector_to_local(self, site: Array) -> Vector:
-        """A velocity or acceleration (3,): site NED → local NED."""
+        """Transform a velocity or acceleration (3,): site NED → local NED."""
         x, y, z = (site @ self.rotation).tolist()
         return x, y, z
 
     def local(self, latitude: float, longitude: float, altitude: float) -> Vector:
-        """The position (m, local NED) of a place (deg, deg, m)."""
+        """Return the position (m, local NED) of a place (deg, deg, m)."""
         return self.position_to_local(enu_to_ned(self.site.to_enu(latitude, longitude, altitude)))
 
     def geodetic(self, local: Vector) -> tuple[float, float, float]:
-        """Latitude (deg), longitude (deg), altitude (m) of a position (m, local NED)."""
+        """Return latitude (deg), longitude (deg), altitude (m) of a position (m, local NED)."""
         return self.site.to_geodetic(ned_to_enu(self.motion_to_site([local])[0]))

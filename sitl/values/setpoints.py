@@ -1,9 +1,9 @@
-"""What a set-point asks for once an autopilot has understood it, and the words shared by both dialects.
+"""Set-points as interpreted by an autopilot, and the constants shared by both dialects.
 
-A SET_POSITION_TARGET_LOCAL_NED (84) means different things to ArduPilot and to PX4: ``flavours`` holds the
-two readings. Each turns the message into one ``Reading``: a ``Setpoint`` to fly, a ``Stop`` (understood as
-"brake and hold") or a ``Refusal`` (nothing changes). A stop or a refusal carries the reason that goes back as
-STATUSTEXT.
+ArduPilot and PX4 interpret a SET_POSITION_TARGET_LOCAL_NED (84) differently: ``sitl.autopilot.firmware``
+holds the two interpretations. Each turns the message into one ``Reading``: a ``Setpoint`` to fly, a ``Stop``
+(understood as "brake and hold") or a ``Refusal`` (nothing changes). A stop or a refusal carries the reason
+that is sent back as STATUSTEXT.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ LOCAL_OFFSET_NED: Final = 7
 BODY_NED: Final = 8
 BODY_OFFSET_NED: Final = 9
 
-# The highest derivative-free quantity that an axis is told: the level at which its loop closes.
+# The lowest derivative that is given for an axis: the level at which its loop closes.
 POSITION: Final = 0
 VELOCITY: Final = 1
 ACCELERATION: Final = 2
 
 ZERO: Final[Vector] = (0.0, 0.0, 0.0)
 
-# A number at a limit may come back a little above it from float32.
+# A number at a limit may return slightly above it from float32.
 _ROUNDING: Final = 1.0 + 1e-6
-# Beyond any flight: larger numbers are damage, and would overflow the float32 of the echo.
+# Beyond any flight: larger numbers are corrupt, and would overflow the float32 of the echo.
 _FAR, _FAST, _TURNING = 1e5, 1e3, 1e2
 _RANGES: Final = (
     ("position", _FAR),
@@ -47,19 +47,19 @@ _RANGES: Final = (
 
 
 class Pose(NamedTuple):
-    """Where the vehicle believes it is: position (m, own local NED) and yaw (rad, clockwise from north)."""
+    """Estimated pose: position (m, own local NED) and yaw (rad, clockwise from north)."""
 
     position: Vector
     yaw: float
 
 
 class Setpoint(NamedTuple):
-    """A motion to follow, in the vehicle's own local NED, valid at the time it was received.
+    """Motion to follow, in the vehicle's own local NED, valid at the time it was received.
 
-    ``levels`` says per axis what is controlled (POSITION, VELOCITY or ACCELERATION); the derivatives of that
-    quantity are feed-forward, zero where they were not given. ``complete`` when all axes have position *and*
-    velocity, so that the stream is a trajectory and not a destination. ``yaw`` and ``yaw_rate`` (rad, rad/s)
-    are None when ignored.
+    ``levels`` gives the controlled quantity per axis (POSITION, VELOCITY or ACCELERATION); the derivatives of
+    that quantity are feed-forward, zero where they were not given. ``complete`` if all axes have position
+    *and* velocity, so that the stream is a trajectory and not a destination. ``yaw`` and ``yaw_rate`` (rad,
+    rad/s) are None if ignored.
     """
 
     levels: tuple[int, int, int]
@@ -72,7 +72,7 @@ class Setpoint(NamedTuple):
 
     @property
     def moves(self) -> bool:
-        """Whether it asks for motion that must not go on for ever when the sender falls silent."""
+        """Whether it requests motion that must not continue for ever without further set-points."""
         return (
             self.levels != (POSITION, POSITION, POSITION)
             or self.velocity != ZERO
@@ -80,7 +80,7 @@ class Setpoint(NamedTuple):
         )
 
     def limited(self, speed: float, acceleration: float) -> Setpoint:
-        """The same with feed-forward within the limits (m/s, m/s²); not ``complete`` if that changed it."""
+        """Return it with feed-forward within the limits (m/s, m/s²); not ``complete`` if that changed it."""
         fast = math.hypot(*self.velocity)
         strong = math.hypot(*self.acceleration)
         if fast <= speed * _ROUNDING and strong <= acceleration * _ROUNDING:
@@ -92,8 +92,11 @@ class Setpoint(NamedTuple):
         )
 
     def after(self, age: float, thrusting: float) -> Setpoint:
-        """Extrapolated by ``age`` seconds: the acceleration acts for the first ``thrusting`` of them, the
-        velocity reached then is kept (constant-acceleration kinematics, per axis)."""
+        """Return it extrapolated by ``age`` seconds.
+
+        The acceleration acts for the first ``thrusting`` of them, then the velocity is kept
+        (constant-acceleration kinematics, per axis).
+        """
         burn = age if age < thrusting else thrusting
         coast = age - burn
         (x, y, z), (vx, vy, vz), (ax, ay, az) = self.position, self.velocity, self.acceleration
@@ -115,7 +118,7 @@ class Setpoint(NamedTuple):
 
 
 class Stop(NamedTuple):
-    """Understood as: brake and hold."""
+    """Interpretation as "brake and hold"."""
 
     reason: str
 
@@ -130,18 +133,18 @@ Reading = Setpoint | Stop | Refusal
 
 
 def scaled(vector: Vector, factor: float) -> Vector:
-    """``factor`` times ``vector``."""
+    """Return ``factor`` times ``vector``."""
     return vector[0] * factor, vector[1] * factor, vector[2] * factor
 
 
 def rotated(vector: Vector, yaw: float) -> Vector:
-    """A vector given forward-right-down of a level vehicle of heading ``yaw``, in NED."""
+    """Return a vector in NED, given forward-right-down of a level vehicle of heading ``yaw`` (rad)."""
     c, s = math.cos(yaw), math.sin(yaw)
     return c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]
 
 
 def unusable(message: SetpointLocal, mask: int) -> str | None:
-    """Why a field that ``mask`` uses cannot be used (NaN, infinite, beyond any flight), or None."""
+    """Return the reason why a field that ``mask`` uses is unusable (NaN, infinite, out of range), or None."""
     if _usable(message):
         return None
     fields = (message.position, message.velocity, message.acceleration, (message.yaw,), (message.yaw_rate,))
@@ -155,7 +158,7 @@ def unusable(message: SetpointLocal, mask: int) -> str | None:
 
 
 def _usable(message: SetpointLocal) -> bool:
-    """Whether there is nothing wrong with any field, used or not: nearly always, and soon seen."""
+    """Return whether all fields, used or not, are valid: the usual case, checked quickly."""
     (x, y, z), (u, v, w), (a, b, c) = message.position, message.velocity, message.acceleration
     return (
         -_FAR <= x <= _FAR
@@ -173,7 +176,7 @@ def _usable(message: SetpointLocal) -> bool:
 
 
 def mask_of(setpoint: Setpoint) -> int:
-    """The type mask that describes what is followed, for POSITION_TARGET_LOCAL_NED (85)."""
+    """Return the type mask of the followed set-point, for POSITION_TARGET_LOCAL_NED (85)."""
     mask = 0
     for axis, level in enumerate(setpoint.levels):
         mask |= (1 << axis) * (level > POSITION) | (8 << axis) * (level > VELOCITY)

@@ -1,4 +1,4 @@
-"""The numbers of one type of vehicle as the compiled steps read them."""
+"""Constants of one type of vehicle, as the compiled steps read them."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from sitl.vehicle.ground import GRAVITY
 FloatArray = NDArray[np.float64]
 
 _WEIGHTLESS = 1e-3
-"""‖A‖ over weight below which A points nowhere."""
+"""Ratio of ‖A‖ to weight below which A has no direction."""
 
 
 class Airframe(NamedTuple):
-    """Derived once from a ``VehicleConfig``; n rotors, SI, body axes forward-right-down.
+    """Constants derived once from a ``VehicleConfig``; n rotors, SI, body axes forward-right-down.
 
     Compiled code reads the same names from the record that ``airframe_record`` packs.
     """
@@ -36,12 +36,12 @@ class Airframe(NamedTuple):
     k_m: float  # m
     rotor_drag: float  # kg/rad
     rolling_moment: float  # kg m/rad
-    half_step_decay_up: float  # what half a step leaves of the distance to a higher rotor speed
+    half_step_decay_up: float  # remaining part, after half a step, of the distance to a higher speed
     half_step_decay_down: float
     omega_idle: float  # rad/s
     min_thrust: float  # N, one rotor
     max_thrust: float  # N, one rotor
-    speed_squared: float  # rad²/s² for each N of a rotor
+    speed_squared: float  # rad²/s² per N of a rotor
     mixer: FloatArray  # (n, 4) from thrust and moments to rotor thrusts
     rotor_share: FloatArray  # (n,) total thrust over that of each rotor in hover
     k_x: float  # N/m
@@ -53,15 +53,15 @@ class Airframe(NamedTuple):
     cancelled_drag: float  # N s/m, D of the controller
     cancelled_drag_arm: float  # N s, D times the mean height z of the rotors
     cancelled_rolling: float  # N s, the rolling moment over velocity
-    cancelled_turning: float  # N m s, what the rotor drag has against a yaw rate
+    cancelled_turning: float  # N m s, moment of the rotor drag against a yaw rate
     limits_force: bool
     tan_max_tilt: float
     cos_max_yaw_error: float
     sin_max_yaw_error: float
-    weightless: float  # N, ‖A‖ below which A points nowhere
+    weightless: float  # N, ‖A‖ below which A has no direction
     min_lift: float  # N, all rotors
     max_lift: float  # N, all rotors
-    force_learnt: float  # part of what is not known of a force that the observer learns in a step
+    force_learnt: float  # part of a force not yet learnt that the observer learns in a step
     moment_learnt: float
     max_disturbance_force: float  # N
     max_disturbance_moment: FloatArray  # (3,) N m
@@ -71,7 +71,7 @@ class Airframe(NamedTuple):
 
 
 def airframe(config: VehicleConfig, gravity: float = GRAVITY) -> Airframe:
-    """Work out what the compiled steps need of ``config``; ``gravity`` in m/s²."""
+    """Return the constants of ``config`` for the compiled steps; ``gravity`` in m/s²."""
     x, y, z = np.ascontiguousarray(np.array([rotor.position for rotor in config.rotors]).T)
     spin = np.array([rotor.spin_sign for rotor in config.rotors])
     n = len(config.rotors)
@@ -130,13 +130,13 @@ def airframe(config: VehicleConfig, gravity: float = GRAVITY) -> Airframe:
 
 
 def hover_speeds(config: VehicleConfig, gravity: float = GRAVITY) -> FloatArray:
-    """The rotor speeds (n,) (rad/s) that carry the weight without a moment; ``gravity`` in m/s²."""
+    """Return the rotor speeds (n,) (rad/s) that carry the weight without a moment; ``gravity`` in m/s²."""
     numbers = airframe(config, gravity)
     return np.sqrt(config.mass * gravity * numbers.mixer[:, 0] * numbers.speed_squared)
 
 
 def airframe_record(numbers: Airframe) -> NDArray[np.void]:
-    """The same numbers as a read-only structured array (1,): numba passes it without unpacking."""
+    """Return the constants as a read-only structured array (1,), which numba passes without unpacking."""
     fields: list[tuple[str, Any, tuple[int, ...]]] = [
         (name, np.asarray(value).dtype, np.shape(value)) for name, value in numbers._asdict().items()
     ]

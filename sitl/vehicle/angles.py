@@ -9,7 +9,7 @@ from sitl.vehicle.simd import nearest
 from sitl.vehicle.vectors import greatest, least
 
 _TURNS = 0.5 / math.pi
-# 2π to 37 bits, so that its product with up to 65 000 turns is exact, and what that leaves.
+# 2π to 37 bits, so that its product with up to 65 000 turns is exact, and the remainder.
 _TURN = 6.283185307169333
 _TURN_REST = 1.0253376606378076e-11
 
@@ -22,7 +22,7 @@ _S11, _S13, _S15 = -1.0 / 39_916_800, 1.0 / 6_227_020_800, -1.0 / 1_307_674_368_
 
 @kernel
 def small_cosine_sinc(square: float) -> tuple[float, float]:
-    """cos x and sin x / x from x², to the last bit where x² < 0.01."""
+    """Return cos x and sin x / x from x², exact to the last bit where x² < 0.01."""
     c = 1.0 + square * (_C2 + square * (_C4 + square * (_C6 + square * _C8)))
     s = 1.0 + square * (_S3 + square * (_S5 + square * (_S7 + square * _S9)))
     return c, s
@@ -30,9 +30,9 @@ def small_cosine_sinc(square: float) -> tuple[float, float]:
 
 @kernel
 def cosine_sine(angle: float) -> tuple[float, float]:
-    """cos and sin of an angle (rad), within 3e-15 up to 65 000 turns; beyond they are merely finite.
+    """Return cos and sin of an angle (rad), within 3e-15 up to 65 000 turns; beyond they are merely finite.
 
-    The series of a quarter of the angle, at most 45°, and its double twice.
+    It evaluates the series of a quarter of the angle, at most 45°, and doubles the angle twice.
     """
     turns = nearest(_TURNS * angle)
     rest = angle - turns * _TURN - turns * _TURN_REST

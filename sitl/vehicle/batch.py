@@ -1,4 +1,4 @@
-"""Rows of vehicles of one type through the compiled pipeline, in blocks or one after the other."""
+"""Rows of vehicles of one type, advanced by the compiled pipeline in blocks or one after the other."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from sitl.vehicle.pipeline import COMMAND_SIZE, advance
 from sitl.vehicle.simd import LANES
 
 _WORTH_A_BLOCK = 3
-"""From so many vehicles on a block is faster than one after the other, though the rest of it is idle."""
+"""Number of vehicles from which on a block is faster than single rows, although its other lanes are idle."""
 
 
 @kernel
 def fill_block(rows: FloatArray, first: int, block: FloatArray) -> None:
-    """Put rows side by side into a block, from ``first`` on; the last one as often as it takes."""
+    """Copy rows side by side into a block, from ``first`` on; the last row fills the remaining lanes."""
     for lane in range(LANES):
         row = min(first + lane, rows.shape[0] - 1)
         for column in range(rows.shape[1]):
@@ -27,7 +27,7 @@ def fill_block(rows: FloatArray, first: int, block: FloatArray) -> None:
 
 @kernel
 def read_block(rows: FloatArray, first: int, block: FloatArray) -> None:
-    """Take the rows from ``first`` on back out of a block."""
+    """Copy the rows from ``first`` on back out of a block."""
     for lane in range(min(LANES, rows.shape[0] - first)):
         for column in range(rows.shape[1]):
             rows[first + lane, column] = block[column, lane]
@@ -35,7 +35,7 @@ def read_block(rows: FloatArray, first: int, block: FloatArray) -> None:
 
 @kernel
 def first_not_finite(rows: FloatArray) -> int:
-    """The index of the first row with something that is not finite; −1 when there is none."""
+    """Return the index of the first row with a value that is not finite, or −1."""
     for k in range(rows.shape[0]):
         if not np.isfinite(np.sum(rows[k])):
             return k
@@ -115,12 +115,12 @@ _singly, _in_blocks = _build(
 def advance_rows(
     states: FloatArray, commands: FloatArray, airframes: NDArray[np.void], steps: int, tracks: FloatArray
 ) -> int:
-    """Advance states (K, STATE_SIZE + 2 n) under commands (K, COMMAND_SIZE) by a number of steps. Compiled.
+    """Advance states (K, STATE_SIZE + 2 n) under commands (K, COMMAND_SIZE) by ``steps`` steps.
 
-    ``airframes`` (1,) is the record, ``tracks`` (K, 3 steps) gets the positions after each step. Changes
-    states and tracks in place and returns −1; or returns the index of a command row that is not finite,
-    having changed nothing. All arrays are C-contiguous float64. What a vehicle does depends neither on the
-    others nor on whether it is in a block, so that it goes where it is faster.
+    ``airframes`` (1,) is the record, ``tracks`` (K, 3 steps) receives the positions after each step. The
+    function changes states and tracks in place and returns −1; or it returns the index of a command row that
+    is not finite, and changes nothing. All arrays are C-contiguous float64. The motion of a vehicle depends
+    neither on the others nor on whether it is in a block, so the faster way is chosen.
     """
     count = len(states)
     rest = count % LANES

@@ -1,7 +1,8 @@
-"""A battery that drains: rotor speeds in, voltage, current and charge out.
+"""Battery model: rotor speeds in, voltage, current and charge out.
 
-The power of a rotor goes with the cube of its speed. A cell's open voltage falls in a line from 4.2 V when
-full to 3.5 V when a tenth is left, and from there to 3.0 V, as lithium polymer roughly does.
+The power of a rotor is proportional to the cube of its speed. A cell's open-circuit voltage falls linearly
+from 4.2 V when full to 3.5 V at a tenth of the charge, and from there to 3.0 V, which approximates lithium
+polymer.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ _PERIOD: Final = 100_000
 
 
 class BatteryConfig(BaseModel):
-    """One battery. SI units, but for what is written on it."""
+    """Properties of one battery. SI units, except the capacity, which is in mAh as printed on batteries."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -31,8 +32,11 @@ class BatteryConfig(BaseModel):
 
 
 class Charge(NamedTuple):
-    """``voltage`` (V, of all cells), ``current`` (A), ``consumed`` (A s), ``remaining`` (0…1), and for how
-    long (s) that lasts at this current."""
+    """State of a battery.
+
+    ``voltage`` (V, of all cells), ``current`` (A), ``consumed`` (A s), ``remaining`` (0…1), and ``lasts``,
+    the time (s) until it is empty at this current.
+    """
 
     voltage: float
     current: float
@@ -42,10 +46,10 @@ class Charge(NamedTuple):
 
 
 class Battery:
-    """The state of one battery, moved on in steps of 0.1 s."""
+    """Model of one battery, advanced in steps of at least 0.1 s."""
 
     def __init__(self, config: BatteryConfig, hover_speeds: list[float]) -> None:
-        """``hover_speeds`` (rad/s) of the rotors: where it gives ``hover_current``."""
+        """``hover_speeds`` (rad/s): rotor speeds at which the motors draw ``hover_current``."""
         self._config = config
         self._hovering = sum(speed**3 for speed in hover_speeds)
         self._capacity = config.capacity_mah * 3.6
@@ -54,23 +58,23 @@ class Battery:
         self._time = 0
 
     def due(self, now: int) -> bool:
-        """Whether a step ends by ``now`` (µs)."""
+        """Return whether a step ends by ``now`` (µs)."""
         return now - self._time >= _PERIOD
 
     def advance(self, now: int, speeds: list[float]) -> None:
-        """To ``now`` (µs), the rotors turning at ``speeds`` (rad/s)."""
+        """Advance to ``now`` (µs), with the rotors turning at ``speeds`` (rad/s)."""
         share = sum(speed**3 for speed in speeds) / self._hovering
         self._current = self._config.idle_current + self._config.hover_current * share
         self._left = max(0.0, self._left - self._current * (now - self._time) * 1e-6)
         self._time = now
 
     def drain(self) -> None:
-        """Nothing left."""
+        """Empty the battery."""
         self._left = 0.0
 
     @property
     def charge(self) -> Charge:
-        """Its state."""
+        """Present state."""
         config, current = self._config, self._current
         remaining = self._left / self._capacity
         if remaining >= _KNEE_AT:

@@ -1,4 +1,4 @@
-"""What a simulated vehicle is made of: typed, checked when loaded, frozen."""
+"""Configuration of a simulated vehicle: typed, checked when loaded, frozen."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Rotor(BaseModel):
-    """Where a rotor is on the body, forward-right-down, and which way it turns."""
+    """Place of a rotor on the body, forward-right-down, and its sense of rotation."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -41,10 +41,10 @@ class Rotor(BaseModel):
 
 
 class VehicleConfig(BaseModel):
-    """A multirotor whose rotors are of one kind and push the same way, and its geometric controller.
+    """Multirotor with rotors of one kind that all push the same way, and its geometric controller.
 
-    Raises ``pydantic.ValidationError`` for rotors that cannot hover, or cannot make the three moments and a
-    thrust independently of each other.
+    Raises ``pydantic.ValidationError`` for rotors that cannot hover, or cannot produce the three moments and
+    a thrust independently of each other.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -1,9 +1,9 @@
-"""The geometric tracking controller of Lee, Leok and McClamroch (CDC 2010) with its whole feed-forward.
+"""Geometric tracking controller of Lee, Leok and McClamroch (CDC 2010) with complete feed-forward.
 
-Notation of the paper, e3 down: A is the force that the vehicle should feel apart from gravity's reaction, b3c
-= −A/‖A‖. Added to the paper: the rotor drag at zero wind can be cancelled (after Faessler, Franchi and
-Scaramuzza, 2018, who show that a drag linear in velocity only turns A), so is the disturbance that the
-``observer`` has learnt, and A can be limited to a greatest tilt.
+Notation of the paper, e3 down: A is the force that the vehicle should receive apart from gravity's reaction,
+b3c = −A/‖A‖. Added to the paper: the rotor drag at zero wind can be cancelled (after Faessler, Franchi and
+Scaramuzza, 2018, who show that a drag linear in velocity only turns A), as can the disturbance estimated by
+``observer``, and A can be limited to a greatest tilt.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ _UPRIGHT_NOSE = 0.02
 
 @kernel
 def limited_force(A: Vector, airframe: Airframe) -> tuple[Vector, bool]:
-    """A within the greatest tilt and the thrust of the rotors, and whether that changed it.
+    """Return A within the greatest tilt and the thrust of the rotors, and whether that changed it.
 
-    Height comes first: the upward part lies between the least lift and all rotors at full thrust, and the
-    horizontal part has what the tilt and the thrust then leave, in its own direction.
+    Height has priority: the upward part lies between the least lift and full thrust of all rotors; the
+    horizontal part keeps its direction and is limited to what the tilt and the thrust then leave.
     """
     up = greatest(airframe.min_lift, least(airframe.max_lift, -A[2]))
     square = A[0] * A[0] + A[1] * A[1]
@@ -62,10 +62,10 @@ def limited_force(A: Vector, airframe: Airframe) -> tuple[Vector, bool]:
 
 @kernel
 def limited_nose(yaw: float, axes: Axes, airframe: Airframe) -> Vector:
-    """b1d = (cos ψ, sin ψ, 0) for a yaw ψ (rad), or for the heading that is the greatest yaw error away from
-    the nose, on the shorter side.
+    """Return b1d = (cos ψ, sin ψ, 0) for a yaw ψ (rad), limited to the greatest yaw error.
 
-    Beyond a right angle e_R leads roll and pitch astray while a vehicle whose yaw is weak turns slowly round.
+    Beyond it b1d is the heading at the greatest yaw error from the nose, on the shorter side: beyond a right
+    angle e_R would misdirect roll and pitch while a vehicle with weak yaw control turns slowly.
     """
     ahead, right = cosine_sine(yaw)
     x, y = axes[0][0], axes[0][1]
@@ -88,12 +88,12 @@ def commanded_attitude(
     axes: Axes,
     airframe: Airframe,
 ) -> tuple[Axes, Vector, Vector]:
-    """R_c, Ω_c and Ω̇_c from A and its derivatives, and from b1d (the ``nose``) and the derivatives of ψ.
+    """Return R_c, Ω_c and Ω̇_c from A and its derivatives, and from b1d (``nose``) and the derivatives of ψ.
 
     The paper takes b2c normal to b1d, which turns the nose of a tilted vehicle away from ψ by up to half its
-    tilt squared. With ``euler_heading`` b1c instead lies in the vertical plane of b1d, so that the yaw that
-    MAVLink speaks of is ψ. Where A vanishes the thrust axis stays where it is, and where b3c leaves no
-    heading to choose so does the nose, without feed-forward: there the command has no direction to follow.
+    tilt squared. With ``euler_heading`` b1c instead lies in the vertical plane of b1d, so that ψ is the yaw
+    of MAVLink. If A vanishes, the thrust axis keeps its direction, and if b3c leaves no heading to choose, so
+    does the nose, both without feed-forward: the command then has no direction to follow.
     """
     still = (0.0, 0.0, 0.0)
     down = (times(-1.0, A[0]), times(-1.0, A[1]), times(-1.0, A[2]))
@@ -115,7 +115,7 @@ def commanded_attitude(
         C = cross_with_rates(b3, (nose, times(yaw_rate, aside), turning))
     upright = dot(C[0], C[0]) <= _UPRIGHT_NOSE * _UPRIGHT_NOSE
     if some(upright):
-        # Of b1 and b2 at most one can be along b3c.
+        # At most one of b1 and b2 can be along b3c.
         side = cross(b3[0], axes[0])
         along = dot(side, side) < _UPRIGHT_NOSE * _UPRIGHT_NOSE
         side = chosen(along, plus(axes[1], -dot(axes[1], b3[0]), b3[0]), side)
@@ -124,7 +124,7 @@ def commanded_attitude(
     b2 = unit_with_rates(C)
     b1 = cross(b2[0], b3[0])
     wx, wy, wz = dot(b3[0], b2[1]), dot(b1, b3[1]), -dot(b1, b2[1])
-    # From ḃ1 = wz b2 − wy b3 and its like for the others.
+    # From ḃ1 = wz b2 − wy b3 and the corresponding equations of the others.
     rates_change = (
         dot(b3[0], b2[2]) - wy * wz,
         dot(b1, b3[2]) - wz * wx,
@@ -144,12 +144,12 @@ def desired_force(
     disturbance: Vector,
     airframe: Airframe,
 ) -> tuple[float, WithRates]:
-    """The thrust f (N) and A with its first two derivatives.
+    """Return the thrust f (N) and A with its first two derivatives.
 
-    A = −k_x e_x − k_v e_v − m g e3 + m ẍ_d + D ẋ_d − d with the known disturbance d (N, NED), and
-    f = −(A − D ẋ_d)·b3. D is the drag that is cancelled: −D v⊥ is −D v and a force along b3, so that the
-    first turns A and the second goes into f. The derivatives take the measured acceleration where the paper
-    has that of its model, which a steady wind would make wrong for ever, and the jerk of the model.
+    A = −k_x e_x − k_v e_v − m g e3 + m ẍ_d + D ẋ_d − d with the known disturbance d (N, NED), and f = −(A − D
+    ẋ_d)·b3. D is the cancelled drag: −D v⊥ is −D v and a force along b3, so that the first turns A and the
+    second goes into f. The derivatives use the measured acceleration instead of the paper's modelled one,
+    which would be permanently wrong in a steady wind, and the jerk of the model.
     """
     m, k_x, k_v, D = airframe.mass, airframe.k_x, airframe.k_v, airframe.cancelled_drag
     b3 = axes[2]
@@ -179,7 +179,7 @@ def desired_force(
 
 @kernel
 def attitude_errors(axes: Axes, commanded: Axes, commanded_rates: Vector) -> tuple[Vector, Vector]:
-    """e_R = ½(R_cᵀR − RᵀR_c)^∨ and RᵀR_cΩ_c, the commanded rates in the body's own axes."""
+    """Return e_R = ½(R_cᵀR − RᵀR_c)^∨ and RᵀR_cΩ_c, the commanded rates in the body's own axes."""
     x, y, z = to_body(commanded, axes[0]), to_body(commanded, axes[1]), to_body(commanded, axes[2])
     e_R = (0.5 * (y[2] - z[1]), 0.5 * (z[0] - x[2]), 0.5 * (x[1] - y[0]))
     return e_R, to_body(axes, to_ned(commanded, commanded_rates))
@@ -199,11 +199,11 @@ def control(
     disturbance: Disturbance,
     airframe: Airframe,
 ) -> tuple[float, Vector]:
-    """Thrust f (N, along −b3) and moment M (N m, body) that track a trajectory (NED) and a heading (rad).
+    """Return thrust f (N, along −b3) and moment M (N m, body) that track a trajectory (NED) and a yaw (rad).
 
-    M = −k_R e_R − k_Ω e_Ω + Ω×JΩ − J(Ω̂RᵀR_cΩ_c − RᵀR_cΩ̇_c), Ω̂ being the cross product with Ω, and less the
-    moment of the rotor drag that is cancelled, which acts at the height of the rotors, and that of the
-    known ``disturbance``.
+    M = −k_R e_R − k_Ω e_Ω + Ω×JΩ − J(Ω̂RᵀR_cΩ_c − RᵀR_cΩ̇_c), Ω̂ being the cross product with Ω, less the
+    moment of the cancelled rotor drag, which acts at the height of the rotors, and that of the known
+    ``disturbance``.
     """
     f, A = desired_force(position, velocity, acceleration, axes, rates, target, disturbance[0], airframe)
     nose = limited_nose(yaw, axes, airframe)

@@ -1,4 +1,4 @@
-"""Vectors with their first two derivatives in time."""
+"""Vectors with their first two time derivatives."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ WithRates = tuple[Vector, Vector, Vector]
 
 @kernel
 def unit_with_rates(x: WithRates) -> WithRates:
-    """u = x/‖x‖ with its first two derivatives, from those of x."""
+    """Return u = x/‖x‖ with its first two derivatives, from those of x."""
     s = 1.0 / norm(x[0])
     u, a, b = times(s, x[0]), times(s, x[1]), times(s, x[2])
     growth = dot(u, a)
@@ -22,7 +22,7 @@ def unit_with_rates(x: WithRates) -> WithRates:
 
 @kernel
 def across_with_rates(x: WithRates, u: WithRates) -> WithRates:
-    """The part of x that is normal to a unit vector u, x − (u·x) u, with its first two derivatives."""
+    """Return the part of x normal to a unit vector u, x − (u·x) u, with its first two derivatives."""
     along = dot(u[0], x[0])
     dalong = dot(u[1], x[0]) + dot(u[0], x[1])
     ddalong = dot(u[2], x[0]) + 2.0 * dot(u[1], x[1]) + dot(u[0], x[2])
@@ -35,7 +35,7 @@ def across_with_rates(x: WithRates, u: WithRates) -> WithRates:
 
 @kernel
 def cross_with_rates(a: WithRates, b: WithRates) -> WithRates:
-    """a×b with its first two derivatives, from those of both."""
+    """Return a×b with its first two derivatives, from those of both."""
     return (
         cross(a[0], b[0]),
         plus(cross(a[1], b[0]), 1.0, cross(a[0], b[1])),

@@ -1,4 +1,4 @@
-"""The surroundings: gravity and the ground. The wind comes with each command."""
+"""Ground contact and gravity. The wind is part of each command."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ GRAVITY = 9.80665
 """Standard gravity, m/s²."""
 
 _RIGHTING_TIME = 0.1
-"""How fast the gear brings a tilted vehicle flat on the ground (s)."""
+"""Time constant with which the gear levels a tilted vehicle on the ground (s)."""
 _TIPPED = 0.5
 """Cosine of the tilt beyond which the vehicle lies on its side and stays so."""
 _FLAT = 1e-9
-"""Tilt (rad) that counts as flat."""
+"""Tilt (rad) that counts as level."""
 
 
 @kernel
 def ground_contact(before: Motion, after: Motion, ground: float, airframe: Airframe) -> tuple[Motion, bool]:
-    """Amend a free step from ``before`` to ``after`` where it ran into the plane z = ``ground`` (m, NED).
+    """Correct a free step from ``before`` to ``after`` if it crossed the plane z = ``ground`` (m, NED).
 
     Returns the motion and whether the vehicle stood on the ground. The ground stops the fall without a
-    bounce; the impulse that it needs for that bounds, by Coulomb's law, the friction against sliding and
-    turning, and through the radius of the gear the impulse that holds the vehicle flat. So a vehicle lifts
-    off as soon as thrust exceeds weight, and one at rest stays where it is to the last bit, because it is
-    moved by its velocities after contact.
+    bounce. The impulse required for that limits, by Coulomb's law, the friction against sliding and turning,
+    and, through the radius of the gear, the impulse that keeps the vehicle level. So a vehicle lifts off as
+    soon as thrust exceeds weight, and one at rest keeps its position to the last bit, because its velocities
+    after contact move it.
     """
     floor = ground - airframe.rest_height
     position, velocity, attitude, rates = after
@@ -55,7 +55,7 @@ def ground_contact(before: Motion, after: Motion, ground: float, airframe: Airfr
 
 @kernel
 def _stood(before: Motion, after: Motion, floor: float, airframe: Airframe) -> Motion:
-    """The motion at the end of a step that the ground amends."""
+    """Return the motion at the end of a step corrected by the ground."""
     _, velocity, _, rates = after
     fall = velocity[2]
     friction = airframe.ground_friction * fall
@@ -81,7 +81,7 @@ def _stood(before: Motion, after: Motion, floor: float, airframe: Airframe) -> M
 
 @kernel
 def _part_left(size: float, taken: float) -> float:
-    """What is left, as a part, of something of this size when as much as ``taken`` is taken away."""
+    """Return the remaining part of a quantity ``size`` after ``taken`` is subtracted, at least 0."""
     return where(size > taken, 1.0 - taken / size, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""A simulated multirotor with its controller: reference in, true motion out."""
+"""Simulated multirotor with its controller: reference in, true motion out."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ZERO.flags.writeable = False
 
 
 class Reference(NamedTuple):
-    """What a vehicle shall follow from now on; it is extrapolated with all the derivatives it gives."""
+    """Motion to follow from now on, extrapolated with all given derivatives."""
 
     position: FloatArray  # (3,) m, NED
     velocity: FloatArray = _ZERO  # (3,) m/s, NED
@@ -33,11 +33,11 @@ class Reference(NamedTuple):
 
     @classmethod
     def hover(cls, position: ArrayLike, yaw: float = 0.0) -> Self:
-        """Stay at a position (3,) (m, NED) with a heading (rad)."""
+        """Return the reference that holds a position (3,) (m, NED) with a heading (rad)."""
         return cls(np.asarray(position, dtype=np.float64), yaw=yaw)
 
     def ahead(self, elapsed: int) -> Self:
-        """The same motion ``elapsed`` µs on, by its Taylor polynomial."""
+        """Return the same motion ``elapsed`` µs later, by its Taylor polynomial."""
         t = elapsed * 1e-6
         x, v, a, j, s, yaw, yaw_rate, yaw_acceleration = self
         return self._replace(
@@ -51,7 +51,7 @@ class Reference(NamedTuple):
 
 
 class VehicleState(NamedTuple):
-    """The true state of a vehicle; own copies."""
+    """True state of a vehicle; own copies."""
 
     position: FloatArray  # (3,) m, NED
     velocity: FloatArray  # (3,) m/s, NED
@@ -59,11 +59,11 @@ class VehicleState(NamedTuple):
     body_rates: FloatArray  # (3,) rad/s, FRD
     rotor_speeds: FloatArray  # (n,) rad/s
     acceleration: FloatArray  # (3,) m/s², NED, mean of the last physics step; 0 at rest
-    learnt_force: FloatArray = _ZERO  # (3,) N, NED, what the controller counters of wind and faults
+    learnt_force: FloatArray = _ZERO  # (3,) N, NED, learnt disturbance that the controller counters
 
 
 class NotFiniteError(ValueError):
-    """A reference or a wind that is not finite; the vehicle has not moved."""
+    """Reference or wind that is not finite; the vehicle has not moved."""
 
 
 def initial_states(
@@ -75,10 +75,11 @@ def initial_states(
     hovering: bool = False,
     gravity: float = GRAVITY,
 ) -> FloatArray:
-    """State rows (K, STATE_SIZE + 2 n) of vehicles at rest, motors off or, when ``hovering``, at hover speed.
+    """Return state rows (K, STATE_SIZE + 2 n) of vehicles at rest.
 
-    Positions (K, 3) in m, NED; yaws (K,) in rad; ``ground`` is the NED z (m). Who starts on the ground or
-    below it is put on its gear there, or, as it cannot hover there, refused with a ValueError.
+    The motors are off or, if ``hovering``, at hover speed. Positions (K, 3) in m, NED; yaws (K,) in rad;
+    ``ground`` is the NED z (m). A vehicle on or below the ground is placed on its gear there. Raises
+    ValueError if it should hover there.
     """
     places = np.atleast_2d(np.asarray(positions, dtype=np.float64))
     half_yaws = 0.5 * np.asarray(yaws, dtype=np.float64)
@@ -103,7 +104,7 @@ def initial_states(
 def command_row(
     reference: Reference | None, *, idle: bool = False, wind: ArrayLike = _ZERO, ground: float = 0.0
 ) -> FloatArray:
-    """The command row (COMMAND_SIZE,) for ``advance_many``; arguments as for ``Vehicle``."""
+    """Return the command row (COMMAND_SIZE,) for ``advance_many``; arguments as for ``Vehicle``."""
     row = np.zeros(COMMAND_SIZE)
     write_command(row, reference, idle, wind, ground)
     return row
@@ -125,7 +126,7 @@ def write_command(
 def advance_many(
     states: FloatArray, commands: FloatArray, airframes: NDArray[np.void], steps: int
 ) -> FloatArray:
-    """Advance K vehicles of one type in place; the positions (K, steps, 3) after each physics step.
+    """Advance K vehicles of one type in place; return the positions (K, steps, 3) after each physics step.
 
     ``states`` (K, STATE_SIZE + 2 n) and ``commands`` (K, COMMAND_SIZE) are rows as in ``pipeline``,
     C-contiguous float64; ``airframes`` comes from ``airframe_record``. Each vehicle moves exactly, to the
@@ -139,14 +140,17 @@ def advance_many(
 
 
 def state_of(row: FloatArray) -> VehicleState:
-    """The state that a state row (STATE_SIZE + 2 n,) tells of; own copies."""
+    """Return the state in a state row (STATE_SIZE + 2 n,); own copies."""
     row = row.copy()
     motors, left = row[STATE_SIZE:].reshape(2, -1)
     return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], motors * left, row[13:16], row[20:23])
 
 
 def checked_rotor(config: VehicleConfig, index: int, left: float) -> None:
-    """Raises IndexError for a rotor that the vehicle has not, ValueError for a part that is not 0 to 1."""
+    """Check the arguments of a rotor failure.
+
+    Raises IndexError if the vehicle has no such rotor, ValueError if ``left`` is not 0 to 1.
+    """
     n = len(config.rotors)
     if not 0 <= index < n:
         raise IndexError(f"rotor {index} of {config.name}: its rotors are 0 to {n - 1}")
@@ -155,7 +159,7 @@ def checked_rotor(config: VehicleConfig, index: int, left: float) -> None:
 
 
 class Vehicle:
-    """One vehicle over flat ground, moved by our own physics."""
+    """One vehicle over flat ground, with our own physics."""
 
     def __init__(
         self,
@@ -167,10 +171,10 @@ class Vehicle:
         *,
         hovering: bool = False,
     ) -> None:
-        """At rest, motors off, or in the air at hover speed when ``hovering``.
+        """Start at rest with motors off, or in the air at hover speed if ``hovering``.
 
         ``position`` (3,) and the z of the ``ground`` in m, NED, ``yaw`` in rad, ``gravity`` in m/s². Raises
-        ValueError for a position to hover at that is not above the ground.
+        ValueError for a hover position that is not above the ground.
         """
         self.config = config
         self._airframe = airframe_record(airframe(config, gravity))
@@ -183,28 +187,27 @@ class Vehicle:
     def advance(
         self, steps: int, reference: Reference | None, wind: ArrayLike = _ZERO, *, idle: bool = False
     ) -> FloatArray:
-        """Advance by ``steps`` physics steps; the true positions (steps, 3) (m, NED) after each of them.
+        """Advance by ``steps`` physics steps; return the true positions (steps, 3) (m, NED) after each.
 
-        The reference holds for the beginning of the first step. None stops the motors, or with ``idle``
-        leaves them turning slowly. ``wind`` (3,) is the velocity of the air (m/s, NED). Raises
-        NotFiniteError.
+        The reference is valid at the beginning of the first step. None stops the motors, or with ``idle``
+        lets them turn slowly. ``wind`` (3,) is the velocity of the air (m/s, NED). Raises NotFiniteError.
         """
         write_command(self._command, reference, idle, wind, self._ground)
         track: FloatArray = advance_many(self._states, self._commands, self._airframe, steps)[0]
         return track
 
     def fail_rotor(self, index: int, left: float) -> None:
-        """From now on the rotor ``index`` (0…n−1) turns at the part ``left`` (0…1) of its motor's speed.
+        """Limit the rotor ``index`` (0…n−1) to the fraction ``left`` (0…1) of its motor's speed from now on.
 
-        Its thrust and its torques fall with the square. Nothing tells the controller. Raises IndexError and
-        ValueError.
+        Its thrust and its torques decrease with the square. The controller receives no indication. Raises
+        IndexError and ValueError.
         """
         checked_rotor(self.config, index, left)
         self._left[index] = left
 
     @property
     def state(self) -> VehicleState:
-        """The true state after the last step."""
+        """True state after the last step."""
         return state_of(self._state)
 
     @property

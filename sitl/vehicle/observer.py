@@ -1,9 +1,9 @@
-"""The disturbance observer: what pushes and turns the vehicle that the controller has not reckoned with.
+"""Disturbance observer: the force and moment on the vehicle that the controller has not accounted for.
 
-What an inertial unit feels (specific force, and angular acceleration by Euler's equation) less what sound
-rotors at these motor speeds would give in still air. What is left, a wind, a failed rotor, a wrong mass, goes
-through a low-pass of first order and is what the controller then counters. It is no integral of the error, so
-it does not wind up: a limit that keeps the rotors from doing what is wanted is no disturbance.
+It takes the measurement of an inertial unit (specific force, and angular acceleration by Euler's equation)
+less the values of intact rotors at these motor speeds in still air. The rest (a wind, a failed rotor, a wrong
+mass) passes a first-order low-pass and is then countered by the controller. It is no integral of the error,
+so it does not wind up: a limit that keeps the rotors from producing the requested wrench is no disturbance.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Disturbance = tuple[Vector, Vector]
 
 @kernel
 def drag_moment(velocity: Vector, yaw_rate: float, airframe: Airframe) -> Vector:
-    """The moment (N m, body) that cancels what rotor drag does at a velocity (m/s, body) in still air."""
+    """Return the moment (N m, body) that cancels rotor drag at a velocity (m/s, body) in still air."""
     low, roll = airframe.cancelled_drag_arm, airframe.cancelled_rolling
     return (
         roll * velocity[0] - low * velocity[1],
@@ -45,11 +45,11 @@ def observed(
     axes: Axes,
     airframe: Airframe,
 ) -> Disturbance:
-    """The disturbance after a physics step, from the one ``known`` before it.
+    """Return the disturbance after a physics step, from the one ``known`` before it.
 
-    ``force`` (N) and ``moment`` (N m) are those felt in the step, ``sound_thrust`` (N) and ``sound_moment``
-    those of sound rotors, ``velocity`` (m/s) and ``rates`` (rad/s) those of the vehicle, all in body axes;
-    ``axes`` takes them to NED.
+    ``force`` (N) and ``moment`` (N m) are those measured in the step, ``sound_thrust`` (N) and
+    ``sound_moment`` those of intact rotors, ``velocity`` (m/s) and ``rates`` (rad/s) those of the vehicle,
+    all in body axes; ``axes`` takes them to NED.
     """
     D = airframe.cancelled_drag
     strange = (force[0] + D * velocity[0], force[1] + D * velocity[1], force[2] + sound_thrust)

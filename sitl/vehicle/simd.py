@@ -1,14 +1,15 @@
-"""Numbers for the kernels that are one double, or eight: the lanes of eight vehicles side by side.
+"""Lanes: numbers of the kernels that are one double, or eight for eight vehicles side by side.
 
 A kernel is compiled for ``float`` and, for a block of vehicles, for *lanes*: a vector of eight doubles that
-the machine's wide registers calculate at once. The same text gives both, every operation on a lane is the
-IEEE operation on a double, and nothing is reordered or fused, so a vehicle moves in a block as alone, to the
-bit. For lanes a condition is eight conditions, hence a kernel chooses with ``where`` instead of branching;
-rare work may stand behind ``if some(...)``, as long as ``where`` leaves alone the lanes that do not need it.
+the machine's wide registers process at once. Both come from the same source, every operation on a lane is the
+IEEE operation on a double, and nothing is reordered or fused, so a vehicle moves in a block exactly as alone,
+to the bit. For lanes a condition is eight conditions, hence a kernel selects with ``where`` instead of
+branching; rare work may stand behind ``if some(...)``, provided that ``where`` leaves the other lanes
+unchanged.
 
-The annotations of the kernels say ``float`` for both. Constants are written as floats. A *row* (C,) holds
-the numbers of one vehicle, a *block* (C, LANES) those of eight; both are C-contiguous, and no index is
-checked. The bodies here are what the functions mean; ``lanes_compiled`` says how they are compiled.
+The annotations of the kernels say ``float`` for both. Constants are written as floats. A *row* (C,) holds the
+numbers of one vehicle, a *block* (C, LANES) those of eight; both are C-contiguous, and no index is checked.
+The bodies here define the meaning of the functions; ``simd_compiled`` defines their compilation.
 """
 
 from __future__ import annotations
@@ -23,36 +24,36 @@ LANES: Final = 8
 
 
 def where(condition: bool, a: float, b: float) -> float:
-    """``a`` in the lanes where the condition holds, else ``b``; both are calculated."""
+    """Return ``a`` in the lanes where the condition holds, else ``b``; both are evaluated."""
     return a if condition else b
 
 
 def some(condition: bool) -> bool:
-    """Whether the condition holds in any lane."""
+    """Return whether the condition holds in any lane."""
     return condition
 
 
 def nearest(x: float) -> float:
-    """The integer nearest to ``x``, the even one halfway, as a float."""
+    """Return the integer nearest to ``x`` as a float; halfway, the even one."""
     return float(round(x))
 
 
 def at(row: FloatArray, column: int) -> float:
-    """A column of a row, or the lanes of a block's."""
+    """Return a column of a row, or the lanes of a block's column."""
     value: float = row[column]
     return value
 
 
 def put(row: FloatArray, column: int, value: float) -> None:
-    """Set what ``at`` reads."""
+    """Set the value that ``at`` reads."""
     row[column] = value
 
 
 def three_at(row: FloatArray, column: int) -> tuple[float, float, float]:
-    """Three columns from ``column`` on."""
+    """Return three columns from ``column`` on."""
     return (row[column], row[column + 1], row[column + 2])
 
 
 def put_three(row: FloatArray, column: int, value: tuple[float, float, float]) -> None:
-    """Set what ``three_at`` reads."""
+    """Set the values that ``three_at`` reads."""
     row[column], row[column + 1], row[column + 2] = value

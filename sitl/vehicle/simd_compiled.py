@@ -1,7 +1,7 @@
-"""How numba compiles ``lanes``: a type for eight doubles, one for eight conditions, and what works on them.
+"""Compilation of ``simd`` by numba: types for eight doubles and for eight conditions, and their operations.
 
 Every lowering is one instruction of LLVM on the whole vector, or a load or a store. Importing this module
-makes it known to numba; its names are for nobody.
+registers it with numba; its names are private.
 """
 # numba has no types, and hands over more than a lowering needs:
 # mypy: allow-untyped-calls, allow-untyped-decorators, allow-subclassing-any
@@ -28,28 +28,32 @@ _BITS: Final = ir.VectorType(ir.IntType(1), LANES)
 
 
 class _Lanes(types.Type):
-    """Eight doubles. A float becomes eight times itself."""
+    """Eight doubles. A float is broadcast."""
 
     def __init__(self) -> None:
         super().__init__(name="Lanes")
 
     def can_convert_from(self, context: Any, other: Any) -> Any:
+        """Return a safe conversion from float64, or None."""
         return Conversion.safe if other == types.float64 else None
 
     def unify(self, context: Any, other: Any) -> Any:
+        """Return this type for a pair with float64, or None."""
         return self if other == types.float64 else None
 
 
 class _Mask(types.Type):
-    """Eight conditions. A single one becomes eight times itself."""
+    """Eight conditions. A single one is broadcast."""
 
     def __init__(self) -> None:
         super().__init__(name="Mask")
 
     def can_convert_from(self, context: Any, other: Any) -> Any:
+        """Return a safe conversion from boolean, or None."""
         return Conversion.safe if other == types.boolean else None
 
     def unify(self, context: Any, other: Any) -> Any:
+        """Return this type for a pair with boolean, or None."""
         return self if other == types.boolean else None
 
 
@@ -77,7 +81,7 @@ def _broadcast(context: Any, builder: Any, given: Any, wanted: Any, value: Any) 
 
 
 def _typed(function: Any, result: Any, arguments: int) -> None:
-    """Say that ``function`` of some lanes gives ``result``; floats among its arguments are broadcast."""
+    """Declare that ``function`` of some lanes gives ``result``; floats among its arguments are broadcast."""
 
     class Rule(AbstractTemplate):
         def generic(self, given: Any, keywords: Any) -> Any:
@@ -91,7 +95,7 @@ def _typed(function: Any, result: Any, arguments: int) -> None:
 
 
 def _exactly(function: Any, result: Any, *arguments: Any) -> None:
-    """Say that ``function`` of just these types gives ``result``."""
+    """Declare that ``function`` of exactly these types gives ``result``."""
 
     class Rule(AbstractTemplate):
         def generic(self, given: Any, keywords: Any) -> Any:
@@ -101,7 +105,7 @@ def _exactly(function: Any, result: Any, *arguments: Any) -> None:
 
 
 def _instruction(name: str, *before: str) -> Any:
-    """A lowering that is one instruction of the builder on the values, and on what comes ``before``."""
+    """Return a lowering to one instruction of the builder on ``before`` and the values."""
 
     def lower(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         return getattr(builder, name)(*before, *values)
@@ -110,7 +114,7 @@ def _instruction(name: str, *before: str) -> Any:
 
 
 def _intrinsic(name: str) -> Any:
-    """A lowering that is one of LLVM's intrinsics, which keeps the type."""
+    """Return a lowering to one of LLVM's intrinsics, which keeps the type."""
 
     def lower(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         kind = values[0].type
@@ -179,14 +183,14 @@ def _some(context: Any, builder: Any, sig: Any, values: Any) -> Any:
 
 
 def _column(kind: Any) -> Any:
-    """What one column of a row or a block holds."""
+    """Return the type of one column of a row or a block, or None for other types."""
     if not isinstance(kind, types.Array) or kind.dtype != types.float64 or kind.layout != "C":
         return None
     return {1: types.float64, 2: _lanes}.get(kind.ndim)
 
 
 def _reading(function: Any, count: int) -> None:
-    """Say that ``function`` of a row or block and a column gives ``count`` columns."""
+    """Declare that ``function`` of a row or block and a column gives ``count`` columns."""
 
     class Rule(AbstractTemplate):
         def generic(self, given: Any, keywords: Any) -> Any:
@@ -206,7 +210,7 @@ def _reading(function: Any, count: int) -> None:
 
 
 def _writing(function: Any, count: int) -> None:
-    """Say that ``function`` of a row or block, a column and a value sets ``count`` columns."""
+    """Declare that ``function`` of a row or block, a column and a value sets ``count`` columns."""
 
     class Rule(AbstractTemplate):
         def generic(self, given: Any, keywords: Any) -> Any:
@@ -229,7 +233,7 @@ def _writing(function: Any, count: int) -> None:
 
 
 def _places(context: Any, builder: Any, kind: Any, array: Any, column: Any, count: int) -> list[Any]:
-    """The addresses of ``count`` columns."""
+    """Return the addresses of ``count`` columns."""
     data = make_array(kind)(context, builder, array).data
     width = 1 if kind.ndim == 1 else LANES
     first = builder.mul(column, ir.Constant(column.type, width))

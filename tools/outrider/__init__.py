@@ -1,0 +1,1 @@
+"""Command line of outrider: takes configuration, logs and links; gives flights, runs and reports."""

@@ -1,4 +1,4 @@
-"""The command ``outrider``: all its commands, and what becomes of what goes wrong in them."""
+"""The command ``outrider``: all its sub-commands, and the exit status and message of each failure."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ app = typer.Typer(
 )
 BAD_INPUT, FAULT = 2, 3
 _INTERRUPTED = 130
-"""What typer makes of Ctrl-C."""
+"""Exit status that typer returns for Ctrl-C."""
 _EXTRAS: Final = {
     "numba": "sitl",
     "llvmlite": "sitl",
@@ -33,14 +33,14 @@ _EXTRAS: Final = {
     "dask": "cluster",
     "distributed": "cluster",
 }
-"""What only an extra of the package installs."""
-# Click's UsageError: typer has no name of its own for it, and newer ones bring their own click.
+"""Packages that only an extra installs, and the name of that extra."""
+# Click's UsageError: typer has no name of its own for it, and newer versions bring their own click.
 _UsageError: Final = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 
 
 @app.callback()
 def _root() -> None:
-    """Keeps every command a sub-command."""
+    """Keep every command a sub-command."""
 
 
 for _command in (swarm, view, sitl, doctor, fly, sweep, paper, gallery, replay, export, report, key, bench):
@@ -48,8 +48,10 @@ for _command in (swarm, view, sitl, doctor, fly, sweep, paper, gallery, replay, 
 
 
 def main() -> None:
-    """Run the command line: bad input ends with status 2 and one line for each fault, never with a
-    traceback."""
+    """Run the command line.
+
+    Bad input ends with status 2 and one line for each fault, never with a traceback.
+    """
     from mavlink_bridge.errors import BridgeError
 
     try:
@@ -71,7 +73,7 @@ def main() -> None:
         sys.stderr.write(f"outrider: {error}\n")
         sys.exit(FAULT)
     except Exception as error:
-        # A fault of ours must not look like a collision, which has status 1.
+        # An internal fault must not look like a collision, which has status 1.
         if os.environ.get("OUTRIDER_TRACEBACK"):
             raise
         sys.stderr.write(f"outrider: {_words(error)}\n")
@@ -83,7 +85,7 @@ def main() -> None:
 
 
 def _words(error: Exception) -> str:
-    """What went wrong, and what to do."""
+    """Return what went wrong, and the remedy."""
     if isinstance(error, ModuleNotFoundError):
         package = (error.name or "").partition(".")[0]
         if package in _EXTRAS:

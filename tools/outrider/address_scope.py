@@ -1,4 +1,4 @@
-"""Which endpoints leave this machine."""
+"""Test whether an endpoint is reachable from outside this machine."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from mavlink_bridge.links.endpoints import Endpoint, Multicast, TcpIn, TcpOut, U
 
 
 def exposed(endpoint: Endpoint) -> bool:
-    """Whether others than this machine can come by it, or hear it. A name is taken for another machine."""
+    """Return whether other machines can reach the endpoint or receive its data.
+
+    A host name other than ``localhost`` counts as another machine.
+    """
     match endpoint:
         case UdpIn() | TcpIn() | UdpOut() | TcpOut():
             return not _loopback(endpoint.host)

@@ -1,4 +1,4 @@
-"""What the command line raises. Every error says which exit status the process ends with."""
+"""Exceptions of the command line; each determines the exit status of the process."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from typing import ClassVar, NamedTuple
 
 
 class OutriderError(Exception):
-    """Base of every error of ``outrider``; what is not further named is a fault of ours."""
+    """Base class of every error of ``outrider``; without a subclass it is an internal fault."""
 
     exit_status: ClassVar[int] = 3
 
 
 class Fault(NamedTuple):
-    """One thing that is wrong with an input. ``line`` and ``column`` count from 1; without, it is the whole.
+    """One fault of an input.
 
-    ``what`` says what is wrong, what is allowed, and the nearest valid word if there is one.
+    ``line`` and ``column`` count from 1; None: the fault concerns the whole input. ``what`` states what is
+    wrong, what is allowed, and the nearest valid word if there is one.
     """
 
     where: str
@@ -28,9 +29,10 @@ class Fault(NamedTuple):
 
 
 class InputError(OutriderError):
-    """What the user gave cannot be used. The message is one line for each fault, in the order of the file.
+    """Unusable input of the user.
 
-    A fault that is no part of a file (an argument) is a plain text.
+    The message is one line for each fault, in the order of the file. A fault that is not part of a file (an
+    argument) is a plain text.
     """
 
     exit_status = 2
@@ -44,5 +46,5 @@ class InputError(OutriderError):
 
 
 def _one_line(text: str) -> str:
-    """``text`` with whatever would break a line or steer a terminal written as an escape."""
+    """Return ``text`` with each character that would break a line or control a terminal as an escape."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end what is being done with a sentence instead of silence, or are noted."""
+"""Handling of Ctrl-C and SIGTERM: they end the current work with a message, or are recorded."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from outrider.errors import OutriderError
 
 @contextmanager
 def interruptible(left: str) -> Iterator[None]:
-    """Inside it SIGTERM is as good as Ctrl-C: files are closed, and OutriderError says what is ``left``. In
-    another thread than the main one signals stay as they are."""
+    """Handle SIGTERM inside the context like Ctrl-C: files are closed, and OutriderError reports ``left``.
+
+    In a thread other than the main one the signal handlers stay unchanged.
+    """
 
     def stop(_signal: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt
@@ -34,7 +36,7 @@ def interruptible(left: str) -> Iterator[None]:
 
 
 class Came(NamedTuple):
-    """A signal, and when (s of the monotonic clock)."""
+    """A received signal, and its time (s of the monotonic clock)."""
 
     which: int
     at: float
@@ -42,7 +44,7 @@ class Came(NamedTuple):
 
 @contextmanager
 def noted(signals: Sequence[signal.Signals]) -> Iterator[list[Came]]:
-    """Those of ``signals`` that have come, and would otherwise have ended the process."""
+    """Record those of ``signals`` that arrive instead of letting them end the process."""
     came: list[Came] = []
 
     def note(which: int, _frame: FrameType | None) -> None:
@@ -57,8 +59,10 @@ def noted(signals: Sequence[signal.Signals]) -> Iterator[list[Came]]:
 
 
 def insisted(came: Sequence[Came]) -> bool:
-    """Whether somebody asked again. Who signals a group of processes is heard twice in a moment: that is
-    one."""
+    """Return whether a stop was requested again.
+
+    A signal to a group of processes may arrive twice within a moment; that counts as one request.
+    """
     return bool(came) and any(one.at - came[0].at >= _AGAIN for one in came)
 
 

@@ -1,4 +1,4 @@
-"""Key files on the command line: what is wrong with one is bad input."""
+"""Key files on the command line; a fault of one is bad input."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from outrider.errors import InputError
 
 
 def key_of(path: Path) -> Key:
-    """The key in a file. InputError if there is none, or if others may read it."""
+    """Return the key in a file; raise InputError if there is none, or if others may read it."""
     try:
         return read_key(path)
     except KeyFileError as error:
@@ -18,7 +18,7 @@ def key_of(path: Path) -> Key:
 
 
 def new_key(path: Path) -> str:
-    """A new key in a new file, and what there is to say of it. InputError if it cannot be made."""
+    """Create a key in a new file, and return the message for the user; raise InputError if that fails."""
     try:
         key = create_key(path)
     except KeyFileError as error:

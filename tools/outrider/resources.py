@@ -1,5 +1,4 @@
-"""Where the shipped configuration lies, in a checkout and in an installed wheel, and how a name becomes a
-file."""
+"""Location of the shipped configuration, in a checkout and in an installed wheel."""
 
 from __future__ import annotations
 
@@ -10,17 +9,17 @@ from outrider.errors import InputError
 
 
 def config_root() -> Path:
-    """The folder with ``vehicles``, ``scenarios``, ``companions`` and ``logs``."""
+    """Return the folder with ``vehicles``, ``scenarios``, ``companions`` and ``logs``."""
     here = Path(__file__).resolve().parent
     installed = here / "config"
     return installed if installed.is_dir() else here.parents[1] / "config"
 
 
 def find(kind: str, name: str) -> Path:
-    """The file that ``name`` means: a path, or the name of a shipped file of ``kind`` (a folder of the
-    configuration).
+    """Return the file for ``name``: a path, or the name of a shipped file of ``kind``.
 
-    InputError that lists what is there, and the nearest, when it is neither.
+    ``kind`` is a folder of the configuration. Raises InputError with the available names and the nearest one
+    if ``name`` is neither.
     """
     folder = config_root() / kind
     shipped = {path.stem: path for path in sorted(folder.glob("*.yaml"))}

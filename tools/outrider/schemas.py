@@ -1,6 +1,6 @@
 """JSON Schemas of the configuration, for editors: ``python -m outrider.schemas config/schemas`` writes them.
 
-A shipped file names its schema in its first line; `schema_line` says how.
+A shipped file names its schema in its first line, which `schema_line` composes.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ SCHEMAS: list[tuple[str, type[BaseModel]]] = [
     ("sweep", Sweep),
     ("scene", Scene),
 ]
-"""The name of each schema file, and the model that it is made from."""
+"""The name of each schema file, and the model from which it is made."""
 
 
 def schema(model: type[BaseModel]) -> dict[str, Any]:
-    """The JSON Schema of what may stand in a file of ``model``."""
+    """Return the JSON Schema of the files of ``model``."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema()}
 
 
 def text(model: type[BaseModel]) -> str:
-    """The schema file's content: the same model gives the same bytes."""
+    """Return the content of the schema file; the same model gives the same bytes."""
     return json.dumps(schema(model), indent=2, ensure_ascii=False) + "\n"
 
 
 def schema_line(file: Path, schemas: Path, name: str) -> str:
-    """The first line of ``file``: where, seen from it, ``schemas`` holds the schema ``name``."""
+    """Return the first line of ``file``, with the path from it to the schema ``name`` in ``schemas``."""
     target = relpath(schemas / f"{name}.json", file.parent).replace("\\", "/")
     return f"# yaml-language-server: $schema={target}"
 
 
 def write(folder: Path) -> list[Path]:
-    """Write every schema into ``folder``; returns the files."""
+    """Write every schema into ``folder`` and return the files."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name, model in SCHEMAS:

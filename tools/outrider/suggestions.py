@@ -1,4 +1,4 @@
-"""The nearest valid word to a mistyped one."""
+"""Suggestion of the valid word nearest to a mistyped one."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from difflib import get_close_matches
 from pathlib import Path
 
 LONGEST_WORD = 60
-"""Characters. What is longer is no mistyped word, and comparing it would take long."""
+"""Characters. A longer text is no mistyped word, and comparing it would take long."""
 
 
 def nearest(word: str, valid: Iterable[str]) -> str | None:
-    """The word of ``valid`` most like ``word`` whatever its case, or None if nothing is alike."""
+    """Return the word of ``valid`` most like ``word`` regardless of case, or None if none is alike."""
     if len(word) > LONGEST_WORD:
         return None
     by_folded = {candidate.casefold(): candidate for candidate in valid if len(candidate) <= LONGEST_WORD}
@@ -20,13 +20,13 @@ def nearest(word: str, valid: Iterable[str]) -> str | None:
 
 
 def did_you_mean(word: str, valid: Iterable[str]) -> str:
-    """``; did you mean 'x'?``, or nothing."""
+    """Return ``; did you mean 'x'?``, or an empty string."""
     found = nearest(word, valid)
     return "" if found is None else f"; did you mean {found!r}?"
 
 
 def neighbours(path: Path, suffixes: tuple[str, ...] = (".yaml", ".yml"), most: int = 8) -> list[str]:
-    """What there is where ``path`` is not: the file most like it first, then others with such a suffix."""
+    """Return existing files near the missing ``path``: the most similar first, then others by suffix."""
     try:
         names = sorted(entry.name for entry in path.parent.iterdir())
     except OSError:

@@ -1,6 +1,7 @@
-"""Companions on vehicles of ``outrider sitl`` or of simulations of real firmware, through what may happen to
-them; no part of the wheel.
+"""Trials of companions: take a plan, fly its story on vehicles, give a verdict; no part of the wheel.
 
-plan: what is asked → stage: vehicles, companions, hub, target, observer and station, turned in one loop →
-mishaps or sortie: what happens, act by act → separation, score and verdict: what came of it.
+The vehicles are those of ``outrider sitl`` or of simulations of real firmware. ``plan`` is the request.
+``stage`` holds vehicles, companions, hub, target, observer and station, and steps them in one loop.
+``mishaps`` and ``sortie`` are the stories, act by act. ``separation``, ``score`` and ``verdict`` evaluate the
+flight.
 """

@@ -1,4 +1,4 @@
-"""``python -m trials``: one trial, with a line for each act; exit status 1 if it was not passed."""
+"""Command ``python -m trials``: flies one trial, with a line per act; exit status 1 if it is not passed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _TELLERS = {MISHAPS: mishaps, SORTIE: sortie}
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """The exit status."""
+    """Run the command with arguments ``words`` and return the exit status."""
     parser = argparse.ArgumentParser(prog="make trial ARGS=…", description=__doc__)
     parser.add_argument(
         "--story",
@@ -73,7 +73,7 @@ def planned(
     texts: Sequence[str],
     origin: str | None,
 ) -> Plan:
-    """What the options ask for. InputError for what does not go together."""
+    """Return the plan that the options describe. Raises InputError for options that exclude each other."""
     flown = autopilots(texts) if texts else ()
     story = story or (SORTIE if flown else MISHAPS)
     if flown and flavour is not None:
@@ -102,7 +102,10 @@ def _origin(text: str) -> Origin:
 
 
 def trial(plan: Plan, directory: Path) -> dict[str, Any]:
-    """What came of it; a line for each act on standard error, and on a terminal the time."""
+    """Fly the trial and return the verdict.
+
+    Each act gives a line on standard error; a terminal also shows the time.
+    """
     trouble = None
     with Progress(plan) as progress:
         stage = Stage(plan, directory, progress)
@@ -120,7 +123,7 @@ def trial(plan: Plan, directory: Path) -> dict[str, Any]:
 
 
 def _keep(stage: Stage, directory: Path) -> None:
-    """All events in one file, in the order of the trial's time, and all ways flown."""
+    """Write all events to one file, in the order of the trial's time, and all tracks to another."""
     if stage.observer.ready:
         ways = {
             f"{name}_{system}": values

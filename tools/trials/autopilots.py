@@ -1,5 +1,4 @@
-"""What flies in a trial beside the emulation: simulations of real firmware, to be started or running already,
-as ``--autopilots`` names them."""
+"""Simulations of real firmware, to be started or already running, as ``--autopilots`` names them."""
 
 from __future__ import annotations
 
@@ -14,18 +13,18 @@ from mavlink_bridge.links.endpoints import TcpOut, UdpIn, UdpOut, parse_endpoint
 from outrider.errors import InputError
 
 FEWEST, MOST = 2, 9
-"""Vehicles of a trial."""
+"""Smallest and largest number of vehicles of a trial."""
 USUAL: Final = 5
-"""How many are started of a program when nothing is said."""
+"""Number of instances of a program that are started by default."""
 PROGRAMS: Final = {"arducopter": "ardupilot", "px4": "px4"}
-"""Names of programs, and the flavour that they are."""
+"""Names of programs, and the flavour of each."""
 _PROGRAM = re.compile(r"(?:([^*:/]*)\*)?(arducopter|px4):(.*)", re.DOTALL)
 _NEXT = re.compile(r",(?=(?:ardupilot=|px4=)?(?:[a-z]+:|/))")
 _FLAVOUR = re.compile(r"(ardupilot|px4)=(.*)", re.DOTALL)
 _SERIAL1: Final = 2
-"""ArduPilot's SERIAL1 listens so many TCP ports above SERIAL0."""
+"""Offset from the TCP port of ArduPilot's SERIAL0 to that of its SERIAL1."""
 _GROUND: Final = 14550
-"""UDP port to which every PX4 speaks as to a ground station."""
+"""UDP port to which every PX4 sends as to a ground station."""
 _FORMS: Final = (
     "allowed are arducopter:PATH ARGUMENTS, px4:PATH, each with a number before it (3*arducopter:PATH),"
     " and endpoints of simulations that run: tcp:127.0.0.1:5760,tcp:127.0.0.1:5770"
@@ -34,8 +33,10 @@ _FORMS: Final = (
 
 @dataclass(frozen=True)
 class Program:
-    """A simulation to be started: the program at ``path``, with ``words`` after it (of a PX4, those of the
-    form NAME=VALUE go to its environment)."""
+    """Simulation to be started: the program at ``path`` with the arguments ``words``.
+
+    For a PX4, words of the form NAME=VALUE go to its environment.
+    """
 
     flavour: str
     path: str
@@ -44,7 +45,7 @@ class Program:
 
 @dataclass(frozen=True)
 class Running:
-    """A simulation that runs: the companion's ``endpoint``, and another at which the truth is ``told``."""
+    """Running simulation: the companion's ``endpoint``, and another one, ``told``, for the true state."""
 
     flavour: str
     endpoint: str
@@ -55,8 +56,10 @@ Autopilot = Program | Running
 
 
 def autopilots(texts: Sequence[str]) -> tuple[Autopilot, ...]:
-    """One for each vehicle, in the order of their system ids, from 1 on. InputError with a line for what is
-    wrong."""
+    """Return one autopilot for each vehicle, in the order of their system ids, from 1 on.
+
+    Raises InputError, which names what is wrong.
+    """
     found: list[Autopilot] = []
     alone = len(texts) == 1
     for text in texts:

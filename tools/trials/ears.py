@@ -1,5 +1,4 @@
-"""Where an observer hears vehicles that are not the emulation's: a link to one, or one port to which many
-speak."""
+"""Receivers of an observer for real firmware: a link to one vehicle, or a port to which several send."""
 
 from __future__ import annotations
 
@@ -16,47 +15,50 @@ from outrider.errors import InputError
 _LONGEST: Final = 65536
 _BUFFER: Final = 1 << 20
 _AUTOPILOT: Final = 1
-"""MAV_COMP_ID."""
+"""Value of MAV_COMP_ID."""
 
 
 class Ear(Protocol):
-    """Hears some vehicles, and asks them."""
+    """Receiver for some vehicles, which can also send to them."""
 
     def receive(self) -> list[bytes]:
-        """What has come."""
+        """Return the datagrams received since the last call."""
         ...
 
     def tell(self, system: int, data: bytes) -> None:
-        """To that vehicle, if it is known where it is."""
+        """Send ``data`` to vehicle ``system``, if its address is known."""
         ...
 
     def close(self) -> None:
-        """Give everything back."""
+        """Release all resources."""
         ...
 
 
 class LinkEar:
-    """An endpoint at which one vehicle is."""
+    """Receiver at the endpoint of one vehicle."""
 
     def __init__(self, endpoint: str) -> None:
         self._link = open_link(endpoint, WallClock())
 
     def receive(self) -> list[bytes]:
-        """What has come."""
+        """Return the datagrams received since the last call."""
         return self._link.receive()
 
     def tell(self, system: int, data: bytes) -> None:
-        """To it."""
+        """Send ``data`` to the vehicle."""
         self._link.send(data)
 
     def close(self) -> None:
-        """Its link."""
+        """Close the link."""
         self._link.close()
 
 
 class PortEar:
-    """A UDP port to which several vehicles speak as to a ground station. Each is told only what is for it:
-    a PX4 passes on to its companion what it hears here."""
+    """UDP port to which several vehicles send as to a ground station.
+
+    Each vehicle is sent only messages addressed to it, because a PX4 forwards to its companion what it
+    receives here.
+    """
 
     def __init__(self, endpoint: UdpIn) -> None:
         self._there: dict[int, tuple[str, int]] = {}
@@ -74,28 +76,28 @@ class PortEar:
 
     @property
     def address(self) -> tuple[str, int]:
-        """Where it listens."""
+        """Host and port on which it listens."""
         host, port = self._port.getsockname()
         return host, port
 
     def receive(self) -> list[bytes]:
-        """What has come."""
+        """Return the datagrams received since the last call."""
         found: list[bytes] = []
         while True:
             try:
                 data, place = self._port.recvfrom(_LONGEST)
             except ConnectionError:
-                continue  # one that is gone
+                continue  # the sender of an earlier datagram is gone
             except OSError:
                 return found
             frame = frame_at(data, 0)
-            # It passes on what others say, too.
+            # A PX4 forwards messages of other components, too.
             if not isinstance(frame, Flaw) and frame.component == _AUTOPILOT:
                 self._there[frame.system] = place
             found.append(data)
 
     def tell(self, system: int, data: bytes) -> None:
-        """To where it was heard last."""
+        """Send ``data`` to the address from which the vehicle was last received."""
         place = self._there.get(system)
         if place is not None:
             try:
@@ -104,18 +106,21 @@ class PortEar:
                 return
 
     def close(self) -> None:
-        """The port."""
+        """Close the port."""
         self._port.close()
 
 
 def open_ears(told: dict[int, str]) -> dict[int, Ear]:
-    """For each vehicle, by the endpoint where it is heard: one ear for all that share one."""
+    """Open a receiver for each vehicle by its endpoint; vehicles with the same endpoint share one.
+
+    Raises InputError if one cannot be opened; then none stays open.
+    """
     ears: dict[str, Ear] = {}
     try:
         for text in told.values():
             if text not in ears:
                 endpoint = parse_endpoint(text)
-                # With a peer it is one vehicle's.
+                # With a peer the port is one vehicle's.
                 shared = isinstance(endpoint, UdpIn) and endpoint.peer is None
                 ears[text] = PortEar(endpoint) if shared and isinstance(endpoint, UdpIn) else LinkEar(text)
     except (InputError, LinkError) as error:

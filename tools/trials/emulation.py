@@ -1,4 +1,4 @@
-"""A running ``outrider sitl``."""
+"""Running ``outrider sitl`` process."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ _FAREWELL = 20.0
 
 
 class Emulation:
-    """The vehicles of ``plan``, which also tell everything to ``ear``, an endpoint. OutriderError if they do
-    not come up."""
+    """Vehicles of ``plan``, which also send all telemetry to the endpoint ``ear``.
+
+    Raises OutriderError if they do not start.
+    """
 
     def __init__(self, plan: Plan, ear: str, directory: Path) -> None:
         count = len(plan.systems)
@@ -45,16 +47,16 @@ class Emulation:
         self.summary: dict[str, Any] = {}
 
     def endpoint(self, system: int) -> str:
-        """For that vehicle's companion."""
+        """Return the endpoint for that vehicle's companion."""
         return next(str(one["pymavlink"]) for one in self._ready["vehicles"] if one["system_id"] == system)
 
     def check(self) -> None:
-        """OutriderError if they have ended."""
+        """Raise OutriderError if the process has ended."""
         if self._process.poll() is not None:
             raise OutriderError(f"outrider sitl ended with status {self._process.returncode}")
 
     def close(self) -> None:
-        """End them; ``summary`` is what they said."""
+        """End the process; ``summary`` is then the JSON object that it printed."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
         try:
@@ -67,7 +69,7 @@ class Emulation:
 
 
 def _free_base(flavour: str, count: int) -> int:
-    """A port from which on the SITL's are free."""
+    """Return a base port from which all ports of the SITL are free."""
     kind = socket.SOCK_STREAM if flavour == "ardupilot" else socket.SOCK_DGRAM
     ports = [offset + _STEPS[flavour] * k for offset in _OFFSETS[flavour] for k in range(count)]
     while True:

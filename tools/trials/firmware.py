@@ -1,5 +1,7 @@
-"""Simulations of real firmware that a trial starts: ArduPilot's SITL and PX4's SIH, each in a directory of
-its own, where its parameters and logs begin anew."""
+"""Simulations of real firmware that a trial starts: ArduPilot's SITL and PX4's SIH.
+
+Each runs in a directory of its own, in which its parameters and logs start fresh.
+"""
 
 from __future__ import annotations
 
@@ -21,15 +23,17 @@ _TCP: Final = {"ardupilot": (5760, 5762, 5763), "px4": ()}
 _UDP: Final = {"ardupilot": (), "px4": (14540, 14580, 18570)}
 _STEP: Final = {"ardupilot": 10, "px4": 1}
 _FAREWELL: Final = 6.0
-"""s after which who does not end is killed."""
+"""Time after which a process that does not end is killed (s)."""
 _LAST: Final = 300
-"""Characters of what it wrote last."""
+"""Length of the end of its output that is shown (characters)."""
 
 
 @dataclass(frozen=True)
 class Launch:
-    """How a program is started: ``command`` with ``environment`` on top of the own. The companion's
-    ``endpoint``, and another at which the truth is ``told``."""
+    """Start parameters of a program: ``command``, with ``environment`` in addition to the inherited one.
+
+    ``endpoint`` is the companion's; ``told`` is another one for the true state.
+    """
 
     command: tuple[str, ...]
     environment: dict[str, str]
@@ -38,7 +42,10 @@ class Launch:
 
 
 def launch(program: Program, system: int, fleet: FleetFrame) -> Launch:
-    """Of vehicle ``system``, which stands in the row. The instance is one less: PX4's system ids count so."""
+    """Return the start parameters of vehicle ``system``, which stands in the row.
+
+    The instance is ``system`` − 1, as PX4 derives its system id from it.
+    """
     instance = system - 1
     latitude, longitude, altitude = fleet.to_geodetic((ROW * instance, 0.0, 0.0))
     if program.flavour == "ardupilot":
@@ -78,7 +85,7 @@ def _program(text: str) -> Path:
 
 
 def _px4(text: str) -> tuple[Path, Path]:
-    """The binary and its start scripts: ``text`` is the folder of a build for SITL, or the binary in it."""
+    """Return the binary and its start scripts. ``text`` is the folder of a build for SITL, or its binary."""
     path = Path(text).expanduser().resolve()
     build = path if path.is_dir() else path.parent.parent
     binary, data = build / "bin" / "px4", build / "etc"
@@ -91,7 +98,7 @@ def _px4(text: str) -> tuple[Path, Path]:
 
 
 class Firmware:
-    """The running ``programs``, by system id. InputError if a port is in use."""
+    """Running ``programs``, by system id. Raises InputError if a port is in use."""
 
     def __init__(self, programs: dict[int, Program], fleet: FleetFrame, directory: Path) -> None:
         self.launches = {system: launch(program, system, fleet) for system, program in programs.items()}
@@ -117,7 +124,7 @@ class Firmware:
             files.pop_all()
 
     def check(self) -> None:
-        """OutriderError if one has ended."""
+        """Raise OutriderError if a process has ended."""
         for system, process in self.processes.items():
             if process.poll() is not None:
                 log = self._place(system) / "out.log"
@@ -127,7 +134,7 @@ class Firmware:
                 )
 
     def close(self) -> None:
-        """End them."""
+        """End all processes."""
         for process in self.processes.values():
             if process.poll() is None:
                 process.terminate()
@@ -143,7 +150,7 @@ class Firmware:
 
 
 def _free(flavour: str, system: int) -> None:
-    """InputError if a port that the firmware or its companion would open is not free."""
+    """Raise InputError if a port that the firmware or its companion would open is not free."""
     kinds: Sequence[tuple[tuple[int, ...], int, str]] = (
         (_TCP[flavour], socket.SOCK_STREAM, "TCP"),
         (_UDP[flavour], socket.SOCK_DGRAM, "UDP"),

@@ -1,4 +1,4 @@
-"""What a companion's log tells of its flight: its set-points, and where its autopilot said to be."""
+"""Contents of a companion's log: its set-points, and the positions that its autopilot reported."""
 
 from __future__ import annotations
 
@@ -23,17 +23,20 @@ _READ = frozenset((32, 33, 49, 84))
 
 
 class Flown(NamedTuple):
-    """On the trial's time: ``setpoints``, and ``reported``, the track that the vehicle told of itself."""
+    """Flight on the trial's time.
+
+    ``setpoints`` are those that the companion sent; ``reported`` is the track of the vehicle's own estimate.
+    """
 
     setpoints: Setpoints
     reported: Track
 
 
 def flown(path: Path, system: int, fleet: FleetFrame, seconds: Callable[[Array], Array]) -> Flown | None:
-    """Of the log at ``path`` of the companion of ``system``; None where it never steered.
+    """Return the flight in the log at ``path`` of the companion of ``system``; None without set-points.
 
-    What the target says of its own time ties the companion's clock to the trial's: ``seconds`` makes times
-    since the target's boot (µs) those of the trial.
+    The target's time stamps relate the companion's clock to the trial's: ``seconds`` converts times since the
+    target's boot (µs) to times of the trial (s).
     """
     codec = Codec(lambda identifier, _system, _component: identifier in _READ)
     sent: list[tuple[float, ...]] = []
@@ -72,5 +75,5 @@ def flown(path: Path, system: int, fleet: FleetFrame, seconds: Callable[[Array],
 
 
 def _between(rows: list[tuple[float, ...]], tied: Array) -> Array:
-    """Those whose time, in the first column, is between the first and the last of ``tied``."""
+    """Return the rows whose time, in the first column, is between the first and the last of ``tied``."""
     return np.array([row for row in rows if tied[0, 0] <= row[0] <= tied[-1, 0]])

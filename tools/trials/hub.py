@@ -1,4 +1,4 @@
-"""What joins the companions: all that one says goes to all others, unless the link is cut."""
+"""Hub that connects the companions: it forwards each message to all others, unless the link is cut."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _BUFFER: Final = 1 << 20
 
 
 class Hub:
-    """A UDP port for each of ``systems``: who spoke there last is that vehicle's companion."""
+    """UDP port for each of ``systems``; the last sender at a port is that vehicle's companion."""
 
     def __init__(self, systems: Sequence[int]) -> None:
         self.cut = False
@@ -21,16 +21,16 @@ class Hub:
         self._there: dict[int, tuple[str, int]] = {}
 
     def endpoint(self, system: int) -> str:
-        """For that companion."""
+        """Return the endpoint for the companion of ``system``."""
         return f"udpout:{HOST}:{self._ports[system].getsockname()[1]}"
 
     @property
     def sockets(self) -> list[socket.socket]:
-        """Readable: something has come."""
+        """Sockets that are readable when something has arrived."""
         return list(self._ports.values())
 
     def turn(self) -> None:
-        """Pass on what has come."""
+        """Forward everything that has arrived."""
         for system, port in self._ports.items():
             while True:
                 try:
@@ -43,7 +43,7 @@ class Hub:
                     self._pass_on(data, system)
 
     def close(self) -> None:
-        """All ports."""
+        """Close all ports."""
         for port in self._ports.values():
             port.close()
 

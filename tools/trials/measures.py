@@ -1,4 +1,4 @@
-"""How well a flight was flown: figures of tracks and set-points, values only.
+"""Quality of a flight: figures of tracks and set-points, values only.
 
 Times are s of the trial, positions m in the fleet frame (ENU).
 """
@@ -15,15 +15,15 @@ from trials.separation import Track
 
 Array = NDArray[np.float64]
 TOGETHER = 0.1
-"""s: set-points that are further apart are no step but a gap."""
+"""Longest interval that counts as a step between set-points (s); a longer one is a gap."""
 NEAR, HELD = 0.75, 3.0
-"""m from its surface, for so many s: then a vehicle has converged."""
+"""Convergence criterion: distance from the surface (m), and how long it must be kept (s)."""
 _STEP = 0.02
-"""s between two looks."""
+"""Time between two samples (s)."""
 
 
 class Spread(NamedTuple):
-    """Median, 95th percentile and largest of some values."""
+    """Median, 95th percentile and maximum of some values."""
 
     p50: float
     p95: float
@@ -31,8 +31,11 @@ class Spread(NamedTuple):
 
 
 class Setpoints(NamedTuple):
-    """Those of one companion: times (n,), the same by its own clock (n,), positions, velocities and
-    accelerations, each (n, 3)."""
+    """Set-points of one companion.
+
+    ``times`` (n,) are of the trial, ``clock`` (n,) the same by the companion's own clock; ``places``,
+    ``velocities`` and ``accelerations`` are (n, 3).
+    """
 
     times: Array
     clock: Array
@@ -41,13 +44,13 @@ class Setpoints(NamedTuple):
     accelerations: Array
 
     def between(self, begin: float, end: float) -> Setpoints:
-        """Those of that time."""
+        """Return the set-points from ``begin`` to ``end`` (s)."""
         chosen = (self.times >= begin) & (self.times <= end)
         return Setpoints(*(column[chosen] for column in self))
 
 
 def spread(values: Array) -> Spread | None:
-    """Of those that are known (not NaN); None without any."""
+    """Return the spread of the values that are not NaN; None without any."""
     known = values[~np.isnan(values)]
     if not len(known):
         return None
@@ -56,7 +59,10 @@ def spread(values: Array) -> Spread | None:
 
 
 def largest_step(flown: Setpoints) -> float:
-    """How far (m) a set-point was from where the one before led: p + v Δt + ½ a Δt²."""
+    """Return the largest distance (m) of a set-point from where the one before leads.
+
+    That is p + v Δt + ½ a Δt².
+    """
     if len(flown.clock) < 2:
         return 0.0
     dt = np.diff(flown.clock)[:, None]
@@ -66,7 +72,7 @@ def largest_step(flown: Setpoints) -> float:
 
 
 def tracking_errors(flown: Setpoints, track: Track) -> Array:
-    """Distances (n,) of the vehicle from its set-points; NaN where it is not known."""
+    """Return the distances (n,) of the vehicle from its set-points; NaN where its position is unknown."""
     off: Array = np.linalg.norm(track.at(flown.times) - flown.places, axis=1)
     return off
 
@@ -77,8 +83,11 @@ def surface_errors(
     nearest: Callable[[Array], Array],
     times: Array,
 ) -> Array:
-    """Distances (n, K) at ``times`` (n,) from the surface around the target, whose ``nearest`` point to an
-    offset (…, 3) from it is asked for; NaN where a vehicle is not known."""
+    """Return the distances (n, K) of K vehicles at ``times`` (n,) from the surface around the target.
+
+    ``nearest`` maps offsets (…, 3) from the target to the nearest points of the surface. NaN where a
+    vehicle's position is unknown.
+    """
     around = target(times)
     columns = []
     for track in tracks.values():
@@ -91,13 +100,16 @@ def surface_errors(
 
 
 def looks(begin: float, end: float) -> Array:
-    """Times from ``begin`` to ``end``, close enough together for figures."""
+    """Return sample times from ``begin`` to ``end`` (s)."""
     return np.arange(begin, end, _STEP)
 
 
 def converged_after(errors: Array, times: Array) -> float | None:
-    """s from the first of ``times`` (n,) until all of ``errors`` (n, K) begin to be below ``NEAR`` for
-    ``HELD``; None if they never are."""
+    """Return the time (s) from the first of ``times`` (n,) until all vehicles have converged.
+
+    They have when all of ``errors`` (n, K) stay below ``NEAR`` for ``HELD``; the beginning of that interval
+    counts. None if they never have.
+    """
     well = np.all(errors < NEAR, axis=1)
     begun: float | None = None
     for now, good in zip(times.tolist(), well.tolist(), strict=True):
@@ -111,5 +123,5 @@ def converged_after(errors: Array, times: Array) -> float | None:
 
 
 def joined(parts: Sequence[Array]) -> Array:
-    """One after the other; empty without any."""
+    """Return the arrays joined end to end; empty without any."""
     return np.concatenate(parts) if parts else np.empty(0)

@@ -1,4 +1,4 @@
-"""The story of mishaps: an escort that loses its target, companions and links, act by act."""
+"""Story of mishaps: an escort that loses its target, companions and links, act by act."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from trials.reports import Reports, come_back, go, send, wait_for_the_go
 from trials.stage import Stage
 
 KILLED, ENDED = 3, 4
-"""Of the one the process that flies is killed; of the other all processes."""
+"""Vehicle whose flying process is killed, and vehicle whose companion is killed altogether."""
 TARGET_LOST = "Target lost: holding"
 
 
 def mishaps(stage: Stage) -> None:
-    """All acts. OutriderError if what has to follow does not."""
+    """Play all acts. Raises OutriderError if an expected consequence does not occur."""
     plan, everyone = stage.plan, stage.plan.systems
     wait_for_the_go(stage)
     go(stage, everyone)
@@ -45,7 +45,7 @@ def _kill_the_pilot(stage: Stage) -> None:
     reports = Reports(stage)
     wingman.kill_pilot()
     reports.of([KILLED], "lost", "the companion is gone")
-    # It holds, or its own time-out was quicker on a machine that is busy.
+    # It holds; on a busy machine the autopilot's own time-out may come first.
     reports.of([KILLED], "last word", "the vehicle")
     reports.of([KILLED], "waiting", "the operator's go")
     stage.wait(stage.plan.pause_s)

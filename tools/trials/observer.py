@@ -1,5 +1,7 @@
-"""Where the vehicles truly are, in one time that they all have: what every observer tells, and the one of the
-emulation, which hears it on a port of its own."""
+"""True positions of the vehicles on one common time: the observers' interface, and that for emulation.
+
+The observer of the emulation receives on a port of its own.
+"""
 
 from __future__ import annotations
 
@@ -30,15 +32,18 @@ ARMED = 0x80
 _HEARTBEAT, _TIME, _LOCAL, _ORIGIN = 0, 2, 32, 49
 _REQUEST = 512
 AGAIN = 500_000
-"""µs of the wall between two askings for what is missing."""
+"""Wall time between two requests for missing messages (µs)."""
 
 
 class Observer(Protocol):
-    """``clock``: the trial's time, µs; ``seconds`` makes one of its times s since the trial's beginning."""
+    """Observer of true positions.
+
+    ``clock`` is the trial's time (µs); ``seconds`` converts it to s since the trial's beginning.
+    """
 
     @property
     def clock(self) -> Clock:
-        """What it follows."""
+        """Clock that the trial follows."""
         ...
 
     @property
@@ -48,36 +53,41 @@ class Observer(Protocol):
 
     @property
     def wanted(self) -> str:
-        """What it takes to be ready."""
+        """Description of what is missing."""
         ...
 
     @property
     def latest(self) -> float:
-        """s since the beginning; 0 before they are known."""
+        """Time since the beginning (s); 0 before the vehicles are known."""
         ...
 
     @property
     def grounded(self) -> bool:
-        """Whether no motors run."""
+        """Whether all motors are off."""
         ...
 
     def seconds(self, clock: Array) -> Array:
-        """s since the beginning (n,), when the clock showed ``clock`` (n,), µs. Before the first message and
-        after the last it stands."""
+        """Return the times (n,) since the beginning (s) at which ``clock`` had the values (n,), µs.
+
+        Before the first message and after the last the result is constant.
+        """
         ...
 
     def turn(self) -> None:
-        """Hear what has come."""
+        """Process everything that has arrived."""
         ...
 
     def tracks(self) -> dict[int, Track]:
-        """Of all vehicles."""
+        """Return the tracks of all vehicles, by system id."""
         ...
 
 
 class Seen:
-    """One vehicle. ``armed``: None before its first heartbeat. ``rows``: time since boot (µs), position (m,
-    local NED), whether armed."""
+    """Record of one vehicle.
+
+    ``armed``: None before its first heartbeat. ``rows``: time since boot (µs), position (m, local NED),
+    whether armed.
+    """
 
     def __init__(self) -> None:
         self.armed: bool | None = None
@@ -87,11 +97,14 @@ class Seen:
 
     @property
     def known(self) -> bool:
-        """Whether its clock and its origin have been heard."""
+        """Whether its clock and its origin have been received."""
         return self.boot is not None and self.frame is not None
 
     def track(self, begin: int) -> Track:
-        """Times are s since ``begin`` (Unix µs)."""
+        """Return the track with times in s since ``begin`` (Unix µs).
+
+        Raises ValueError while its clock or its origin is unknown.
+        """
         if self.boot is None or self.frame is None:
             raise ValueError("its clock and its origin have not been heard")
         times = 1e-6 * (np.array([row[0] for row in self.rows]) + (self.boot - begin))
@@ -100,8 +113,10 @@ class Seen:
 
 
 class SitlObserver:
-    """Hears ``systems`` of ``outrider sitl`` on ``link``. Its clock shows simulated time as their stamps do,
-    all the same."""
+    """Observer of ``systems`` of ``outrider sitl`` on ``link``.
+
+    Its clock shows the simulated time of their stamps, which is the same for all.
+    """
 
     def __init__(self, link: Link, systems: Sequence[int], fleet: FleetFrame) -> None:
         self.link = link
@@ -112,7 +127,7 @@ class SitlObserver:
         self._first = systems[0]
         self._next = 0
         self._ties: list[tuple[int, int]] = []
-        """What the clock showed, and the stamp of the message that came then."""
+        """Clock reading at the arrival of a message, and the message's stamp (µs)."""
         self._codec = Codec(
             lambda identifier, system, component: (
                 identifier in (_HEARTBEAT, _TIME, _LOCAL, _ORIGIN) and system in self.seen and component == 1
@@ -121,52 +136,55 @@ class SitlObserver:
 
     @property
     def clock(self) -> FollowedClock:
-        """That of the first of them."""
+        """Clock that follows the first vehicle's."""
         return self._clock
 
     @property
     def ready(self) -> bool:
-        """Whether all are known."""
+        """Whether all vehicles are known."""
         return all(one.known for one in self.seen.values())
 
     @property
     def wanted(self) -> str:
-        """Both are asked for."""
+        """Description of what is missing; it is requested from the vehicles."""
         return "the vehicles' clocks and origins"
 
     @property
     def grounded(self) -> bool:
-        """Whether no motors run."""
+        """Whether all motors are off."""
         return all(one.armed is False for one in self.seen.values())
 
     @property
     def _begin(self) -> int:
-        """Unix time (µs) at which the first of them booted."""
+        """Unix time (µs) at which the first vehicle booted."""
         return min(one.boot for one in self.seen.values() if one.boot is not None)
 
     @property
     def latest(self) -> float:
-        """s since then, as told last; 0 before they are known."""
+        """Time since the first boot (s), as last reported; 0 before the vehicles are known."""
         one = self.seen[self._first]
         return float(self._since(np.array(one.rows[-1][0]))) if self.ready and one.rows else 0.0
 
     def seconds(self, clock: Array) -> Array:
-        """s since then, when the clock showed that: it goes on where the simulation stands for a moment."""
+        """Return the times (n,) since the first boot (s) at which ``clock`` had the values (n,), µs.
+
+        The clock goes on while the simulation pauses; the result does not.
+        """
         shown, stamps = np.array(self._ties, dtype=np.float64).T
         return np.interp(clock, shown, self._since(stamps))
 
     def _since(self, stamps: Array) -> Array:
-        """s since the beginning, of stamps (n,) of the first vehicle, µs."""
+        """Convert stamps (n,) of the first vehicle (µs) to times since the beginning (s)."""
         boot = self.seen[self._first].boot
         since: Array = (stamps + (0 if boot is None else boot - self._begin)) * 1e-6
         return since
 
     def tracks(self) -> dict[int, Track]:
-        """Of all."""
+        """Return the tracks of all vehicles, by system id."""
         return {system: one.track(self._begin) for system, one in self.seen.items()}
 
     def turn(self) -> None:
-        """Hear what has come."""
+        """Process everything that has arrived, and request what is missing."""
         for data in self.link.receive():
             for message in self._codec.feed(data, whole=True):
                 one = self.seen[message.source.system]

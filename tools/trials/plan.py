@@ -1,4 +1,4 @@
-"""What a trial is: how many fly what, what happens to them, and how fast time goes."""
+"""Plan of a trial: vehicles, story, and speed of time."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ FLAVOURS: Final = ("ardupilot", "px4")
 MISHAPS, SORTIE = "mishaps", "sortie"
 STORIES: Final = (MISHAPS, SORTIE)
 _PLAN_US, _SETPOINT_US = 5_000, 50_000
-"""µs: of the wall between two plans at least, and of the simulation between two set-points at most."""
+"""Shortest wall time between two plans, and longest simulated time between two set-points (µs)."""
 ROW: Final = 5.0
-"""m between vehicles that stand in a row, towards the east, from the origin on."""
+"""Distance between vehicles that stand in a row, eastward from the origin (m)."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Seconds are of the simulation, of which ``speed`` pass in one of the wall. Without ``autopilots`` five
-    emulated ones of ``flavour`` fly; ``origin``: of the fleet frame, if not that of the shipped files."""
+    """Plan of a trial.
+
+    Durations are in simulated seconds, ``speed`` of which pass per wall second. Without ``autopilots`` five
+    emulated ones of ``flavour`` fly. ``origin``: of the fleet frame, None for that of the shipped files.
+    """
 
     flavour: str
     speed: float
@@ -37,18 +40,18 @@ class Plan:
     blind_s: float = 10.0
     cut_s: float = 5.0
     pause_s: float = 5.0
-    """Between two acts, so that what follows on one is over before the next."""
+    """Pause between two acts (s), so that the consequences of one are over before the next."""
     run_s: float = 25.0
-    """For which the target of a sortie runs."""
+    """Time for which the target of a sortie runs (s)."""
 
     @property
     def systems(self) -> range:
-        """System ids."""
+        """System ids of the vehicles."""
         return range(1, len(self.autopilots or (None,) * USUAL) + 1)
 
     @property
     def name(self) -> str:
-        """What flies what."""
+        """Description of vehicles and story."""
         flown = [self.flavour_of(system) for system in self.systems]
         if not self.autopilots:
             return f"{self.flavour}, emulated, {self.story} ×{self.speed:g}"
@@ -56,11 +59,11 @@ class Plan:
         return f"{kinds}, {self.story}"
 
     def flavour_of(self, system: int) -> str:
-        """What that vehicle's autopilot is."""
+        """Return the flavour of that vehicle's autopilot."""
         return self.autopilots[system - 1].flavour if self.autopilots else self.flavour
 
     def settings(self, flavour: str) -> dict[str, Any]:
-        """The shipped file of the flavour, with a companion that speaks to the ground."""
+        """Return the shipped companion file of ``flavour``, with reports to the ground switched on."""
         document: dict[str, Any] = yaml.safe_load(find("companions", flavour).read_text(encoding="utf-8"))
         document["target"] = TARGET
         companion = document["companion"]
@@ -68,16 +71,16 @@ class Plan:
         if self.origin is not None:
             document["origin"] = self.origin.model_dump()
         if not self.autopilots:
-            # At the wall's speed, too, it stands whenever the machine is busy.
+            # Even at the wall's speed the simulation pauses whenever the machine is busy.
             document["clock"] = "autopilot"
-            # Five companions on two cores have no more plans in them than so many in a second of the wall.
+            # Five companions on two cores cannot compute more plans than this per wall second.
             replan = max(companion["rates"]["replan_us"], round(_PLAN_US * self.speed))
             companion["rates"] = {"replan_us": replan, "setpoint_us": min(replan, _SETPOINT_US)}
             document["period_us"] = min(replan // 2, _SETPOINT_US // 2)
         return document
 
     def write(self, place: Path) -> dict[str, Path]:
-        """The companions' file of each flavour, in ``place``."""
+        """Write the companions' file of each flavour to ``place``; return the paths by flavour."""
         paths = {}
         for flavour in {self.flavour_of(system) for system in self.systems}:
             path = paths[flavour] = place / f"companion-{flavour}.yaml"

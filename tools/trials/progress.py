@@ -1,4 +1,4 @@
-"""How far a trial is: a line for each act, and on a terminal the act and its time."""
+"""Progress of a trial: a line for each act, and on a terminal the act and its time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from trials.plan import Plan
 
 
 class Progress:
-    """Of a trial of ``plan``; a context."""
+    """Progress of a trial of ``plan``; a context manager."""
 
     def __init__(self, plan: Plan) -> None:
         self._name = plan.name
@@ -31,7 +31,7 @@ class Progress:
             self._status.stop()
 
     def tell(self, now: float, act: str) -> None:
-        """An act begins at ``now`` (s)."""
+        """Report that an act begins at ``now`` (s)."""
         self._act = act
         line = f"{self._name} {now:7.1f} s  {act}"
         if self._status is None:
@@ -40,6 +40,6 @@ class Progress:
             self._status.console.print(line, highlight=False)
 
     def look(self, now: float) -> None:
-        """It is ``now`` (s)."""
+        """Show the time ``now`` (s)."""
         if self._status is not None:
             self._status.update(f"{now:7.1f} s  {self._act}")

@@ -1,5 +1,7 @@
-"""What the companions report, and what is said to them. An act is over when those it concerns have reported
-all that it leads to."""
+"""Reports of the companions, and orders to them.
+
+An act is over when all companions concerned have reported all its consequences.
+"""
 
 from __future__ import annotations
 
@@ -11,21 +13,21 @@ from outrider.errors import OutriderError
 from trials.stage import PATIENCE, Stage
 
 START = 180.0
-"""s until all wait for the go: receivers, estimators and clocks take their time."""
+"""Time limit until all wait for the go (s): receivers, estimators and clocks need time."""
 GO_AWAITED = "the operator's go"
 _AGAIN = 1.0
-"""s of the wall after which a go that was not taken is said again."""
+"""Wall time after which a go that was not accepted is repeated (s)."""
 
 
 class Reports:
-    """Waits for events of the companions that come after a mark."""
+    """Waits for events of the companions that follow a mark, which is set at construction."""
 
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
         self._marks = {system: len(wingman.events) for system, wingman in stage.wingmen.items()}
 
     def of(self, systems: Iterable[int], what: str, text: str, patience: float = PATIENCE) -> None:
-        """All of them note it."""
+        """Wait until all ``systems`` have recorded an event of kind ``what`` that contains ``text``."""
         wanted = list(systems)
         self._stage.until(
             lambda: all(self.noted(system, what, text) for system in wanted),
@@ -34,7 +36,7 @@ class Reports:
         )
 
     def go(self, systems: Iterable[int]) -> None:
-        """Say go to them, again to who was not ready."""
+        """Send a go to ``systems``, repeated to those that were not ready."""
         wanted, asked = list(systems), time.monotonic() - _AGAIN
 
         def taken() -> bool:
@@ -49,21 +51,24 @@ class Reports:
         self._stage.until(taken, f"phase prepare of {wanted}")
 
     def noted(self, system: int, what: str, text: str) -> bool:
-        """Whether it has."""
+        """Return whether ``system`` has recorded such an event since the mark."""
         return any(event["what"] == what and text in event["text"] for event in self.events(system))
 
     def last_wait(self, system: int) -> str:
-        """What it was waiting for when it last said so."""
+        """Return what ``system`` waited for in its last report of waiting."""
         waits = [event["text"] for event in self.events(system) if event["what"] == "waiting"]
         return waits[-1] if waits else "a companion"
 
     def events(self, system: int) -> list[dict[str, Any]]:
-        """Since the mark."""
+        """Return the events of ``system`` since the mark."""
         return self._stage.wingmen[system].events[self._marks[system] :]
 
 
 def wait_for_the_go(stage: Stage) -> None:
-    """All wait for it, and their truth is known."""
+    """Wait until all companions wait for the go and the true positions are known.
+
+    Raises OutriderError if a companion ends.
+    """
     stage.tell("all get ready")
     reports = Reports(stage)
 
@@ -83,19 +88,19 @@ def wait_for_the_go(stage: Stage) -> None:
 
 
 def go(stage: Stage, systems: Iterable[int]) -> None:
-    """They take off, and escort."""
+    """Announce the go; send it to ``systems`` and wait until they escort."""
     stage.tell("go")
     send(Reports(stage), systems)
 
 
 def send(reports: Reports, systems: Iterable[int]) -> None:
-    """The same, within an act."""
+    """Send the go within an act, and wait until ``systems`` escort."""
     reports.go(systems)
     reports.of(systems, "phase", "escort")
 
 
 def come_back(stage: Stage) -> None:
-    """All return and land."""
+    """Order all vehicles to return and land, and wait until they have."""
     everyone = stage.plan.systems
     stage.tell("all come back")
     reports = Reports(stage)

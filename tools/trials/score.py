@@ -1,4 +1,4 @@
-"""The figures of a sortie from its tracks and logs, and the bars that it has to pass."""
+"""Figures of a sortie from its tracks and logs, and the limits that it has to meet."""
 
 from __future__ import annotations
 
@@ -25,22 +25,26 @@ from trials.stage import Stage
 
 Array = NDArray[np.float64]
 CLOSEST: Final = 1.5
-"""m between any two: there is neither wind nor loss in a trial."""
+"""Least distance between two vehicles (m): a trial has neither wind nor message loss."""
 TRACKING: Final = 0.35
-"""m from set-point to vehicle, as it told of itself, 95 %."""
+"""Limit of the distance from set-point to the vehicle's reported position, 95 % (m)."""
 STEP: Final = 0.3
-"""m of a set-point beyond where the one before led."""
+"""Limit of a set-point's distance from where the one before leads (m)."""
 CONVERGED: Final = 15.0
-"""s from the go until all are at their places."""
+"""Limit of the time from the go until all vehicles are at their places (s)."""
 STANDOFF: Final = 0.6
-"""m from the surface while the target walks, as the vehicles told of themselves, 95 %."""
+"""Limit of the reported distance from the surface while the target walks, 95 % (m)."""
 
 
 class Score(NamedTuple):
-    """``tracking``: from set-points to where the vehicles told to be; ``true_tracking``: to where they were;
-    ``estimate``: between the two; ``step``: the largest of a set-point (m). ``standoff``, ``true_standoff``:
-    from the surface, by the target's pace, as told and in truth. ``converged``, ``truly_converged``: s after
-    the go; ``anchored``: how often plans began anew where the vehicle was. None: not known."""
+    """Figures of a sortie; None: unknown.
+
+    Distances are in m. ``tracking``: from set-points to reported positions; ``true_tracking``: to true
+    positions; ``estimate``: between the two. ``step``: the largest step of a set-point. ``standoff``,
+    ``true_standoff``: from the surface, by the target's pace, reported and true. ``converged``,
+    ``truly_converged``: s after the go. ``anchored``: number of times that plans restarted at the vehicle's
+    position.
+    """
 
     tracking: Spread | None
     true_tracking: Spread | None
@@ -54,7 +58,7 @@ class Score(NamedTuple):
 
     @property
     def document(self) -> dict[str, Any]:
-        """For the verdict."""
+        """Figures as JSON values, for the verdict."""
         return {
             "tracking_error_m": _rounded(self.tracking),
             "true_tracking_error_m": _rounded(self.true_tracking),
@@ -68,7 +72,7 @@ class Score(NamedTuple):
         }
 
     def faults(self, closest: float | None) -> list[str]:
-        """Which bars it does not pass; ``closest``: the least distance of two vehicles, m."""
+        """Return the limits that are not met; ``closest``: least distance of two vehicles (m)."""
         wrong = []
         if closest is None or closest < CLOSEST:
             wrong.append(f"two vehicles were {_said(closest)} m apart; a sortie allows {CLOSEST} m")
@@ -95,8 +99,11 @@ def score(
     nearest: Callable[[Array], Array],
     anchored: int | None,
 ) -> Score:
-    """Of a sortie that came as far as its marks say. ``tracks``: the truth; ``nearest``: the point of the
-    surface that is nearest to an offset from the target."""
+    """Return the figures of a sortie, as far as its marks go.
+
+    ``tracks``: true positions; ``nearest``: maps an offset from the target to the nearest point of the
+    surface; ``anchored``: count of restarted plans, None if unknown.
+    """
     marks = stage.marks
     own = {system: _joined(parts) for system, parts in logs.items() if parts}
     steered = {

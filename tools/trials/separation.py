@@ -1,4 +1,4 @@
-"""How near the vehicles came to each other and to the target, between their messages too."""
+"""Least distances between the vehicles and to the target, also between their messages."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 _STEP = 0.005
-"""s between two looks; at 5 m/s that is 2.5 cm of way, and millimetres of distance at the nearest point."""
+"""Time between two samples (s); at 5 m/s that is 2.5 cm, and millimetres of distance at the nearest point."""
 GAP = 1.0
-"""s: over a longer silence nothing is known."""
+"""Longest interval between messages over which a position is interpolated (s)."""
 
 
 class Nearest(NamedTuple):
-    """The least distance (m) of ``pair``, and when (s)."""
+    """Least distance (m) of ``pair``, and its time (s)."""
 
     pair: tuple[int, int]
     distance: float
@@ -25,14 +25,14 @@ class Nearest(NamedTuple):
 
 
 class Track(NamedTuple):
-    """Times (n,) s, positions (n, 3) m, whether its motors ran (n,)."""
+    """Track of a vehicle: times (n,) s, positions (n, 3) m, whether its motors ran (n,)."""
 
     times: Array
     places: Array
     armed: NDArray[np.bool_]
 
     def at(self, times: Array) -> Array:
-        """Positions (m, 3) at ``times`` (m,); NaN while its motors do not run, and where nothing is known."""
+        """Return positions (m, 3) at ``times`` (m,); NaN while its motors are off, and where unknown."""
         found = np.stack([np.interp(times, self.times, self.places[:, k]) for k in range(3)], axis=1)
         after = np.clip(np.searchsorted(self.times, times), 1, len(self.times) - 1)
         unknown = self.times[after] - self.times[after - 1] > GAP
@@ -42,13 +42,16 @@ class Track(NamedTuple):
         return found
 
     def beside(self, other: Track) -> Array:
-        """Distances (n,) m of the points of another track of the same vehicle; NaN where nothing is known."""
+        """Return the distances (n,) m to the points of another track of this vehicle; NaN where unknown."""
         off: Array = np.linalg.norm(self.at(other.times) - other.places, axis=1)
         return off
 
 
 def nearest(tracks: Mapping[int, Track], target: tuple[int, Callable[[Array], Array]]) -> list[Nearest]:
-    """Each pair of ``tracks``, and each with the ``target``: its id, and its places (m, 3) at times (m,)."""
+    """Return the least distance of each pair of ``tracks``, and of each with the ``target``.
+
+    ``target`` is its id, and a function that gives its positions (m, 3) at times (m,).
+    """
     begin = min(track.times[0] for track in tracks.values())
     end = max(track.times[-1] for track in tracks.values())
     times = np.arange(begin, end, _STEP)
@@ -64,13 +67,13 @@ def nearest(tracks: Mapping[int, Track], target: tuple[int, Callable[[Array], Ar
 
 
 def blind(gap: float) -> list[str]:
-    """A fault where the longest gap (s) is too long: then nobody knows how near who came meanwhile."""
+    """Return a fault if the longest gap (s) is too long: distances during it are unknown."""
     if gap <= GAP:
         return []
     return [f"nothing is known of a flying vehicle for {gap:.1f} s, and the machine may have stood still"]
 
 
 def longest_gap(track: Track) -> float:
-    """s between two messages, while its motors ran."""
+    """Return the longest time (s) between two messages while the motors ran."""
     flown = track.times[track.armed]
     return float(np.diff(flown).max()) if len(flown) > 1 else 0.0

@@ -1,4 +1,4 @@
-"""The story of a sortie: the flight by which separation and tracking are measured, act by act."""
+"""Story of a sortie: the flight in which separation and tracking are measured, act by act."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from trials.stage import Stage
 from trials.walker import sortie_target
 
 GO, ESCORT, WALK, RUN, RETURN = "go", "escort", "walk", "run", "return"
-"""When it was said, when all escorted, and when the target began to walk and to run."""
+"""Marks: the go, all vehicles escort, the target begins to walk, it begins to run, the return."""
 
 
 def sortie(stage: Stage) -> None:
-    """All acts. OutriderError if what has to follow does not."""
+    """Play all acts. Raises OutriderError if an expected consequence does not occur."""
     wait_for_the_go(stage)
     stage.mark(GO)
     go(stage, stage.plan.systems)

@@ -1,4 +1,4 @@
-"""All that a trial consists of, turned in one loop."""
+"""All parts of a trial, stepped in one loop."""
 
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ from trials.wingman import Wingman
 Array = NDArray[np.float64]
 
 _TURN = 0.002
-"""s at most between two looks at the target."""
+"""Longest time between two steps of the target (s)."""
 _LOOK = 0.05
-"""s between two looks at what the companions have noted."""
+"""Time between two polls of the companions' events (s)."""
 PATIENCE = 60.0
-"""s of the wall, and so many more of the simulation, until something that has not come is given up."""
+"""Wall time, and simulated time, after which an expected event is given up (s)."""
 
 
 class Stage:
-    """For ``plan``, with all files in ``directory``."""
+    """Parts of a trial of ``plan``; all files are in ``directory``."""
 
     def __init__(self, plan: Plan, directory: Path, progress: Progress) -> None:
         self.plan, self.directory = plan, directory
         self._progress = progress
         self._began = time.monotonic()
         self.ended = 0.0
-        """When it was closed, s."""
+        """Time at which it was closed (s)."""
         self._looked = 0.0
         self._target: list[tuple[float, float, float, float]] = []
         self.marks: dict[str, float] = {}
-        """When what happened, s."""
+        """Times of the marks (s)."""
         origin = plan.settings(plan.flavour_of(1))["origin"]
         self.fleet = FleetFrame(origin["latitude"], origin["longitude"], origin["altitude"])
         with ExitStack() as files:
@@ -78,22 +78,24 @@ class Stage:
 
     @property
     def now(self) -> float:
-        """s since the first vehicle booted, or since it is observed: of the simulation where that is the
-        emulation's, else of the wall."""
+        """Time since the first vehicle booted, or since observation began (s).
+
+        It is simulated time for the emulation, otherwise wall time.
+        """
         return self.observer.latest
 
     def mark(self, name: str) -> None:
-        """It happens now."""
+        """Record the mark ``name`` at the current time."""
         self.marks[name] = self.now
 
     def tell(self, act: str) -> None:
-        """An act begins."""
+        """Report that an act begins."""
         self._progress.tell(self.now, act)
 
     def until(
         self, is_so: Callable[[], object], what: str | Callable[[], str], patience: float = PATIENCE
     ) -> None:
-        """Turn until then. OutriderError if it does not come."""
+        """Step until ``is_so`` returns true. Raises OutriderError if it does not within ``patience`` s."""
         end, last = time.monotonic() + patience, self.now + patience
         while not is_so():
             self.vehicles.check()
@@ -102,14 +104,14 @@ class Stage:
             self.turn()
 
     def wait(self, seconds: float) -> None:
-        """So long, of the simulation."""
+        """Step for that many seconds of ``now``."""
         end = self.now + seconds
         while self.now < end:
             self.turn()
 
     def turn(self) -> None:
-        """One round."""
-        # What the companions say to each other is passed on at once; the rest may wait until the next round.
+        """Do one step of all parts."""
+        # Messages between companions are forwarded at once; the rest may wait until the next step.
         select.select(self.swarm.sockets, [], [], _TURN)
         self.swarm.turn()
         self.observer.turn()
@@ -131,17 +133,17 @@ class Stage:
             self._target.append((self.now, *self.walker.motion(clock).position.tolist()))
 
     def target(self, times: Array) -> Array:
-        """Where the target was (n, 3) at ``times`` (n,)."""
+        """Return the target's positions (n, 3) at ``times`` (n,)."""
         rows = np.array(self._target)
         return np.stack([np.interp(times, rows[:, 0], rows[:, k]) for k in (1, 2, 3)], axis=1)
 
     def nearest(self) -> tuple[list[Nearest], float]:
-        """Who came how near to whom; and the longest gap (s) of what is known of a flying vehicle."""
+        """Return the least distances of all pairs, and the longest gap (s) in a flying vehicle's track."""
         tracks = self.observer.tracks()
         return nearest(tracks, (TARGET, self.target)), max(map(longest_gap, tracks.values()))
 
     def steered(self, system: int) -> tuple[float, float]:
-        """From when on, and until when, that vehicle's companion steered it, s."""
+        """Return the times (s) from which and until which the companion of ``system`` steered it."""
         phases = {
             event["text"]: event["trial_s"]
             for event in self.wingmen[system].events
@@ -150,7 +152,7 @@ class Stage:
         return phases.get("escort", inf), phases.get("land", inf)
 
     def flown(self, system: int) -> list[Flown]:
-        """What each log of that vehicle's companion tells."""
+        """Return the flight of each log of that vehicle's companion."""
         boot = self.walker.boot
 
         def seconds(since_boot: Array) -> Array:
@@ -162,10 +164,10 @@ class Stage:
 
     @property
     def wall_s(self) -> float:
-        """Since the beginning."""
+        """Wall time since the beginning (s)."""
         return time.monotonic() - self._began
 
     def close(self) -> None:
-        """End all of it."""
+        """End all parts."""
         self.ended = self.now
         self._files.close()

@@ -1,4 +1,4 @@
-"""The ground: hears what the companions tell it."""
+"""Ground station: receives the companions' status texts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _TEXT = 253
 
 
 class Station:
-    """``texts`` of each of ``systems``, in the order of their coming."""
+    """Ground station; ``texts`` of each of ``systems``, in the order of arrival."""
 
     def __init__(self, systems: Sequence[int]) -> None:
         self.link, self.endpoint = listener()
@@ -26,7 +26,7 @@ class Station:
         )
 
     def turn(self) -> None:
-        """Hear what has come."""
+        """Process everything that has arrived."""
         for data in self.link.receive():
             for message in self._codec.feed(data, whole=True):
                 if isinstance(message, StatusText):
@@ -34,6 +34,6 @@ class Station:
 
 
 def listener() -> tuple[Link, str]:
-    """A UDP port, and the endpoint for who speaks to it."""
+    """Open a UDP port; return it, and the endpoint for its senders."""
     link = UdpListener(UdpIn(HOST, 0), WallClock())
     return link, f"udpout:{HOST}:{link.address[1]}"

@@ -1,5 +1,8 @@
-"""The observer of real firmware's simulations: SIM_STATE of ArduPilot's SITL, HIL_STATE_QUATERNION of PX4's
-SIH, by the time of the wall, which is what they all have in common."""
+"""Observer of real firmware's simulations.
+
+It uses SIM_STATE of ArduPilot's SITL and HIL_STATE_QUATERNION of PX4's SIH, dated by wall time, which all of
+them share.
+"""
 
 from __future__ import annotations
 
@@ -21,16 +24,16 @@ Array = NDArray[np.float64]
 _HEARTBEAT, _SIM_STATE, _HIL_STATE = 0, 108, 115
 _SET_INTERVAL: Final = 511
 _PERIOD: Final = 20_000
-"""µs asked for between two of a vehicle's true states."""
+"""Requested period of a vehicle's true state (µs)."""
 _SILENT: Final = 1_000_000
-"""µs of the wall after which they are asked for again."""
+"""Wall time without a true state after which it is requested again (µs)."""
 _ARDUPILOT: Final = "ardupilot"
 _GROUND_STATION: Final = (6, 8, 0, 0, 4)
 """MAV_TYPE, MAV_AUTOPILOT (none), modes, MAV_STATE."""
 
 
 class TrueSeen:
-    """One vehicle. ``rows``: time of the wall (µs), position (m, fleet frame), whether armed."""
+    """Record of one vehicle; ``rows``: wall time (µs), position (m, fleet frame), whether armed."""
 
     def __init__(self) -> None:
         self.armed: bool | None = None
@@ -38,14 +41,14 @@ class TrueSeen:
         self.rows: list[tuple[int, tuple[float, float, float], bool]] = []
 
     def track(self, begin: int) -> Track:
-        """Times are s since ``begin``."""
+        """Return the track with times in s since ``begin`` (µs)."""
         places = np.array([row[1] for row in self.rows]).reshape(-1, 3)
         times = 1e-6 * (np.array([row[0] for row in self.rows]) - begin)
         return Track(times, places, np.array([row[2] for row in self.rows], dtype=bool))
 
 
 class TruthObserver:
-    """Hears the vehicles of ``flavours``, by their system ids, at ``ears``."""
+    """Observer of the vehicles of ``flavours``, by system id, through the receivers ``ears``."""
 
     def __init__(
         self,
@@ -71,17 +74,17 @@ class TruthObserver:
 
     @property
     def clock(self) -> Clock:
-        """The wall's."""
+        """Wall clock."""
         return self._clock
 
     @property
     def ready(self) -> bool:
-        """Whether the true state of all is told."""
+        """Whether the true state of all vehicles is received."""
         return all(one.rows and one.armed is not None for one in self.seen.values())
 
     @property
     def wanted(self) -> str:
-        """What those do not tell that are not ready."""
+        """Messages that are missing from vehicles that are not ready."""
         names = {True: "SIM_STATE", False: "HIL_STATE_QUATERNION"}
         return ", ".join(
             f"{names[self._flavours[system] == _ARDUPILOT]} of vehicle {system}"
@@ -91,25 +94,25 @@ class TruthObserver:
 
     @property
     def grounded(self) -> bool:
-        """Whether no motors run."""
+        """Whether all motors are off."""
         return all(one.armed is False for one in self.seen.values())
 
     @property
     def latest(self) -> float:
-        """s since it began to listen."""
+        """Time since observation began (s)."""
         return (self._clock.now() - self._begin) * 1e-6
 
     def seconds(self, clock: Array) -> Array:
-        """s since then, when the clock showed that."""
+        """Return the times (n,) since observation began (s) at which ``clock`` had the values (n,), µs."""
         since: Array = (clock - self._begin) * 1e-6
         return since
 
     def tracks(self) -> dict[int, Track]:
-        """Of all."""
+        """Return the tracks of all vehicles, by system id."""
         return {system: one.track(self._begin) for system, one in self.seen.items()}
 
     def turn(self) -> None:
-        """Hear what has come."""
+        """Process everything that has arrived, and request what is missing."""
         now = self._clock.now()
         for ear in {id(ear): ear for ear in self._ears.values()}.values():
             for data in ear.receive():

@@ -1,4 +1,4 @@
-"""The vehicles of a trial, and who observes them: the emulation's, or those of real firmware."""
+"""Vehicles of a trial with their observer: emulated ones, or those of real firmware."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from trials.truth import TruthObserver
 
 
 class Vehicles(Protocol):
-    """Some that fly, and their ``observer``."""
+    """Vehicles of a trial, and their ``observer``."""
 
     observer: Observer
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What they said of themselves in the end."""
+        """Summary that the vehicles gave at the end."""
         ...
 
     def endpoint(self, system: int) -> str:
-        """For that vehicle's companion."""
+        """Return the endpoint for that vehicle's companion."""
         ...
 
     def check(self) -> None:
-        """OutriderError if one has ended."""
+        """Raise OutriderError if a vehicle has ended."""
         ...
 
     def close(self) -> None:
-        """End those that the trial has started."""
+        """End the vehicles that the trial has started."""
         ...
 
 
 class Emulated:
-    """Those of ``outrider sitl``."""
+    """Vehicles of ``outrider sitl``."""
 
     def __init__(self, plan: Plan, fleet: FleetFrame, directory: Path) -> None:
         with ExitStack() as files:
@@ -54,24 +54,24 @@ class Emulated:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What they said."""
+        """Summary of ``outrider sitl``."""
         return self._emulation.summary
 
     def endpoint(self, system: int) -> str:
-        """For that vehicle's companion."""
+        """Return the endpoint for that vehicle's companion."""
         return self._emulation.endpoint(system)
 
     def check(self) -> None:
-        """OutriderError if they have ended."""
+        """Raise OutriderError if the process has ended."""
         self._emulation.check()
 
     def close(self) -> None:
-        """End them."""
+        """End the process and close the receiver."""
         self._files.close()
 
 
 class Real:
-    """Those of simulations of real firmware, started here or running already."""
+    """Vehicles of real firmware's simulations, started here or already running."""
 
     def __init__(self, plan: Plan, fleet: FleetFrame, directory: Path) -> None:
         flown = dict(zip(plan.systems, plan.autopilots, strict=True))
@@ -98,22 +98,22 @@ class Real:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """They say nothing."""
+        """Empty: they give no summary."""
         return {}
 
     def endpoint(self, system: int) -> str:
-        """For that vehicle's companion."""
+        """Return the endpoint for that vehicle's companion."""
         return self._endpoints[system]
 
     def check(self) -> None:
-        """OutriderError if one that was started here has ended."""
+        """Raise OutriderError if a simulation that was started here has ended."""
         self._firmware.check()
 
     def close(self) -> None:
-        """End those that were started here."""
+        """End the simulations that were started here, and close the receivers."""
         self._files.close()
 
 
 def vehicles(plan: Plan, fleet: FleetFrame, directory: Path) -> Vehicles:
-    """Those of ``plan``, with files in ``directory``."""
+    """Return the vehicles of ``plan``; their files are in ``directory``."""
     return Real(plan, fleet, directory) if plan.autopilots else Emulated(plan, fleet, directory)

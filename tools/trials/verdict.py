@@ -1,4 +1,4 @@
-"""What came of a trial: figures, and what is wrong with it."""
+"""Verdict on a trial: figures and faults."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from trials.separation import Nearest, blind
 from trials.stage import Stage
 
 _SAID = ("Target lost", "Target is back")
-"""By every companion, to the ground, in the story of mishaps."""
+"""Texts that every companion sends to the ground in the story of mishaps."""
 Said = dict[int, dict[str, Any] | None]
-"""The companions' summaries."""
+"""Summaries of the companions, by system id."""
 
 
 def verdict(stage: Stage, trouble: str | None) -> dict[str, Any]:
-    """One JSON object; ``faults`` is empty for a trial that was passed. After the stage has been closed."""
+    """Return the verdict as one JSON object; ``faults`` is empty for a trial that was passed.
+
+    ``trouble``: why the story broke off, None if it did not. The stage must have been closed.
+    """
     plan = stage.plan
     config = CompanionConfig.model_validate(plan.settings(plan.flavour_of(1))["companion"])
     d_min, target_d_min = config.field.d_min, config.target_d_min
@@ -64,7 +67,7 @@ def _scored(stage: Stage, config: CompanionConfig, summaries: Said) -> Score:
 
 
 def _counts(stage: Stage, summaries: Said) -> dict[str, Any]:
-    """What was counted of all."""
+    """Return the counts and timings of all companions."""
     sums = [said for said in summaries.values() if said is not None]
     return {
         "events": {str(system): len(wingman.events) for system, wingman in stage.wingmen.items()},
@@ -89,7 +92,7 @@ def _counts(stage: Stage, summaries: Said) -> dict[str, Any]:
 
 
 def _near(found: list[Nearest], d_min: float, target_d_min: float | None) -> list[str]:
-    """Each pair that was nearer than allowed."""
+    """Return a fault for each pair that was nearer than allowed."""
     return [
         f"{_pair(one)} are {one.distance:.2f} m apart at {one.at:.1f} s; allowed: {limit} m"
         for one in found
@@ -113,7 +116,7 @@ def _told(found: list[Nearest]) -> str | None:
 
 
 def _unsaid(stage: Stage) -> list[str]:
-    """What the ground should have been told of the mishaps."""
+    """Return a fault for each text on the mishaps that the ground station did not receive."""
     faults = []
     for system, heard in stage.station.texts.items():
         wanted = _SAID if system == ENDED else (*_SAID, f"Neighbour {ENDED} is not heard")
@@ -122,7 +125,7 @@ def _unsaid(stage: Stage) -> list[str]:
 
 
 def _wrong_with(system: int, said: dict[str, Any] | None, restarts: int) -> list[str]:
-    """A companion that came to its end."""
+    """Return the faults of a companion that has ended, from its summary."""
     if said is None:
         return [f"{system} said nothing in the end"]
     wrong = [f"{system}: set-points {fault}" for fault in said["setpoint_faults"]]

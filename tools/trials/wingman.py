@@ -1,4 +1,4 @@
-"""A running ``outrider fly``."""
+"""Running ``outrider fly`` process."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from typing import IO, Any
 
 
 class Wingman:
-    """Of vehicle ``system``, with its files below ``directory``. ``events`` are those that ``look`` has
-    read."""
+    """Companion process of vehicle ``system``, with its files below ``directory``.
+
+    ``events`` are those that ``look`` has read.
+    """
 
     def __init__(self, system: int, directory: Path, *options: str) -> None:
         self.system = system
@@ -26,7 +28,7 @@ class Wingman:
         self.start()
 
     def start(self) -> None:
-        """Begin, or begin anew after its end."""
+        """Start the process, or start it again after its end."""
         self._close()
         self._lives += 1
         self._out = self._directory / f"life-{self._lives}"
@@ -39,7 +41,7 @@ class Wingman:
             )
 
     def look(self, now: float) -> None:
-        """Read what has happened until ``now``, s of the trial."""
+        """Read the events up to ``now``, s of the trial."""
         path = self._out / "events.jsonl"
         if self._file is None:
             if not path.exists():
@@ -50,39 +52,39 @@ class Wingman:
         self.events += [{"trial_s": round(now, 2), **json.loads(line)} for line in lines]
 
     def order(self, word: str) -> None:
-        """As typed."""
+        """Send an order as if it were typed."""
         if self.process.stdin is not None:
             self.process.stdin.write(f"{word}\n".encode())
             self.process.stdin.flush()
 
     @property
     def pilot(self) -> int:
-        """The process that flies."""
+        """Process id of the child that flies."""
         last = [event["text"] for event in self.events if event["what"] == "process"][-1]
         return int(last.rpartition(" ")[2])
 
     def kill_pilot(self) -> None:
-        """SIGKILL to the process that flies."""
+        """Send SIGKILL to the process that flies."""
         os.kill(self.pilot, signal.SIGKILL)
 
     def kill(self) -> None:
-        """SIGKILL to all of it."""
+        """Send SIGKILL to all its processes."""
         os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
 
     @property
     def summary(self) -> dict[str, Any] | None:
-        """What it said in the end; None before."""
+        """Summary that it printed at its end; None before."""
         text = self._said.read_text(encoding="utf-8")
         return json.loads(text) if text.strip() else None
 
     @property
     def errors(self) -> str:
-        """What it wrote to standard error in this life."""
+        """Standard error of the current run."""
         return self._said.with_suffix(".log").read_text(encoding="utf-8", errors="replace")
 
     def close(self) -> None:
-        """End by force what still runs."""
+        """Kill what still runs, and close the files."""
         if self.process.poll() is None:
             self.kill()
         self._close()

@@ -1,5 +1,4 @@
-"""What PX4 and ArduPilot want differently: modes, the order of take-off, and which set-point fields they
-take."""
+"""Differences between PX4 and ArduPilot: modes, order of take-off steps, and set-point fields."""
 
 from __future__ import annotations
 
@@ -12,7 +11,7 @@ Params = tuple[float, float, float, float, float, float, float]
 
 
 class Step(Enum):
-    """One stage on the way into the air; which order is the autopilot's."""
+    """One step of the take-off; the order of the steps depends on the autopilot."""
 
     MODE = "guided mode"
     ARM = "arm"
@@ -20,8 +19,11 @@ class Step(Enum):
 
 
 class Shaping(NamedTuple):
-    """How the trajectory follows the set-points: its acceleration changes by at most ``jerk`` (m/s³), and
-    corrects its velocity at the rate ``velocity``, its position at the rate ``position`` (1/s)."""
+    """Dynamics of a trajectory that follows the set-points.
+
+    Its acceleration changes by at most ``jerk`` (m/s³). It corrects its velocity at the rate ``velocity``,
+    its position at the rate ``position`` (1/s).
+    """
 
     jerk: float
     position: float
@@ -29,13 +31,16 @@ class Shaping(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """Gains of an autopilot's horizontal position loop, its defaults: it asks for the velocity v_r +
-    ``position`` · error (1/s), and for the acceleration a_r + ``velocity`` · its error (1/s). ``slew``: how
-    fast (m/s³) what is added to a_r may change beside what plans ask for. ``shaping``: of an autopilot that
-    chases set-points with a trajectory of its own. ``offset_s``: over so many seconds it is seen by how much
-    the estimated velocity is off, for the velocity set-point to make up for it; 0: it does not. ``lead_us``:
-    by so much (µs) the attitude is late, and the acceleration of set-points early. ``pull``: rate (1/s) at
-    which the velocity set-point corrects the position beside what the loop does."""
+    """Default gains of an autopilot's horizontal position loop.
+
+    The loop asks for the velocity v_r + ``position`` · position error (1/s), and for the acceleration a_r +
+    ``velocity`` · velocity error (1/s). ``slew`` (m/s³): how fast the addition to a_r may change beside what
+    plans ask for. ``shaping``: for an autopilot that follows set-points with a trajectory of its own.
+    ``offset_s``: time constant (s) of the estimated velocity offset, which the velocity set-point
+    compensates; 0: no compensation. ``lead_us``: lag of the attitude (µs), by which the acceleration of
+    set-points is sent ahead. ``pull`` (1/s): rate at which the velocity set-point corrects the position in
+    addition to the loop.
+    """
 
     position: float
     velocity: float
@@ -47,18 +52,20 @@ class Loop(NamedTuple):
 
 
 class Profile(NamedTuple):
-    """An autopilot's ways. ``estimator_message``: the id of the one by which its estimator tells how it is.
-    ``mode_params`` are p1…p3 of DO_SET_MODE; ``setpoint_mask`` is the type_mask to send.
+    """Firmware-specific modes, parameters and gains of an autopilot.
 
-    ``guided_custom_mode`` is how HEARTBEAT says that our set-points steer, in the mode ``guided_name``.
-    ``streams_first``: set-points must flow before the mode is granted, and before its checks pass in it.
-    ``takeoff_absolute``: NAV_TAKEOFF wants an altitude above mean sea level, not above home.
-    ``hold_params``: p1…p3 of DO_SET_MODE for the mode, ``hold_mode`` and ``hold_name``, in which it stays
-    where it is by itself. ``fallen_modes``: what custom_mode may be when set-points were
-    missing for too long; ``loss_modes``: those of them that no pilot flies in. ``takeoff_modes`` and
-    ``land_modes``: those into which NAV_TAKEOFF, where it changes the mode, and NAV_LAND lead.
-    ``loop``: how it follows set-points.
-    ``bytewise``: PARAM_VALUE holds the bytes of an integer parameter, not its value as a float.
+    ``estimator_message``: the id of the message with the estimator's status. ``mode_params``: p1…p3 of
+    DO_SET_MODE for the guided mode; ``setpoint_mask``: the type_mask to send.
+
+    ``guided_custom_mode``: custom_mode of HEARTBEAT in which the vehicle follows set-points; ``guided_name``:
+    the name of that mode. ``streams_first``: set-points must be streamed before the mode is granted, and
+    before its pre-arm checks pass in it. ``takeoff_absolute``: NAV_TAKEOFF takes an altitude above mean sea
+    level, not above home. ``hold_params``: p1…p3 of DO_SET_MODE for the mode in which the autopilot holds its
+    position by itself, ``hold_mode`` and ``hold_name``. ``fallen_modes``: possible values of custom_mode
+    after set-points were missing for too long; ``loss_modes``: those of them that no pilot flies in.
+    ``takeoff_modes`` and ``land_modes``: the modes to which NAV_TAKEOFF, where it changes the mode, and
+    NAV_LAND lead. ``loop``: how the autopilot follows set-points. ``bytewise``: PARAM_VALUE holds the bytes
+    of an integer parameter, not its value as a float.
     """
 
     name: str
@@ -83,15 +90,15 @@ class Profile(NamedTuple):
 
     @property
     def mode_call(self) -> Params:
-        """All parameters of DO_SET_MODE for the mode in which our set-points steer."""
+        """All parameters of DO_SET_MODE for the guided mode."""
         return (*self.mode_params, 0.0, 0.0, 0.0, 0.0)
 
     @property
     def hold_call(self) -> Params:
-        """The same for the one in which it stays where it is by itself."""
+        """All parameters of DO_SET_MODE for the mode in which the autopilot holds its position."""
         return (*self.hold_params, 0.0, 0.0, 0.0, 0.0)
 
 
 def is_guided(profile: Profile, heartbeat: Heartbeat) -> bool:
-    """Whether our set-points steer this vehicle."""
+    """Return whether the vehicle's mode is the one in which it follows set-points."""
     return heartbeat.custom_mode == profile.guided_custom_mode

@@ -1,5 +1,7 @@
-"""ArduCopter: GUIDED, arm, NAV_TAKEOFF above home, then set-points with all five parts (measured as its
-best)."""
+"""Profile of ArduCopter: GUIDED, arm, NAV_TAKEOFF above home, then set-points.
+
+The set-points have all five parts, with which it was measured to follow best.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ ARDUPILOT = Profile(
     hold_mode=17,
     hold_name="BRAKE",
     land_modes=frozenset((9,)),
-    # PSC_POSXY_P and PSC_VELXY_P; of PSC_JERK_XY, 5 m/s³, plans have most.
-    # The trajectory's gains are the jerk over WPNAV_ACCEL, 2.5 m/s², and half of that.
+    # PSC_POSXY_P and PSC_VELXY_P; the slew is low because plans use most of PSC_JERK_XY, 5 m/s³. The
+    # trajectory's gains are the jerk over WPNAV_ACCEL, 2.5 m/s², and half of that.
     loop=Loop(1.0, 2.0, 1.0, Shaping(jerk=5.0, position=1.0, velocity=2.0)),
 )

@@ -1,4 +1,4 @@
-"""The autopilots that we know."""
+"""Registry of the supported autopilots."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from companion.flight.autopilots.px4 import PX4
 from mavlink_bridge.messages import Heartbeat
 
 KNOWN = {profile.autopilot: profile for profile in (ARDUPILOT, PX4)}
-"""By MAV_AUTOPILOT."""
+"""Profiles by MAV_AUTOPILOT."""
 
 
 def profile_of(heartbeat: Heartbeat) -> Profile | None:
-    """What the sender of ``heartbeat`` wants; None for one that is not known."""
+    """Return the profile for the sender of ``heartbeat``; None for an unknown autopilot."""
     return KNOWN.get(heartbeat.autopilot)

@@ -1,9 +1,9 @@
-"""Parameters of an autopilot → what it can follow.
+"""Limits of an autopilot, computed from its parameters.
 
-How each firmware uses them was read in the sources of ArduCopter 4.6.3 and PX4 1.16.1. ArduCopter shapes
-every guided set-point: the acceleration with which it corrects position and velocity, and the rate at which
-acceleration changes, are bounded. PX4 in OFFBOARD bounds speed and tilt only: MPC_ACC_HOR and MPC_JERK_MAX
-shape its own modes, and are taken here as what the vehicle was set up for.
+How each firmware uses the parameters was read in the sources of ArduCopter 4.6.3 and PX4 1.16.1. ArduCopter
+shapes every guided set-point: it bounds the acceleration with which it corrects position and velocity, and
+the rate of change of the acceleration. PX4 in OFFBOARD bounds speed and tilt only: MPC_ACC_HOR and
+MPC_JERK_MAX shape its own modes, and are used here as the limits for which the vehicle was set up.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _CENTIDEGREE: Final = math.radians(0.01)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of an autopilot that follows set-points, horizontal but for ``climb`` and ``sink``.
+    """Limits of an autopilot that follows set-points, horizontal except ``climb`` and ``sink``.
 
     ``jerk`` (m/s³), ``acceleration`` (m/s²), ``speed`` (m/s), ``tilt`` (rad). ``position_gain`` and
-    ``velocity_gain`` (1/s): of the loops that close on position and velocity. ``climb`` and ``sink`` (m/s):
-    vertical speeds, both positive. ``shaped``: jerk and acceleration are enforced on set-points; otherwise
-    only speeds and tilt are.
+    ``velocity_gain`` (1/s): of the position and velocity loops. ``climb`` and ``sink`` (m/s): vertical
+    speeds, both positive. ``shaped``: jerk and acceleration are enforced on set-points; otherwise only speeds
+    and tilt are.
     """
 
     jerk: float
@@ -48,19 +48,21 @@ class Limits:
 
     @property
     def usable_acceleration(self) -> float:
-        """The lower of acceleration and what the tilt allows (m/s²)."""
+        """The lower of ``acceleration`` and the acceleration that the tilt allows (m/s²)."""
         return min(self.acceleration, self.tilt_acceleration)
 
     def stopping_distance(self, speed: float) -> float:
-        """The way (m) from ``speed`` (m/s) to rest within acceleration and jerk, both zero at either end;
-        infinite if one of the limits is 0."""
+        """Return the distance (m) from ``speed`` (m/s) to rest within acceleration and jerk.
+
+        The acceleration is zero at both ends. Returns infinity if one of the limits is 0.
+        """
         acceleration, jerk = self.usable_acceleration, self.jerk
         if speed <= 0.0:
             return 0.0
         if min(acceleration, jerk) <= 0.0:
             return math.inf
         full = acceleration / jerk
-        # The speed is symmetric about the middle of the time that it takes.
+        # The speed is point-symmetric about the middle of the stopping time.
         time = speed / acceleration + full if speed >= acceleration * full else 2.0 * math.sqrt(speed / jerk)
         return 0.5 * speed * time
 
@@ -99,14 +101,18 @@ _STOCK: Final[Mapping[int, Mapping[str, float]]] = MappingProxyType(
 
 
 def stock_parameters(autopilot: int) -> Mapping[str, float]:
-    """The parameters that ``limits_of`` reads, with the firmware's defaults; empty for a MAV_AUTOPILOT that
-    is not known."""
+    """Return the parameters that ``limits_of`` reads, with the firmware's defaults.
+
+    Returns an empty mapping for an unknown MAV_AUTOPILOT.
+    """
     return _STOCK.get(autopilot, MappingProxyType({}))
 
 
 def limits_of(autopilot: int, parameters: Mapping[str, float]) -> Limits:
-    """The limits of a vehicle with this MAV_AUTOPILOT. A parameter that is missing or not finite counts as
-    stock, so an empty mapping gives the firmware's own limits. KeyError for an autopilot that is not known.
+    """Return the limits of a vehicle with this MAV_AUTOPILOT and these parameters.
+
+    A parameter that is missing or not finite has the stock value, so an empty mapping gives the stock
+    firmware's limits. Raises KeyError for an unknown autopilot.
     """
     stock = _STOCK[autopilot]
     values = {name: _finite(parameters.get(name), usual) for name, usual in stock.items()}
@@ -114,15 +120,15 @@ def limits_of(autopilot: int, parameters: Mapping[str, float]) -> Limits:
 
 
 def _ardupilot(values: Mapping[str, float], stock: Mapping[str, float]) -> Limits:
-    # WPNAV_ACCEL of 0 and less means the firmware's default; PSC_ANGLE_MAX of 0 means ANGLE_MAX.
+    # WPNAV_ACCEL of 0 or less means the firmware's default; PSC_ANGLE_MAX of 0 means ANGLE_MAX.
     acceleration = 0.01 * (values["WPNAV_ACCEL"] if values["WPNAV_ACCEL"] > 0.0 else stock["WPNAV_ACCEL"])
     own_tilt = values["PSC_ANGLE_MAX"]
     tilt = math.radians(own_tilt) if own_tilt > 0.0 else values["ANGLE_MAX"] * _CENTIDEGREE
     jerk = values["PSC_JERK_XY"]
     angular = min(values["ATC_ACCEL_R_MAX"], values["ATC_ACCEL_P_MAX"]) * _CENTIDEGREE
     if angular > 0.0:
-        # The mean jerk that the angular acceleration gives on the way to the full acceleration. It binds
-        # where PSC_JERK_XY was raised and WPNAV_ACCEL was not.
+        # Mean jerk that the angular acceleration allows on the way to the full acceleration. It is the lower
+        # one where PSC_JERK_XY was raised and WPNAV_ACCEL was not.
         jerk = min(jerk, 0.5 * math.sqrt(acceleration * angular * _GRAVITY))
     return Limits(
         max(jerk, 0.0),
@@ -182,8 +188,10 @@ _DECIDING: Final[Mapping[int, Mapping[str, tuple[str, ...]]]] = MappingProxyType
 
 
 def deciding(autopilot: int, parameters: Mapping[str, float], limit: str) -> tuple[str, float]:
-    """The parameter, with its value, that makes the field ``limit`` of ``limits_of`` what it is: of several
-    the one that alone comes nearest to it."""
+    """Return name and value of the parameter that determines the field ``limit`` of ``limits_of``.
+
+    If there are several, it is the one that alone gives the nearest value.
+    """
     actual = getattr(limits_of(autopilot, parameters), limit)
     stock = _STOCK[autopilot]
     values = {name: _finite(parameters.get(name), stock[name]) for name in _DECIDING[autopilot][limit]}
@@ -200,7 +208,7 @@ def _finite(value: float | None, usual: float) -> float:
 
 
 def _tilt(angle: float) -> float:
-    """Between level and the 89° that PX4 allows at most."""
+    """Clamp a tilt (rad) to between level and 89°, the largest that PX4 allows."""
     return min(max(angle, 0.0), math.radians(89.0))
 
 

@@ -1,4 +1,7 @@
-"""PX4: arm, take off in AUTO to an altitude above mean sea level, stream set-points, then OFFBOARD."""
+"""Profile of PX4: arm, take-off in AUTO, stream of set-points, then OFFBOARD.
+
+The altitude of the take-off is above mean sea level.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +29,8 @@ PX4 = Profile(
     fallen_modes=frozenset((3 << 16, _HOLD, 4 << 16 | 5 << 24, 4 << 16 | 6 << 24)),
     loss_modes=frozenset((_HOLD,)),
     takeoff_modes=frozenset((4 << 16 | 2 << 24,)),
-    # MPC_XY_P and MPC_XY_VEL_P_ACC.
-    # Its position loop has no integral: an estimated velocity that is off by 0.3 m/s leaves it 0.3 m beside.
+    # MPC_XY_P and MPC_XY_VEL_P_ACC. The position loop has no integral: an error of 0.3 m/s in the estimated
+    # velocity causes a position error of 0.3 m.
     loop=Loop(0.95, 1.8, 4.0, offset_s=0.5, lead_us=180_000, pull=0.5),
     bytewise=True,
 )

@@ -1,4 +1,4 @@
-"""What the fields of each message mean: tuples in MAVLink's wire order ↔ the SI values of ``messages``.
+"""Conversion of each message's fields: tuples in MAVLink's wire order ↔ the SI values of ``messages``.
 
 degE7 ↔ degrees (float64), mm, cm/s, mV, % ↔ m, m/s, V, 0…1; cdeg ↔ rad; ms ↔ µs (the rest is lost); markers
 of *unknown* ↔ None. ``name(source, fields)`` decodes, None if the fields are absurd; ``name_fields(message)``

@@ -1,4 +1,4 @@
-"""Those of ``messages.surroundings``."""
+"""Fields of the messages in ``messages.surroundings``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _GEOMETRIC = 1
 
 
 def _text(data: bytes) -> str:
-    """What is not ASCII is a question mark, as it is on the way out."""
+    """Decode ASCII; other characters become question marks, as in the encoder."""
     return data.split(b"\0", 1)[0].decode("ascii", errors="replace").replace("\ufffd", "?")
 
 
@@ -30,6 +30,7 @@ def _bytes(field: str, text: str, most: int) -> bytes:
 
 
 def adsb(s: m.Source, f: Fields) -> m.AdsbVehicle | None:
+    """Decode ADSB_VEHICLE; return None if a field is invalid."""
     address, latitude, longitude, altitude, heading, speed, climb, flags, _, kind, name, emitter, age = f
     if not (flags & _COORDINATES and on_globe(latitude, longitude)):
         return None
@@ -50,6 +51,7 @@ def adsb(s: m.Source, f: Fields) -> m.AdsbVehicle | None:
 
 
 def adsb_fields(x: m.AdsbVehicle) -> Fields:
+    """Encode ADSB_VEHICLE; raise EncodeError for a value that does not fit."""
     known = (
         (_ALTITUDE, x.altitude is not None),
         (_HEADING, x.course is not None),
@@ -75,19 +77,22 @@ def adsb_fields(x: m.AdsbVehicle) -> Fields:
 
 
 def named_value(s: m.Source, f: Fields) -> m.NamedValue | None:
+    """Decode NAMED_VALUE_FLOAT; return None if a field is invalid."""
     time, value, name = f
     return m.NamedValue(s, time * 1000, _text(name), value) if isfinite(value) else None
 
 
 def named_value_fields(x: m.NamedValue) -> Fields:
+    """Encode NAMED_VALUE_FLOAT; raise EncodeError for a value that does not fit."""
     if not isfinite(x.value):
         raise EncodeError(f"NAMED_VALUE_FLOAT: value = {x.value} is not finite")
     return x.time_boot // 1000, x.value, _bytes("NAMED_VALUE_FLOAT: name", x.name, _NAME)
 
 
 def camera_tracking(s: m.Source, f: Fields) -> m.CameraTrackingGeo | None:
+    """Decode CAMERA_TRACKING_GEO_STATUS; return None if a field is invalid."""
     latitude, longitude, altitude = f[:3]
-    # NaN is what a camera says of a velocity that it does not know; accuracies may be anything.
+    # A camera reports an unknown velocity as NaN; accuracies may hold any value.
     north, east, down = f[5:8]
     if not (on_globe(latitude, longitude) and isfinite(altitude)):
         return None
@@ -96,6 +101,7 @@ def camera_tracking(s: m.Source, f: Fields) -> m.CameraTrackingGeo | None:
 
 
 def camera_tracking_fields(x: m.CameraTrackingGeo) -> Fields:
+    """Encode CAMERA_TRACKING_GEO_STATUS; raise EncodeError for a value that does not fit."""
     return (
         degrees_e7("latitude", x.latitude, 90),
         degrees_e7("longitude", x.longitude, 180),
@@ -110,6 +116,7 @@ def camera_tracking_fields(x: m.CameraTrackingGeo) -> Fields:
 
 
 def obstacle_distance(s: m.Source, f: Fields) -> m.ObstacleDistance:
+    """Decode OBSTACLE_DISTANCE."""
     time, distances = f[0], f[1 : 1 + SECTORS]
     least, most, sensor, whole, increment, offset, frame = f[1 + SECTORS :]
     return m.ObstacleDistance(
@@ -126,6 +133,7 @@ def obstacle_distance(s: m.Source, f: Fields) -> m.ObstacleDistance:
 
 
 def obstacle_distance_fields(x: m.ObstacleDistance) -> Fields:
+    """Encode OBSTACLE_DISTANCE; raise EncodeError for a value that does not fit."""
     if len(x.distances) != SECTORS:
         raise EncodeError(f"OBSTACLE_DISTANCE: {len(x.distances)} distances; allowed: {SECTORS}")
     return (

@@ -1,8 +1,8 @@
-"""What ArduPilot and PX4 do differently, behind one small interface.
+"""Differences between ArduPilot and PX4, behind one small interface.
 
-The commander knows when something is asked; a flavour knows whether it is allowed, how its modes are numbered
-and how it reads a set-point. Everything here is pure: ``Status`` in, verdicts out. Sources: ArduCopter 4.6.3
-and PX4 1.16.1 as flown and measured.
+The commander receives requests; a flavour decides whether they are allowed, numbers the modes and interprets
+set-points. Everything here is pure: it takes ``Status`` and returns verdicts. Sources: ArduCopter 4.6.3 and
+PX4 1.16.1 as flown and measured.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ARMED: Final = 0x80
 
 
 class Mode(Enum):
-    """What a mode means; a flavour gives it its number."""
+    """Meaning of a mode; a flavour gives it its number."""
 
     STANDBY = "standby"
     POSITION = "position"
@@ -48,19 +48,22 @@ class Mode(Enum):
 
 
 ACTIONS: Final = {"warn": None, "hold": Mode.HOLD, "land": Mode.LAND, "return": Mode.RETURN}
-"""The mode that follows, by what the settings call it."""
+"""Modes that failsafe actions enter, by the names in the settings."""
 
 
 def limit(setting: float | None, usual: float) -> float:
-    """A limit (m): the ``usual`` one if nothing is set, none if it is 0."""
+    """Return a limit (m): ``usual`` if ``setting`` is None, infinity if it is 0."""
     return (usual if setting is None else setting) or math.inf
 
 
 class Status(NamedTuple):
-    """What a decision may depend on. ``height`` (m) above home. ``stream_age`` and ``stream_gap`` (s): since
-    the last usable set-point, and between it and the one before it (0 when it is the first of its stream).
-    ``items``, ``takes_off``: how many items the mission has, and whether it begins with a takeoff; told when
-    its mode is asked for."""
+    """Inputs of a decision.
+
+    ``height`` (m) is above home. ``stream_age`` and ``stream_gap`` (s) are the time since the last usable
+    set-point, and between it and its predecessor (0 if it is the first of its stream). ``items`` and
+    ``takes_off``: how many items the mission has, and whether it begins with a takeoff; set only when the
+    mission mode is requested.
+    """
 
     armed: bool
     landed: bool
@@ -75,7 +78,7 @@ class Status(NamedTuple):
 
 
 class Worry(NamedTuple):
-    """How bad it is about a battery (0: not at all), in a word, and the mode that follows, if any."""
+    """Severity of the battery's state (0: good), its name, and the mode that follows, if any."""
 
     level: int
     word: str = ""
@@ -83,133 +86,140 @@ class Worry(NamedTuple):
 
 
 class Takeoff(NamedTuple):
-    """Climb to ``height`` (m above home), in this mode."""
+    """Accepted takeoff: climb to ``height`` (m above home) in ``mode``."""
 
     height: float
     mode: Mode
 
 
 class Denial(NamedTuple):
-    """Not now or not at all: a MAV_RESULT, and why."""
+    """Refusal, temporary or final: a MAV_RESULT and the reason."""
 
     result: int
     reason: str
 
 
 class Flavour(Protocol):
-    """One firmware's dialect and rules."""
+    """Dialect and rules of one firmware."""
 
     autopilot: int
     """MAV_AUTOPILOT."""
     boot_mode: Mode
     stream_first: bool
-    """Whether set-points count before GUIDED is entered, and can take the vehicle off the ground in it."""
+    """Whether set-points count before GUIDED is entered, and can lift the vehicle off the ground in it."""
     stops: bool
-    """Whether a set-point in a frame that it does not know means *stop*; else it is refused."""
+    """Whether a set-point in an unknown frame means *stop*; else it is refused."""
     reports_ekf: bool
     """Whether EKF_STATUS_REPORT (193) is streamed."""
     echoes_yaw: bool
-    """Whether POSITION_TARGET_LOCAL_NED (85) comes back with yaw."""
+    """Whether POSITION_TARGET_LOCAL_NED (85) includes yaw."""
     shortest_interval: int
-    """µs; SET_MESSAGE_INTERVAL (511) refuses less."""
+    """µs; SET_MESSAGE_INTERVAL (511) refuses shorter intervals."""
     bytewise: bool
     """Whether integer parameters are sent as their bytes (PARAM_ENCODE_BYTEWISE)."""
     groups_streams: bool
-    """Whether REQUEST_DATA_STREAM (66) is obeyed."""
+    """Whether REQUEST_DATA_STREAM (66) is supported."""
     after_takeoff: Mode
     after_landing: Mode
     keeps_choice: bool
-    """Whether the last mode that was chosen and may be armed in comes back when it is disarmed, and GUIDED
-    when its set-points do."""
+    """Whether disarming restores the last chosen mode in which arming is allowed.
+
+    If so, GUIDED resumes when its set-points resume.
+    """
     after_return: Mode
     after_mission: Mode
-    """The mode when the last item is done."""
+    """The mode after the last item."""
     set_mode_ack: int
     """The command that COMMAND_ACK (77) names after SET_MODE (11)."""
     first_item: int
-    """The first item of a mission that is flown: ArduPilot keeps home as item 0."""
+    """The first mission item that is flown: ArduPilot keeps home as item 0."""
     start_arms: bool
     """Whether MISSION_START (300) arms."""
     after_loss: Mode
-    """The mode when set-points time out."""
+    """The mode after set-points have timed out."""
     coasting: float
-    """s; so long its filter has a position without GPS."""
+    """Time during which the filter keeps a position without GPS (s)."""
     blind_patience: int
-    """µs; flying without a position for so long, it lands."""
+    """Time in flight without a position after which it lands (µs)."""
     blind_text: str
-    """STATUSTEXT (253) of that."""
+    """STATUSTEXT (253) of that landing."""
 
     doubt_prefix: str
-    """STATUSTEXT (253) of what speaks against arming begins so."""
+    """Prefix of the STATUSTEXT (253) of an objection to arming."""
     repeats_doubts: bool
-    """Whether it says them without being asked."""
+    """Whether objections to arming are repeated without a request."""
     checks_mode: bool
-    """Whether its pre-arm check (SYS_STATUS) asks for a mode in which it may be armed."""
+    """Whether the pre-arm check (SYS_STATUS) requires a mode in which arming is allowed."""
     battery_patience: int
-    """µs; a battery counts as low when it has been so for as long."""
+    """Time for which a battery must be low before it counts as low (µs)."""
     loiter: Mode
-    """Of NAV_LOITER_UNLIM (17)."""
+    """The mode that NAV_LOITER_UNLIM (17) enters."""
     repositioning: Mode
-    """In which DO_REPOSITION (192) moves it."""
+    """The mode in which DO_REPOSITION (192) moves the vehicle."""
     fence_rules: Rules
-    """When a fence is breached, and what follows."""
+    """Conditions of a fence breach, and the action that follows."""
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other settings from now on."""
+        """Use new settings from now on."""
         ...
 
     def custom_mode(self, mode: Mode) -> int:
-        """HEARTBEAT.custom_mode."""
+        """Return HEARTBEAT.custom_mode."""
         ...
 
     def base_mode(self, mode: Mode) -> int:
-        """HEARTBEAT.base_mode without the armed bit."""
+        """Return HEARTBEAT.base_mode without the armed bit."""
         ...
 
     def split(self, custom_mode: int, /) -> tuple[int, int]:
-        """``custom_mode`` as the two parameters of DO_SET_MODE."""
+        """Return ``custom_mode`` as the two parameters of DO_SET_MODE."""
         ...
 
     def requested(self, main: int, sub: int, /) -> Mode | None:
-        """The mode that DO_SET_MODE (176) asks for by parameters 2 and 3, None when there is none such."""
+        """Return the mode that parameters 2 and 3 of DO_SET_MODE (176) request, or None if unknown."""
         ...
 
     def armable_mode(self, mode: Mode, /) -> bool:
-        """Whether it can be armed in this mode."""
+        """Return whether arming is allowed in ``mode``."""
         ...
 
     def arming_denial(self, status: Status) -> str | None:
-        """Why it must not arm now."""
+        """Return the reason against arming now, or None."""
         ...
 
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
-        """Why ``mode`` must not be entered now."""
+        """Return the reason against entering ``mode`` now, or None."""
         ...
 
     def worry(self, charge: Charge, /) -> Worry:
-        """How bad it is about the battery."""
+        """Return the severity of the battery's state."""
         ...
 
     def takeoff(
         self, altitude: float, relative: bool | None, ground: float, status: Status, /
     ) -> Takeoff | Denial:
-        """NAV_TAKEOFF (22) to ``altitude`` (m; NaN when not given), above home if ``relative``, above mean
-        sea level if not, None when the message has no frame. ``ground``: home's altitude above mean sea level
-        (m)."""
+        """Decide on NAV_TAKEOFF (22) to ``altitude`` (m; NaN if not given).
+
+        ``altitude`` is above home if ``relative`` is True, above mean sea level if False; None if the message
+        has no frame. ``ground``: home's altitude above mean sea level (m).
+        """
         ...
 
     def read(self, message: SetpointLocal, here: Pose) -> Reading:
-        """What a set-point asks for; offsets and body axes are resolved with ``here``."""
+        """Interpret a set-point; ``here`` resolves offsets and body axes."""
         ...
 
     def read_attitude(self, message: SetpointAttitude, /) -> Reading:
-        """What an attitude and a thrust ask for."""
+        """Interpret an attitude and a thrust."""
         ...
 
     def steering_denial(self, status: Status) -> str | None:
-        """Why a good set-point is not followed now; an empty text when that is no cause for complaint."""
+        """Return the reason against following a good set-point now, or None.
+
+        An empty text means that it is ignored without a complaint.
+        """
         ...
 
     def timeout(self, setpoint: Setpoint, /) -> int | None:
-        """How long (µs) it is followed when no other comes; None for ever."""
+        """Return how long (µs) ``setpoint`` is followed without a successor; None for no limit."""
         ...

@@ -1,5 +1,4 @@
-"""ArduCopter 4.6: modes by one number, triples of ignore bits, offsets and body frames, takeoff by
-command."""
+"""ArduCopter 4.6: single-number modes, triples of ignore bits, offset and body frames, takeoff by command."""
 
 from __future__ import annotations
 
@@ -78,9 +77,10 @@ _TRIPLES: Final = (IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION)
 
 
 class ArduPilot:
-    """STABILIZE 0, AUTO 3, GUIDED 4, LOITER 5, RTL 6, LAND 9, BRAKE 17, FOLLOW 23.
+    """Dialect and rules of ArduCopter.
 
-    The force bit of a set-point means nothing to it: MAVProxy's velocity command has it set.
+    Modes: STABILIZE 0, AUTO 3, GUIDED 4, LOITER 5, RTL 6, LAND 9, BRAKE 17, FOLLOW 23. The force bit of a
+    set-point has no effect, because MAVProxy's velocity command sets it.
     """
 
     autopilot = 3
@@ -89,7 +89,7 @@ class ArduPilot:
     stops = True
     reports_ekf = True
     echoes_yaw = False
-    # Streams are served from the 400 Hz loop, and not faster than 80 % of it.
+    # Streams are served from the 400 Hz loop, at no more than 80 % of its rate.
     shortest_interval = 3125
     bytewise = False
     groups_streams = True
@@ -98,7 +98,7 @@ class ArduPilot:
     keeps_choice = False
     after_return = Mode.RETURN
     after_mission = Mode.MISSION
-    # As if the number of the message were a command's.
+    # The acknowledgement names the id of the message as if it were a command's.
     set_mode_ack = 11
     first_item = 1
     start_arms = False
@@ -119,6 +119,7 @@ class ArduPilot:
         self.configure(config)
 
     def configure(self, config: AutopilotConfig) -> None:
+        """Use new settings from now on."""
         self._timeout = round(config.guided_timeout * 1e6)
         self._climb, self._sink = config.waypoint_climb, config.waypoint_sink
         self._battery = config.battery_failsafe
@@ -136,26 +137,33 @@ class ArduPilot:
         )
 
     def custom_mode(self, mode: Mode) -> int:
+        """Return HEARTBEAT.custom_mode."""
         return _NUMBERS[mode]
 
     def base_mode(self, mode: Mode) -> int:
+        """Return HEARTBEAT.base_mode without the armed bit."""
         guided = GUIDED_FLAG if mode not in (Mode.STANDBY, Mode.POSITION) else 0
         return CUSTOM | STABILIZED | MANUAL | guided
 
     def split(self, custom_mode: int, /) -> tuple[int, int]:
+        """Return ``custom_mode`` as the two parameters of DO_SET_MODE."""
         return custom_mode, 0
 
     def requested(self, main: int, _sub: int, /) -> Mode | None:
+        """Return the mode that DO_SET_MODE (176) requests, or None."""
         return _MODES.get(main)
 
     def armable_mode(self, mode: Mode, /) -> bool:
+        """Return whether arming is allowed in ``mode``."""
         return mode not in _NOT_ARMABLE
 
     def arming_denial(self, status: Status) -> str | None:
+        """Return the reason against arming in the present mode, or None."""
         name = _NAMES.get(status.mode, status.mode.name)
         return None if self.armable_mode(status.mode) else f"{name} mode is not armable"
 
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
+        """Return the reason against entering ``mode`` now, or None."""
         if mode is Mode.STANDBY and status.armed and not status.landed:
             return Denial(FAILED, "STABILIZE in flight needs a pilot")
         if mode not in (Mode.STANDBY, Mode.LAND) and not status.ready:
@@ -169,6 +177,7 @@ class ArduPilot:
         return None
 
     def worry(self, charge: Charge, /) -> Worry:
+        """Return the severity of the battery's state, by voltage."""
         battery = self._battery
         if charge.voltage < battery.critical_voltage:
             return Worry(2, "critical", ACTIONS[battery.critical_action])
@@ -179,6 +188,7 @@ class ArduPilot:
     def takeoff(
         self, altitude: float, relative: bool | None, _ground: float, status: Status, /
     ) -> Takeoff | Denial:
+        """Decide on NAV_TAKEOFF (22) to ``altitude`` (m above home)."""
         if relative is False:
             return Denial(DENIED, "Takeoff needs an altitude above home")
         if not math.isfinite(altitude) or altitude <= 0.0:
@@ -192,6 +202,7 @@ class ArduPilot:
         return Takeoff(altitude, Mode.GUIDED)
 
     def read(self, message: SetpointLocal, here: Pose) -> Reading:
+        """Interpret a set-point; ``here`` resolves offsets and body axes."""
         mask = message.type_mask
         for triple in _TRIPLES:
             mask |= triple if mask & triple else 0
@@ -218,9 +229,11 @@ class ArduPilot:
         )
 
     def read_attitude(self, message: SetpointAttitude, /) -> Reading:
+        """Interpret an attitude, with its thrust as a climb rate."""
         return climbing(message, self._climb, self._sink)
 
     def steering_denial(self, status: Status) -> str | None:
+        """Return the reason against following a good set-point now, or None."""
         if status.mode is not Mode.GUIDED:
             return "Set-point ignored: not in GUIDED"
         if not status.armed:
@@ -230,6 +243,7 @@ class ArduPilot:
         return None
 
     def timeout(self, setpoint: Setpoint, /) -> int | None:
+        """Return how long (µs) ``setpoint`` is followed without a successor; None if it does not move."""
         return self._timeout if setpoint.moves else None
 
 
@@ -238,7 +252,11 @@ def _turned(vector: Vector, yaw: float) -> Vector:
 
 
 def _placed(message: SetpointLocal, here: Pose) -> Vector:
-    """Frame 1: from the origin. 7: from here, along north and east. 8 and 9: from here, along the body."""
+    """Return the position (m, local NED) of a set-point.
+
+    Frame 1 counts from the origin; frame 7 from here, along north and east; frames 8 and 9 from here, along
+    the body's axes.
+    """
     if message.frame == LOCAL_NED:
         return message.position
     turn = 0.0 if message.frame == LOCAL_OFFSET_NED else here.yaw

@@ -1,5 +1,4 @@
-"""PX4 1.16: main and sub modes, ignore bits per axis, offboard only with a stream, takeoff also by
-set-point."""
+"""PX4 1.16: main and sub modes, ignore bits per axis, offboard only with a stream, takeoff by set-point."""
 
 from __future__ import annotations
 
@@ -58,13 +57,16 @@ _NUMBERS: Final = {
 }
 _MODES: Final = {number: mode for mode, number in _NUMBERS.items() if mode is not Mode.STANDBY}
 _LOSS: Final = {"hold": Mode.HOLD, "land": Mode.LAND, "return": Mode.RETURN, "descend": Mode.POSITION}
-# Offboard needs more than 2 Hz.
+# Longest set-point interval (s): offboard needs more than 2 Hz.
 _SLOWEST: Final = 0.5
 
 
 class Px4:
-    """POSCTL 3, AUTO 4 (TAKEOFF 2, LOITER 3, MISSION 4, RTL 5, LAND 6, FOLLOW 8), OFFBOARD 6;
-    custom_mode is main << 16 | sub << 24."""
+    """Dialect and rules of PX4.
+
+    Modes: POSCTL 3, AUTO 4 (TAKEOFF 2, LOITER 3, MISSION 4, RTL 5, LAND 6, FOLLOW 8), OFFBOARD 6; custom_mode
+    is main << 16 | sub << 24.
+    """
 
     autopilot = 12
     boot_mode = Mode.HOLD
@@ -80,7 +82,7 @@ class Px4:
     keeps_choice = True
     after_return = Mode.HOLD
     after_mission = Mode.HOLD
-    # It makes a DO_SET_MODE of it.
+    # PX4 turns SET_MODE into a DO_SET_MODE.
     set_mode_ack = 176
     first_item = 0
     start_arms = True
@@ -99,6 +101,7 @@ class Px4:
         self.configure(config)
 
     def configure(self, config: AutopilotConfig) -> None:
+        """Use new settings from now on."""
         self.after_loss = _LOSS[config.offboard_loss]
         self._timeout = round(config.offboard_timeout * 1e6)
         self._takeoff_height = config.takeoff_height
@@ -109,30 +112,37 @@ class Px4:
         )
 
     def custom_mode(self, mode: Mode) -> int:
+        """Return HEARTBEAT.custom_mode."""
         main, sub = _NUMBERS[mode]
         return main << 16 | sub << 24
 
     def base_mode(self, mode: Mode) -> int:
+        """Return HEARTBEAT.base_mode without the armed bit."""
         if mode in (Mode.STANDBY, Mode.POSITION):
             return CUSTOM | STABILIZED | MANUAL
         return CUSTOM | STABILIZED | (0 if mode is Mode.GUIDED else GUIDED_FLAG | AUTO)
 
     def split(self, custom_mode: int, /) -> tuple[int, int]:
+        """Return ``custom_mode`` as the two parameters of DO_SET_MODE."""
         return custom_mode >> 16 & 0xFF, custom_mode >> 24
 
     def requested(self, main: int, sub: int, /) -> Mode | None:
+        """Return the mode that DO_SET_MODE (176) requests, or None."""
         return _MODES.get((main, sub))
 
     def armable_mode(self, mode: Mode, /) -> bool:
+        """Return whether arming is allowed in ``mode``."""
         return mode not in (Mode.FOLLOW, Mode.RETURN, Mode.LAND)
 
     def arming_denial(self, status: Status) -> str | None:
+        """Return the reason against arming now, or None."""
         if status.mode is Mode.GUIDED and not _streaming(status):
             return "no offboard signal"
         return None if self.armable_mode(status.mode) else f"{status.mode.name} mode is not armable"
 
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
-        # On the ground any mode can be chosen; then the stream counts when it is to be armed.
+        """Return the reason against entering ``mode`` now, or None."""
+        # Any mode can be chosen while disarmed; the stream is then checked at arming.
         if mode is Mode.GUIDED and status.armed and not _streaming(status):
             return Denial(TEMPORARILY_REJECTED, "OFFBOARD needs set-points at more than 2 Hz")
         if not status.ready and (status.landed or mode is not Mode.LAND):
@@ -142,6 +152,7 @@ class Px4:
         return None
 
     def worry(self, charge: Charge, /) -> Worry:
+        """Return the severity of the battery's state, by its remaining charge."""
         battery = self._battery
         if charge.remaining < battery.emergency:
             return Worry(3, "at its end", None if battery.action == "warn" else Mode.LAND)
@@ -152,6 +163,7 @@ class Px4:
     def takeoff(
         self, altitude: float, relative: bool | None, ground: float, status: Status, /
     ) -> Takeoff | Denial:
+        """Decide on NAV_TAKEOFF (22) to ``altitude`` (m)."""
         if not status.ready:
             return Denial(TEMPORARILY_REJECTED, "Takeoff refused: no position estimate")
         if math.isinf(altitude):
@@ -159,10 +171,11 @@ class Px4:
         height = altitude if relative else altitude - ground
         if not status.landed and not status.taking_off:
             height = height if height > status.height else status.height
-        # Never lower than the default height, as with MIS_TAKEOFF_ALT.
+        # The height is at least the default, as with MIS_TAKEOFF_ALT.
         return Takeoff(height if height > self._takeoff_height else self._takeoff_height, Mode.TAKEOFF)
 
     def read(self, message: SetpointLocal, here: Pose) -> Reading:
+        """Interpret a set-point; ``here`` resolves body axes."""
         mask = message.type_mask
         if fault := unusable(message, mask):
             return Refusal(fault)
@@ -191,12 +204,15 @@ class Px4:
         )
 
     def read_attitude(self, message: SetpointAttitude, /) -> Reading:
+        """Interpret an attitude and a thrust."""
         return thrusting(message)
 
     def steering_denial(self, status: Status) -> str | None:
+        """Return None to follow set-points now, or an empty text to ignore them without complaint."""
         return None if status.mode is Mode.GUIDED and status.armed else ""
 
     def timeout(self, _setpoint: Setpoint, /) -> int | None:
+        """Return how long (µs) a set-point is followed without a successor."""
         return self._timeout
 
 

@@ -1,5 +1,5 @@
-"""Missions, fences and rally points: held, sent up and down, and the mission flown.
+"""Missions, fences and rally points: storage, transfer over MAVLink, and flight of the mission.
 
-messages → transfer → plans → itinerary → guidance. Fences are watched by ``sitl.autopilot.failsafes``; their
-return points, and rally points, are kept and given back and change no flight.
+The flow is messages → transfer → plans → itinerary → guidance. ``sitl.autopilot.failsafes`` monitors fences.
+Their return points, and rally points, are stored and returned but change no flight.
 """

@@ -1,4 +1,4 @@
-"""One item of a mission, a fence or a list of rally points: what it must be to be taken."""
+"""One item of a mission, a fence or a list of rally points, and the conditions for its acceptance."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 
 class Type(IntEnum):
-    """MAV_MISSION_TYPE."""
+    """Values of MAV_MISSION_TYPE."""
 
     MISSION = 0
     FENCE = 1
@@ -25,7 +25,7 @@ UNSUPPORTED: Final = 3
 NO_SPACE: Final = 4
 INVALID: Final = 5
 INVALID_PARAM: Final = (6, 7, 8, 9, 10, 11, 12)
-"""For parameters 1 to 7."""
+"""Results for parameters 1 to 7."""
 INVALID_SEQUENCE: Final = 13
 DENIED: Final = 14
 CANCELLED: Final = 15
@@ -41,11 +41,11 @@ DELAY: Final = 93
 JUMP: Final = 177
 CHANGE_SPEED: Final = 178
 FLOWN: Final = frozenset((WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, RETURN, LAND, TAKEOFF, DELAY))
-"""Those that take time: NAV commands."""
-# For cameras and gimbals, which are not there: accepted as real ones do, and passed over.
+"""NAV commands: items that take time."""
+# Commands for cameras and gimbals, which do not exist: accepted as by real firmwares, and skipped.
 _PAYLOAD: Final = frozenset((203, 205, 206, 530, 1000, 1001, 2000, 2001, 2500, 2501))
 _PLACED: Final = FLOWN - {RETURN, DELAY}
-# Fence: return point, polygon to stay in and out of, circle to stay in and out of
+# Fence: return point, inclusion and exclusion polygons, inclusion and exclusion circles
 _FENCE_RETURN, _POLYGONS, _CIRCLES = 5000, (5001, 5002), (5003, 5004)
 _RALLY: Final = 5100
 
@@ -61,7 +61,7 @@ _FEWEST: Final = 3
 
 
 class Item(NamedTuple):
-    """As MISSION_ITEM_INT (73) has it: ``x``, ``y`` in degE7, ``z`` in m, the frame says above what."""
+    """One item as in MISSION_ITEM_INT (73): ``x``, ``y`` in degE7, ``z`` in m above the frame's reference."""
 
     frame: int
     command: int
@@ -73,12 +73,12 @@ class Item(NamedTuple):
 
     @property
     def here(self) -> bool:
-        """Whether it says no place, and means where the vehicle is."""
+        """Whether it gives no place, and so means the vehicle's position."""
         return self.x == self.y == 0 or NOWHERE in (self.x, self.y)
 
 
 def fault(item: Item, of: Type) -> int:
-    """The MAV_MISSION_RESULT with which ``item`` is refused in a plan of that type, or ACCEPTED."""
+    """Return the MAV_MISSION_RESULT that refuses ``item`` in a plan of type ``of``, or ACCEPTED."""
     if of is Type.MISSION:
         return _mission_fault(item)
     known = (_RALLY,) if of is Type.RALLY else (_FENCE_RETURN, *_POLYGONS, *_CIRCLES)
@@ -93,7 +93,7 @@ def fault(item: Item, of: Type) -> int:
 
 
 def whole_fault(items: tuple[Item, ...], of: Type) -> int:
-    """The same for what can be said only of all items together."""
+    """Return the MAV_MISSION_RESULT of the checks that need all items of a plan, or ACCEPTED."""
     at = 0
     while at < len(items):
         item = items[at]
@@ -132,7 +132,7 @@ def _place_fault(item: Item) -> int:
             return INVALID_PARAM[4]
         if abs(item.y) > _LAST[1]:
             return INVALID_PARAM[5]
-    # A landing says nothing about the height, and rally points and fences not always.
+    # The height may be NaN only for a landing, which does not use it.
     if not abs(item.z) <= _HIGHEST and not (item.command == LAND and math.isnan(item.z)):
         return INVALID_PARAM[6]
     return ACCEPTED

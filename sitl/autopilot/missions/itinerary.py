@@ -1,7 +1,7 @@
-"""Which item of the mission is flown, and what becomes of it: the way through a plan.
+"""Progress through a mission: the choice of the current item and its execution.
 
-Items that take time (NAV) are flown one after the other; those between them (DO) happen on the way. What
-moves is the guidance: a waypoint is a destination with a speed, and is passed when the estimate is near
+Items that take time (NAV) are flown one after the other; those between them (DO) are executed on the way. The
+guidance moves the vehicle: a waypoint is a destination with a speed, and is passed when the estimate is near
 enough.
 """
 
@@ -34,17 +34,17 @@ from sitl.estimation.sensors import Estimate
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 
-# A height is reached this near (m).
+# Distance (m) at which a height counts as reached.
 _LEVEL: Final = 0.3
-# Nearer than this (m) there is no bearing to turn to.
+# Distance (m) below which there is no bearing to turn to.
 _NEAR: Final = 1.0
 _FOR_EVER: Final = -1
-# Ground and air speed; without wind in the plan they are one.
+# SPEED_TYPE of air and ground speed, which are equal because plans ignore wind.
 _SPEEDS: Final = (0.0, 1.0)
 
 
 class Phase(Enum):
-    """What of an item is being done."""
+    """Phase of the current item."""
 
     IDLE = "idle"
     LIFTING = "lifting"
@@ -55,15 +55,18 @@ class Phase(Enum):
 
 
 class Event(Enum):
-    """What the commander has to know."""
+    """Event for the commander."""
 
     FINISHED = "finished"
     RETURNS = "returns"
 
 
 class Itinerary:
-    """The progress through the mission of ``plans``. ``current`` is the item that is flown or will be;
-    ``reached`` collects the items that are done, until someone has told them."""
+    """Progress through the mission of ``plans``.
+
+    ``current`` is the item that is flown or will be. ``reached`` collects the completed items until they have
+    been reported.
+    """
 
     def __init__(
         self,
@@ -76,9 +79,12 @@ class Itinerary:
         *,
         px4: bool,
     ) -> None:
-        """``first``: item 0 is home for ArduPilot. ``px4``: a mission that begins on the ground without a
-        takeoff takes off all the same, and a waypoint may say its own radius (parameter 2) and heading
-        (4)."""
+        """Set the firmware's mission rules.
+
+        ``first`` is the first item to fly; item 0 is home for ArduPilot. ``px4``: a mission that begins on
+        the ground without a takeoff takes off all the same, and a waypoint may set its own radius (parameter
+        2) and heading (4).
+        """
         self._plans = plans
         self._guidance = guidance
         self._home = home
@@ -95,7 +101,7 @@ class Itinerary:
         self.reached: list[int] = []
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other settings from now on."""
+        """Use new settings from now on."""
         self._config = config
 
     @property
@@ -104,36 +110,38 @@ class Itinerary:
 
     @property
     def total(self) -> int:
-        """Items, without home."""
+        """Number of items, without home."""
         return max(0, len(self._items) - self._first)
 
     @property
     def begun(self) -> bool:
-        """Whether it is beyond its beginning."""
+        """Whether progress is beyond the first item."""
         return self.current > self._first
 
     @property
     def takes_off(self) -> bool:
-        """Whether the first thing to fly is a takeoff."""
+        """Whether the first item to fly is a takeoff."""
         flown = [item.command for item in self._items[self._first :] if item.command in FLOWN]
         return flown[:1] == [TAKEOFF]
 
     def rewind(self) -> None:
-        """To the beginning, at rest."""
+        """Return to the beginning, at rest."""
         self.phase, self.current = Phase.IDLE, self._first
         self._speed = None
         self._jumps.clear()
 
     def replaced(self) -> None:
-        """The mission is another: from its beginning; ArduPilot in flight goes on with the item of the same
-        number."""
+        """Handle the replacement of the mission: begin anew.
+
+        ArduPilot in flight continues with the item of the same number.
+        """
         if self._px4 or self._guidance.activity is Activity.IDLE or self.current >= len(self._items):
             self.rewind()
         else:
             self.pause()
 
     def select(self, seq: int) -> bool:
-        """Go on with item ``seq``; False if there is none such. Begins when ``advance`` is called."""
+        """Continue with item ``seq`` at the next ``advance``; return False if it does not exist."""
         if not 0 <= seq < len(self._items):
             return False
         self.phase, self.current = Phase.IDLE, max(seq, self._first)
@@ -141,16 +149,16 @@ class Itinerary:
         return True
 
     def hasten(self, speed: float | None) -> None:
-        """Fly on at ``speed`` (m/s); None: the usual one."""
+        """Continue at ``speed`` (m/s); None restores the default."""
         self._speed = speed
 
     def pause(self) -> None:
-        """Something else flies now; it goes on with the same item."""
+        """Interrupt the mission; it will resume with the same item."""
         if self.phase is not Phase.DONE:
             self.phase = Phase.IDLE
 
     def advance(self, now: int, here: Estimate) -> Event | None:
-        """Fly on: to be called in each step at ``now`` (µs) while the mission flies."""
+        """Continue the mission; call this in each step at ``now`` (µs) while the mission is flown."""
         match self.phase:
             case Phase.IDLE:
                 return self._begin(here)
@@ -163,17 +171,17 @@ class Itinerary:
         return None
 
     def landed(self) -> None:
-        """The motors were stopped on the ground, which ends a landing."""
+        """Complete a landing, after the motors have stopped on the ground."""
         if self.phase is Phase.LANDING:
             self.reached.append(self.current)
             self.phase = Phase.DONE
 
-    # Within
+    # Internals
 
     def _begin(self, here: Estimate) -> Event | None:
-        """Do what can be done at once, up to the next item that is flown."""
+        """Execute the immediate items, up to the next item that is flown."""
         items = self._items
-        # A plan of nothing but jumps would go round for ever.
+        # A plan of nothing but jumps would loop for ever.
         for _ in range(2 * len(items) + 1):
             if self.current >= len(items):
                 break
@@ -209,7 +217,7 @@ class Itinerary:
         return self._fly(here)
 
     def _fly(self, here: Estimate) -> Event | None:
-        """Leave for the current item, in the air."""
+        """Start flying to the current item, in the air."""
         item = self._items[self.current]
         match item.command:
             case command if command == RETURN:
@@ -253,7 +261,7 @@ class Itinerary:
         if item.command == TAKEOFF:
             return self._is_high(here)
         if item.command == LAND:
-            # It sinks from the height that it has.
+            # The descent may begin at any height.
             return math.dist(here.position[:2], self._target[:2]) <= min(0.3, self._config.acceptance_radius)
         return math.dist(here.position, self._target) <= self._radius(item)
 
@@ -262,16 +270,16 @@ class Itinerary:
         return own if 0.0 < own < math.inf else self._config.acceptance_radius
 
     def _height(self, item: Item) -> float:
-        """m above the origin."""
+        """Return the height of an item (m above the origin)."""
         above = self._home.height if item.frame in ABOVE_HOME else -self._origin.altitude
         return item.z + above
 
     def _place(self, item: Item, here: Estimate) -> Vector:
-        """Where an item leads, m, local NED."""
+        """Return the destination of an item (m, local NED)."""
         north, east, down = here.position
         if item.command == LAND or item.command == TAKEOFF:
             if item.here or item.command == TAKEOFF:
-                # A takeoff in the air leads up or nowhere.
+                # A takeoff in the air climbs or stays.
                 return north, east, down if item.command == LAND else min(down, -self._height(item))
             x, y, _ = self._origin.local(item.x / 1e7, item.y / 1e7, self._origin.altitude)
             return x, y, down
@@ -282,7 +290,7 @@ class Itinerary:
         return x, y, z
 
     def _leg_speed(self, here: Estimate) -> float:
-        """The speed (m/s) along the leg that neither climbs nor sinks too fast."""
+        """Return the speed (m/s) along the leg, within the limits of climb and sink rate."""
         speed = self._speed or self._config.waypoint_speed
         length = math.dist(here.position, self._target)
         rise = here.position[2] - self._target[2]
@@ -291,7 +299,7 @@ class Itinerary:
         return min(speed, limit * length / abs(rise)) if rise else speed
 
     def _yaw(self, item: Item, here: Estimate) -> float | None:
-        """rad: to where it flies, or as PX4's parameter 4 says (degrees)."""
+        """Return the yaw (rad): along the leg, or PX4's parameter 4 (degrees)."""
         if self._px4 and math.isfinite(item.params[3]) and item.command != LAND:
             return math.radians(item.params[3])
         north, east = self._target[0] - here.position[0], self._target[1] - here.position[1]

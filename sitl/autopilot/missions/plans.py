@@ -1,4 +1,4 @@
-"""The plans that a vehicle holds: a mission, a fence, rally points."""
+"""Plans that a vehicle stores: a mission, a fence, rally points."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _ITEM: Final = Struct("<BHB4fiif")
 
 
 class Plans:
-    """By type, the items of each. ``changed`` is called when the mission is another."""
+    """Items of each plan, by type. ``changed`` is called when the mission is replaced."""
 
     def __init__(self, saved: tuple[tuple[Item, ...], ...]) -> None:
-        """``saved``: the items of mission, fence and rally points; what would be refused is left out."""
+        """``saved``: the items of mission, fence and rally points; invalid plans are dropped."""
         self.changed: Callable[[], None] = lambda: None
         self._items: dict[Type, tuple[Item, ...]] = dict.fromkeys(Type, ())
         self._identities: dict[Type, int] = {}
@@ -26,19 +26,19 @@ class Plans:
                 self._items[of] = items
 
     def items(self, of: Type) -> tuple[Item, ...]:
-        """The items of one plan."""
+        """Return the items of one plan."""
         return self._items[of]
 
     def replace(self, of: Type, items: tuple[Item, ...]) -> None:
-        """Another plan from now on."""
+        """Replace a plan."""
         self._items[of] = items
         self._identities.pop(of, None)
         if of is Type.MISSION:
             self.changed()
 
     def identity(self, of: Type) -> int:
-        """The opaque id of one plan: the same for the same items, 0 for none."""
-        # Worked out once, as it goes out with every acknowledgement.
+        """Return the opaque id of one plan: equal for equal items, 0 for none."""
+        # Cached, because every acknowledgement contains it.
         if of not in self._identities:
             self._identities[of] = self._summed(of)
         return self._identities[of]
@@ -54,5 +54,5 @@ class Plans:
 
     @property
     def all(self) -> tuple[tuple[Item, ...], ...]:
-        """What there is to save."""
+        """All plans, in the order of ``Type``, for saving."""
         return tuple(self._items[of] for of in Type)

@@ -1,4 +1,4 @@
-"""The mission's messages and commands, and who acts on them."""
+"""Mission messages and commands, and their handlers."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ RETURN: Final = 20
 SET_CURRENT: Final = 224
 START: Final = 300
 
-# MISSION_STATE: there is none, not begun, active, paused, complete; MISSION_CURRENT.mission_mode
+# MISSION_STATE: no mission, not started, active, paused, complete; MISSION_CURRENT.mission_mode
 _NONE, _NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
 _IN_MODE, _SUSPENDED = 1, 2
 
 
 class MissionService:
-    """``handlers`` and ``commands`` of missions; MISSION_CURRENT (42) and MISSION_ITEM_REACHED (46)."""
+    """Mission ``handlers`` and ``commands``, and MISSION_CURRENT (42) and MISSION_ITEM_REACHED (46)."""
 
     def __init__(
         self,
@@ -87,7 +87,7 @@ class MissionService:
         }
 
     def tell(self) -> None:
-        """Say what was reached since the last time."""
+        """Report the items reached since the last call."""
         reached = self._itinerary.reached
         if reached:
             self._outbox += [MissionItemReached(self._source, seq) for seq in reached]
@@ -95,7 +95,7 @@ class MissionService:
             self._telemetry.request(q.MISSION_CURRENT)
 
     def current(self) -> MissionCurrent:
-        """MISSION_CURRENT (42)."""
+        """Return MISSION_CURRENT (42)."""
         itinerary, plans = self._itinerary, self._plans
         flying = self._commander.mode is Mode.MISSION
         if not itinerary.total:
@@ -119,7 +119,10 @@ class MissionService:
         self._telemetry.request(q.MISSION_CURRENT)
 
     def _order_current(self, order: Order) -> Denial | None:
-        """DO_SET_MISSION_CURRENT: parameter 1 the item, −1 for none other; 2 from the beginning."""
+        """Execute DO_SET_MISSION_CURRENT.
+
+        Parameter 1 is the item, −1 for no change; parameter 2 is 1 to begin anew.
+        """
         seq, anew = order.params[:2]
         if anew == 1.0:
             self._itinerary.rewind()

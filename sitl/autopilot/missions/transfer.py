@@ -1,5 +1,4 @@
-"""The mission protocol: plans up and down, one item at a time, whichever of the old and the new messages a
-client speaks."""
+"""Mission protocol: upload and download of plans, one item at a time, with the old or the new messages."""
 
 from __future__ import annotations
 
@@ -40,8 +39,8 @@ from sitl.autopilot.missions.plans import Plans
 from sitl.telemetry.status_text import Voice
 
 CAPACITY: Final = 724
-"""Items of a plan; ArduCopter's mission has room for as many."""
-# An item that does not come is asked for again after so long (µs), and at most so often.
+"""Greatest number of items of a plan, the capacity of ArduCopter's mission."""
+# Time after which a missing item is requested again (µs), and the limit of requests.
 _PATIENCE, _TRIES = 500_000, 10
 _NEVER: Final = 1 << 62
 _KNOWN: Final = frozenset(int(of) for of in Type)
@@ -49,7 +48,7 @@ _KNOWN: Final = frozenset(int(of) for of in Type)
 
 @dataclass
 class _Upload:
-    """``items`` that have come of ``total``; the first of them is number ``first`` of the plan."""
+    """Upload in progress: ``items`` received of ``total``; the first is number ``first`` of the plan."""
 
     partner: Source
     of: Type
@@ -61,11 +60,11 @@ class _Upload:
 
 
 class Transfer:
-    """Receives plans and gives them. A plan counts when its last item has come and all are good; what is
-    broken off leaves the old one. ``next_due`` (µs): before it there is no ``work``.
+    """Receiver and sender of plans.
 
-    As ArduPilot, items are asked for with MISSION_REQUEST (40), and any form of item is an answer; as PX4,
-    with MISSION_REQUEST_INT (51).
+    A plan takes effect when its last item has arrived and all are valid; an aborted upload leaves the old
+    plan. ``next_due`` (µs): no ``work`` is due before it. ArduPilot requests items with MISSION_REQUEST (40),
+    and any form of item is an answer; PX4 requests with MISSION_REQUEST_INT (51).
     """
 
     def __init__(
@@ -79,10 +78,10 @@ class Transfer:
         self._upload: _Upload | None = None
         self.next_due = _NEVER
 
-    # Up
+    # Upload
 
     def count(self, message: MissionCount, now: int) -> None:
-        """MISSION_COUNT (44): someone begins to send a plan."""
+        """Handle MISSION_COUNT (44), the begin of an upload."""
         of = self._known(message.source, message.mission_type)
         if of is None or self._is_busy(message.source, of):
             return
@@ -92,7 +91,7 @@ class Transfer:
         self._begin(_Upload(message.source, of, 0, message.total, []), now)
 
     def write_partial(self, message: MissionWritePartialList, now: int) -> None:
-        """MISSION_WRITE_PARTIAL_LIST (38), which PX4 does not have: a part of a plan comes anew."""
+        """Handle MISSION_WRITE_PARTIAL_LIST (38), the upload of a part of a plan; not supported by PX4."""
         of = self._known(message.source, message.mission_type)
         if of is None or self._is_busy(message.source, of):
             return
@@ -105,7 +104,7 @@ class Transfer:
             self._begin(_Upload(message.source, of, message.start, total, [], partial=True), now)
 
     def item(self, message: MissionItem | MissionItemFloat, now: int) -> None:
-        """MISSION_ITEM_INT (73) or MISSION_ITEM (39): one that was asked for, or one that came twice."""
+        """Handle MISSION_ITEM_INT (73) or MISSION_ITEM (39): the requested item or a repeated one."""
         upload = self._upload
         if upload is None or (message.source, message.mission_type) != (upload.partner, upload.of):
             self._acknowledge(message.source, message.mission_type, DENIED)
@@ -125,14 +124,14 @@ class Transfer:
             self._finish()
 
     def acknowledged(self, message: MissionAck, _now: int) -> None:
-        """MISSION_ACK (47): the end of a download, or who sends a plan breaks off."""
+        """Handle MISSION_ACK (47): the end of a download, or the abort of an upload by its sender."""
         upload = self._upload
         is_mine = upload and (message.source, message.mission_type) == (upload.partner, upload.of)
         if is_mine and message.result != ACCEPTED:
             self._upload, self.next_due = None, _NEVER
 
     def clear(self, message: MissionClearAll, _now: int) -> None:
-        """MISSION_CLEAR_ALL (45)."""
+        """Handle MISSION_CLEAR_ALL (45)."""
         if message.mission_type == ALL:
             for each in Type:
                 self._plans.replace(each, ())
@@ -144,7 +143,7 @@ class Transfer:
             self._acknowledge(message.source, of, ACCEPTED)
 
     def work(self, now: int) -> None:
-        """Ask again, or give up."""
+        """Request the missing item again, or give up."""
         upload = self._upload
         if upload is None:
             self.next_due = _NEVER
@@ -154,17 +153,17 @@ class Transfer:
         else:
             self._ask(now)
 
-    # Down
+    # Download
 
     def list(self, message: MissionRequestList, _now: int) -> None:
-        """MISSION_REQUEST_LIST (43)."""
+        """Handle MISSION_REQUEST_LIST (43)."""
         of = self._known(message.source, message.mission_type)
         if of is not None:
             total, identity = len(self._plans.items(of)), self._plans.identity(of)
             self._outbox.append(MissionCount(self._source, total, *message.source, of, identity))
 
     def request(self, message: MissionRequest | MissionRequestFloat, current: int) -> None:
-        """MISSION_REQUEST_INT (51) or MISSION_REQUEST (40); ``current`` is the item that is flown."""
+        """Handle MISSION_REQUEST_INT (51) or MISSION_REQUEST (40); ``current`` is the item that is flown."""
         of = self._known(message.source, message.mission_type)
         if of is None:
             return
@@ -181,7 +180,7 @@ class Transfer:
             x, y = _degrees(item)
             self._outbox.append(MissionItemFloat(self._source, item.params, x, y, *tail))
 
-    # Within
+    # Internals
 
     def _known(self, partner: Source, mission_type: int) -> Type | None:
         if mission_type in _KNOWN:
@@ -237,7 +236,7 @@ class Transfer:
 
 
 def _integer(message: MissionItem | MissionItemFloat) -> Item | None:
-    """With whole degE7; None where there is no such place."""
+    """Return the item with coordinates in whole degE7; None if they do not fit."""
     x, y = message.x, message.y
     if isinstance(message, MissionItemFloat):
         scale = 1e7 if message.frame in ABOVE_SEA | ABOVE_HOME else 1e4

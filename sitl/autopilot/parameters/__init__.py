@@ -1,5 +1,4 @@
-"""Parameters: a table for each firmware, the values of one vehicle, and the protocol that shows and
-sets them.
+"""Parameters: a table for each firmware, the values of one vehicle, and the PARAM_* protocol.
 
-table → values ⇄ settings of the autopilot; protocol: PARAM_* messages → values → PARAM_VALUE.
+The flow is table → values ⇄ settings of the autopilot; protocol: PARAM_* messages → values → PARAM_VALUE.
 """

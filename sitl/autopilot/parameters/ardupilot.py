@@ -1,7 +1,7 @@
-"""ArduCopter 4.6's parameters: those that clients look for, with the firmware's types, defaults and units.
+"""Parameters of ArduCopter 4.6 that clients look for, with the firmware's types, defaults and units.
 
-About a fifth of what the firmware has. Most do nothing here; those with a ``Bound`` are settings of the
-simulation. A longer module as it is a table.
+The table holds about a fifth of the firmware's parameters. Most have no effect here; those with a ``Bound``
+are settings of the simulation. The module is long because it is a table.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ STREAMS: Final = {
     "EXTRA2": 11,
     "EXTRA3": 12,
 }
-"""MAV_DATA_STREAM of the SR0_ parameters, which say how often its messages go out."""
+"""MAV_DATA_STREAM of the SR0_ parameters, which set the rates of its messages."""
 
 _DEGREE: Final = math.radians(1.0)
 _SWITCH: Final = ((0, "off"), (1, "on"))
@@ -305,7 +305,7 @@ _ROWS: Final[tuple[_Row, ...]] = (
 
 
 def table(rotors: int) -> tuple[Parameter, ...]:
-    """The parameters of a vehicle with so many rotors."""
+    """Return the parameters of a vehicle with ``rotors`` rotors."""
     vehicle: tuple[_Row, ...] = (
         ("FRAME_CLASS", _I8, _CLASSES.get(rotors, 0), 0, 17),
         *(row for k in range(1, 9) for row in _output(k, rotors)),

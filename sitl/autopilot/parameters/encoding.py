@@ -1,6 +1,6 @@
-"""The four bytes of PARAM_VALUE (22) and PARAM_SET (23), as each firmware means them.
+"""Encoding of the four bytes of PARAM_VALUE (22) and PARAM_SET (23) by each firmware.
 
-ArduPilot casts every number to float32. PX4 puts the bytes of an int32 there
+ArduPilot casts every number to float32. PX4 stores the bytes of an int32
 (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE).
 """
 
@@ -16,13 +16,13 @@ _INT: Final = Struct("<i")
 
 
 def encoded(value: float, kind: Kind, *, bytewise: bool) -> bytes:
-    """``value``, which fits ``kind``, on the wire."""
+    """Return the four bytes of ``value``, which must fit ``kind``."""
     if bytewise and kind is not Kind.REAL32:
         return _INT.pack(int(value))
     return _FLOAT.pack(value)
 
 
 def decoded(raw: bytes, kind: Kind, *, bytewise: bool) -> float:
-    """What four bytes say; it may be infinite or NaN."""
+    """Return the value of four bytes; it may be infinite or NaN."""
     layout = _INT if bytewise and kind is not Kind.REAL32 else _FLOAT
     return float(layout.unpack(raw)[0])

@@ -1,4 +1,4 @@
-"""One parameter: its name, type, range, and what it does here."""
+"""Parameter: its name, type, range and effect in the simulation."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from struct import Struct
 from typing import Final, NamedTuple
 
 _FLOAT: Final = Struct("<f")
-# ``set`` says it to a person, so an absurd number must not fill the screen.
+# Messages to people show the value, so an absurd number must stay short.
 _SHOWN: Final = "{:.6g}"
 
 
 class Kind(Enum):
-    """MAV_PARAM_TYPE of what firmwares have."""
+    """MAV_PARAM_TYPE values in use by the firmwares."""
 
     INT8 = 2
     INT16 = 4
@@ -25,9 +25,10 @@ _BITS: Final = {Kind.INT8: 8, Kind.INT16: 16, Kind.INT32: 32}
 
 
 class Bound(NamedTuple):
-    """The setting of ``AutopilotConfig`` that a parameter is: value × ``scale``, or one of ``options``.
+    """Setting of ``AutopilotConfig`` bound to a parameter: value × ``scale``, or one of ``options``.
 
-    ``setting`` may be one of a group (``fence.height``); one that is None is as the firmware has it.
+    ``setting`` may be a member of a group (``fence.height``). A setting that is None leaves the firmware's
+    default.
     """
 
     setting: str
@@ -36,8 +37,11 @@ class Bound(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """``default`` is the firmware's own; one that is ``bound`` begins as the setting is. ``low`` and ``high``
-    are inclusive and in ``unit``, infinite where the firmware gives no range."""
+    """One parameter of a firmware.
+
+    ``default`` is the firmware's own; a ``bound`` parameter starts with the value of its setting. ``low`` and
+    ``high`` are inclusive and in ``unit``, infinite where the firmware gives no range.
+    """
 
     name: str
     kind: Kind
@@ -48,11 +52,11 @@ class Parameter(NamedTuple):
     bound: Bound | None = None
 
     def fitted(self, value: float) -> float:
-        """``value`` as the type holds it: float32, or the nearest whole number."""
+        """Return ``value`` as the type stores it: float32, or the nearest whole number."""
         return float(_FLOAT.unpack(_FLOAT.pack(value))[0]) if self.kind is Kind.REAL32 else round(value)
 
     def denial(self, value: float) -> str | None:
-        """Why it cannot have ``value``, which is as ``fitted`` makes it or not finite."""
+        """Return the reason against ``value`` (a result of ``fitted``, or not finite), or None."""
         if not math.isfinite(value):
             return f"{self.name}: not a number"
         if not self._held(self.low) <= value <= self._held(self.high):
@@ -65,5 +69,5 @@ class Parameter(NamedTuple):
         return None
 
     def _held(self, end: float) -> float:
-        """An end of the range as the type holds it: 0.03 is a little less in float32."""
+        """Return an end of the range as the type stores it: 0.03 is slightly less in float32."""
         return self.fitted(end) if math.isfinite(end) else end

@@ -1,5 +1,4 @@
-"""The parameter protocol: PARAM_REQUEST_LIST (21), PARAM_REQUEST_READ (20), PARAM_SET (23) in, PARAM_VALUE
-(22) out."""
+"""Parameter protocol: PARAM_REQUEST_LIST (21), PARAM_REQUEST_READ (20), PARAM_SET (23) → PARAM_VALUE (22)."""
 
 from __future__ import annotations
 
@@ -19,19 +18,20 @@ from sitl.autopilot.parameters.values import Values
 from sitl.telemetry.status_text import Voice
 
 HASH: Final = "_HASH_CHECK"
-"""PX4's name for the hash of all names and values, so that a client may keep a list that it has."""
+"""PX4's name for the hash of all names and values, which lets a client reuse a list that it has."""
 _UINT32: Final = 5
 _NO_NUMBER: Final = 0xFFFF
-# A list goes out as ten messages (0.4 kB) each 10 ms: real links are slower, and no buffer overflows.
+# A list is sent as ten messages (0.4 kB) every 10 ms: real links are slower, and no buffer overflows.
 _BURST, _PAUSE = 10, 10_000
 _NEVER: Final = 1 << 62
 
 
 class ParameterProtocol:
-    """Shows and sets ``values``. ``next_due`` (µs): before it there is no ``work``.
+    """Server that sends and sets ``values``.
 
-    A value that is refused is answered with the old one, and with STATUSTEXT (253). ArduPilot says no number
-    with what it was asked for by name; PX4 does, and has the hash.
+    ``next_due`` (µs): no ``work`` is due before it. A refused value is answered with the old value and with
+    STATUSTEXT (253). ArduPilot omits the number in the answer to a request by name; PX4 includes it, and has
+    the hash.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class ParameterProtocol:
         *,
         bytewise: bool,
     ) -> None:
-        """``changed`` is called after each value that is new. ``bytewise``: as PX4."""
+        """``changed`` is called after each new value. ``bytewise`` selects PX4's behaviour."""
         self._source = source
         self._values = values
         self._outbox = outbox
@@ -56,11 +56,11 @@ class ParameterProtocol:
         self.next_due = _NEVER
 
     def handle(self, message: ParamRequestList | ParamRequestRead | ParamSet, now: int) -> None:
-        """Act on a message for this vehicle that arrived at ``now`` (µs)."""
+        """Handle a message for this vehicle that arrived at ``now`` (µs)."""
         match message:
             case ParamRequestList():
-                # Who asks while a list goes out gets the rest of it and then one more. Real ones begin anew
-                # at once, so that of two who keep asking neither gets the end.
+                # A request while a list is being sent gets the rest of it and then one more list. Real
+                # firmwares restart at once, so that of two clients that keep asking neither receives the end.
                 if self.next_due == _NEVER:
                     self._begin(now)
                 else:
@@ -101,7 +101,7 @@ class ParameterProtocol:
     def _set(self, message: ParamSet, now: int) -> None:
         values = self._values
         if self._bytewise and message.name == HASH:
-            # The client has this list already; who asked since perhaps not.
+            # This client has the list already; a client that has requested it since may not.
             if not self._again:
                 self.next_due = _NEVER
             return

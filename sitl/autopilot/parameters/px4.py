@@ -1,7 +1,7 @@
-"""PX4 1.16's parameters: those that clients look for, with the firmware's types, defaults and units.
+"""Parameters of PX4 1.16 that clients look for, with the firmware's types, defaults and units.
 
-About a quarter of what a multicopter has, by name as PX4 sorts them. Most do nothing here; those with a
-``Bound`` are settings of the simulation. A longer module as it is a table.
+The table holds about a quarter of a multicopter's parameters, sorted by name as in PX4. Most have no effect
+here; those with a ``Bound`` are settings of the simulation. The module is long because it is a table.
 """
 
 from __future__ import annotations
@@ -239,7 +239,7 @@ _ROWS: Final[tuple[_Row, ...]] = (
 
 
 def table(rotors: int) -> tuple[Parameter, ...]:
-    """The parameters of a vehicle with so many rotors."""
+    """Return the parameters of a vehicle with ``rotors`` rotors."""
     kind, airframe = _VEHICLES.get(rotors, (0, 0))
     vehicle: tuple[_Row, ...] = (
         ("CA_ROTOR_COUNT", _I, rotors, 0, 12),

@@ -1,4 +1,4 @@
-"""The parameters of one vehicle: what each is now, and what that makes of the autopilot's settings."""
+"""Parameter values of one vehicle, and the autopilot settings that they imply."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _ALL_ONES: Final = 0xFFFFFFFF
 
 
 class Values:
-    """Values by name, in the order of the table. What is not ``saved`` is as the table and ``config`` say."""
+    """Values in the order of the table; those not ``saved`` come from the table and ``config``."""
 
     def __init__(
         self, table: Sequence[Parameter], config: AutopilotConfig, saved: Mapping[str, float]
     ) -> None:
-        """Of ``saved`` what is no parameter, or not allowed, is left out."""
+        """Entries of ``saved`` that are unknown or not allowed are dropped."""
         self.table = tuple(table)
         self._numbers = {parameter.name: number for number, parameter in enumerate(self.table)}
         self._initial = [_initial(parameter, config) for parameter in self.table]
@@ -36,19 +36,19 @@ class Values:
         return len(self.table)
 
     def number(self, name: str) -> int | None:
-        """Its place in the table, None if there is none such."""
+        """Return the index of a parameter in the table, or None if it does not exist."""
         return self._numbers.get(name)
 
     def value(self, number: int) -> float:
-        """The present value of the parameter at ``number``."""
+        """Return the present value of the parameter at ``number``."""
         return self._values[number]
 
     def named(self, name: str) -> float:
-        """The present value by name; KeyError if there is none such."""
+        """Return the present value by name; raise KeyError if it does not exist."""
         return self._values[self._numbers[name]]
 
     def set(self, number: int, value: float) -> str | None:
-        """Give the parameter at ``number`` a value, or say why not."""
+        """Set the parameter at ``number``, or return the reason against ``value``."""
         parameter = self.table[number]
         if math.isfinite(value) and abs(value) <= 3e38:
             value = parameter.fitted(value)
@@ -59,18 +59,18 @@ class Values:
         return denial
 
     def reset(self) -> None:
-        """All as at first."""
+        """Restore all initial values."""
         self._values = list(self._initial)
         self._digest = None
 
     @property
     def changed(self) -> dict[str, float]:
-        """What differs from the beginning: what there is to save."""
+        """Values that differ from the initial ones, for saving."""
         triples = zip(self.table, self._initial, self._values, strict=True)
         return {parameter.name: value for parameter, initial, value in triples if value != initial}
 
     def configured(self, config: AutopilotConfig) -> AutopilotConfig:
-        """``config`` with the settings that changed parameters are."""
+        """Return ``config`` with the settings of changed parameters."""
         changed = self.changed
         update: dict[str, object] = {}
         groups: dict[str, dict[str, object]] = {}
@@ -85,7 +85,7 @@ class Values:
         return config.model_copy(update=update) if update else config
 
     def digest(self) -> int:
-        """PX4's ``_HASH_CHECK``: CRC-32 over names and values, without inversion at either end."""
+        """Return PX4's ``_HASH_CHECK``: CRC-32 over names and values, without inversion at either end."""
         if self._digest is None:
             self._digest = self._summed()
         return self._digest
@@ -106,7 +106,7 @@ def _initial(parameter: Parameter, config: AutopilotConfig) -> float:
     for number, word in bound.options:
         if word == value:
             return number
-    # A setting that this firmware has no number for reads as its usual one.
+    # A setting without a number in this firmware reads as the firmware's default.
     return parameter.fitted(parameter.default if bound.options else value / bound.scale)
 
 

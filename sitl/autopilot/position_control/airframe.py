@@ -1,7 +1,7 @@
-"""The airframe of a firmware's simulator as a point mass: tilt that follows late, thrust, drag in the air.
+"""Airframe of a firmware's simulator as a point mass, with lag of tilt and thrust, and drag.
 
 Both simulators fly a quadrotor whose horizontal acceleration is g·tan(tilt) less drag. The attitude loop is
-taken as a second-order lag on each tilt angle; yaw does not matter to a point mass.
+modelled as a second-order lag on each tilt angle; yaw has no effect on a point mass.
 """
 
 from __future__ import annotations
@@ -19,10 +19,13 @@ Motion = tuple[Vector, Vector, Vector]
 
 
 class Airframe(NamedTuple):
-    """``angle_rate`` 1/s: tilt rate asked for per angle of error; ``angle_acceleration`` rad/s²: bound on how
-    fast that rate changes; ``angle_lag`` s: first-order lag from the angle asked for to the tilt;
-    ``thrust_lag`` s: of vertical thrust. ``drag`` 1/s and ``square_drag`` 1/m: deceleration per speed, and
-    per square of speed, relative to the air. ``vertical_drag``: whether drag acts upwards, too."""
+    """Constants of an airframe.
+
+    ``angle_rate`` 1/s: requested tilt rate per angle of error; ``angle_acceleration`` rad/s²: limit of the
+    change of that rate; ``angle_lag`` s: first-order lag from the requested angle to the tilt; ``thrust_lag``
+    s: lag of vertical thrust. ``drag`` 1/s and ``square_drag`` 1/m: deceleration per speed, and per square of
+    speed, relative to the air. ``vertical_drag``: whether drag also acts vertically.
+    """
 
     angle_rate: float
     angle_acceleration: float
@@ -34,7 +37,7 @@ class Airframe(NamedTuple):
 
 
 ARDUPILOT: Final = Airframe(
-    # ATC_INPUT_TC 0.15 s and ATC_ACCEL_R_MAX 1100 °/s²; the lag stands for the attitude and rate loops.
+    # ATC_INPUT_TC 0.15 s and ATC_ACCEL_R_MAX 1100 °/s²; the lag represents the attitude and rate loops.
     angle_rate=1.0 / 0.15,
     angle_acceleration=math.radians(1100.0),
     angle_lag=0.04,
@@ -45,7 +48,7 @@ ARDUPILOT: Final = Airframe(
     vertical_drag=False,
 )
 PX4: Final = Airframe(
-    # MC_ROLL_P; the rate loop is quicker than the angle loop by far.
+    # MC_ROLL_P; the rate loop is much faster than the angle loop.
     angle_rate=6.5,
     angle_acceleration=40.0,
     angle_lag=0.05,
@@ -58,7 +61,7 @@ PX4: Final = Airframe(
 
 
 class PointMass:
-    """``position``, ``velocity``, ``acceleration`` of a vehicle that is asked for accelerations; z down."""
+    """Point mass that is controlled by acceleration: ``position``, ``velocity``, ``acceleration``; z down."""
 
     def __init__(self, airframe: Airframe) -> None:
         self._airframe = airframe
@@ -75,9 +78,11 @@ class PointMass:
         self._lift = 0.0
 
     def advance(self, wanted: Vector, wind: Vector, dt: float, drift: Vector = (0.0, 0.0, 0.0)) -> None:
-        """Move by ``dt`` seconds in air that moves with ``wind`` (m/s), asked for the acceleration ``wanted``
-        (m/s²) without drag. The position is the estimated one, which moves by ``drift`` (m/s) more than the
-        velocity says."""
+        """Advance by ``dt`` seconds towards the acceleration ``wanted`` (m/s², without drag).
+
+        ``wind`` (m/s) is the velocity of the air. The position is the estimated one, which moves by ``drift``
+        (m/s) more than the velocity indicates.
+        """
         frame = self._airframe
         share = -math.expm1(-dt / frame.angle_lag)
         most = frame.angle_acceleration * dt

@@ -24,8 +24,11 @@ from sitl.values.setpoints import ZERO
 
 
 class ArduPilotResponse:
-    """Where an ArduCopter is that is sent set-points. ``motion`` is the vehicle's, ``desired`` that of the
-    trajectory that it chases the set-points with; local NED."""
+    """Response of an ArduCopter to set-points.
+
+    ``motion`` is the vehicle's motion, ``desired`` that of the trajectory that approaches the set-points;
+    local NED.
+    """
 
     def __init__(self, gains: ArduPilotGains, speeds: Speeds) -> None:
         self._gains = gains
@@ -36,27 +39,29 @@ class ArduPilotResponse:
 
     @classmethod
     def of(cls, config: AutopilotConfig) -> Self:
-        """That of an autopilot with these settings."""
+        """Return the response of an autopilot with these settings."""
         return cls(config.ardupilot, _speeds(config))
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other parameters from now on."""
+        """Use new parameters from now on."""
         self._gains = config.ardupilot
         self._speeds = _speeds(config)
         self._shaping.configure(self._gains, self._speeds)
 
     @property
     def motion(self) -> Motion:
+        """Motion of the vehicle."""
         mass = self._mass
         return mass.position, mass.velocity, mass.acceleration
 
     @property
     def desired(self) -> Motion:
+        """Motion of the desired trajectory."""
         shaping = self._shaping
         return shaping.position, shaping.velocity, shaping.acceleration
 
     def restart(self, position: Vector) -> None:
-        """Rest at ``position``, with nothing learnt."""
+        """Rest at ``position``, with the integral reset."""
         self._mass.restart(position)
         self._shaping.restart(position, ZERO, ZERO)
         self._asked: Vector = ZERO
@@ -67,7 +72,10 @@ class ArduPilotResponse:
         self._limited: Pair = (0.0, 0.0)
 
     def relocate(self, position: Vector, velocity: Vector) -> None:
-        """The estimate has jumped to here: the desired trajectory is shifted along, so the errors stay."""
+        """Handle a jump of the estimate to ``position`` and ``velocity``.
+
+        The desired position is shifted by the same amount, so the position error is unchanged.
+        """
         mass, shaping = self._mass, self._shaping
         shift = tuple(new - old for new, old in zip(position, mass.position, strict=True))
         x, y, z = (old + by for old, by in zip(shaping.position, shift, strict=True))
@@ -75,8 +83,10 @@ class ArduPilotResponse:
         mass.position, mass.velocity = position, velocity
 
     def advance(self, wanted: Motion, dt: float, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
-        """Move by ``dt`` seconds after ``wanted``, which is valid at the end of them, in air that moves with
-        ``wind`` (m/s)."""
+        """Advance by ``dt`` seconds towards ``wanted``, which is valid at their end.
+
+        ``wind`` (m/s) is the velocity of the air.
+        """
         self._mass.advance(self._asked, wind, dt, drift)
         slip = (0.0, 0.0) if self._slip is None else self._slip
         self._shaping.advance(wanted, dt, self._limited, self._error, slip)
@@ -87,7 +97,7 @@ class ArduPilotResponse:
         gains, mass, shaping = self._gains, self._mass, self._shaping
         x, y, z = shaping.position
         error = x - mass.position[0], y - mass.position[1]
-        # The desired place never runs further ahead than corrections of the permitted speed close.
+        # The desired position never leads by more than corrections of the permitted speed can close.
         near = cut(error, inverse_square_root_law(self._speeds.level, gains.position, gains.acceleration))
         if near != error:
             error = near
@@ -112,7 +122,7 @@ class ArduPilotResponse:
         return self._leaned((north, east))
 
     def _filter(self, slip: Pair, dt: float) -> None:
-        """First-order filters of the velocity error and of its derivative, both of the same frequency."""
+        """Filter the velocity error and its derivative, first order, both with the same frequency."""
         if self._slip is None:
             self._slip = slip
             return
@@ -127,14 +137,14 @@ class ArduPilotResponse:
         self._slip = new
 
     def _learn(self, dt: float) -> None:
-        """The integral; it does not grow in a direction in which the vehicle cannot lean further."""
+        """Update the integral; it does not grow in a direction in which the lean angle is at its limit."""
         slip, before = self._slip or (0.0, 0.0), self._learnt
         gain = self._gains.integral * dt
         learnt = before[0] + gain * slip[0], before[1] + gain * slip[1]
         self._learnt = cut(learnt, math.hypot(*before)) if same_way(slip, self._limited) else learnt
 
     def _leaned(self, acceleration: Pair) -> Pair:
-        """Within ANGLE_MAX, what is across the desired velocity first."""
+        """Limit the acceleration to ANGLE_MAX; the part across the desired velocity has priority."""
         most = GRAVITY * math.tan(self._gains.tilt)
         self._limited = (0.0, 0.0)
         if math.hypot(*acceleration) <= most:

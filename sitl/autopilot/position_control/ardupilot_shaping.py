@@ -1,10 +1,10 @@
-"""The desired trajectory of ArduCopter's GUIDED mode: set-points are chased within limits, not taken over.
+"""Desired trajectory of ArduCopter's GUIDED mode: it approaches set-points within limits.
 
-Each set-point is carried forward by its own acceleration. The desired trajectory chases it: a velocity that
-closes the position error by the square-root law, an acceleration that closes the velocity error, and the
+Each set-point is extrapolated with its own acceleration. The desired trajectory approaches it with a velocity
+that closes the position error by the square-root law, an acceleration that closes the velocity error, and the
 set-point's own velocity and acceleration on top. The corrections are limited to WPNAV_SPEED and WPNAV_ACCEL,
 the set-point's own part is not; but the *change* of the desired acceleration is limited by PSC_JERK_XY. So a
-stream whose jerk is smaller passes unchanged, and one that reverses its acceleration is followed late.
+stream with less jerk passes unchanged, and one that reverses its acceleration is followed late.
 """
 
 from __future__ import annotations
@@ -29,32 +29,32 @@ from sitl.values.setpoints import ZERO
 _OVERSPEED: Final = 2.0
 """Gain with which vertical limits grow when the vertical speed limits are exceeded."""
 _CORNER: Final = math.sqrt(0.5)
-"""Share of the correction that may be across the wanted velocity, when most of it is along it."""
+"""Share of the correction that may be across the wanted velocity, if most of it is along that velocity."""
 _NONE: Final = (0.0, 0.0)
 
 
 class Shaping:
-    """``position``, ``velocity``, ``acceleration``: the desired trajectory, local NED."""
+    """Desired trajectory: ``position``, ``velocity``, ``acceleration``, local NED."""
 
     def __init__(self, gains: ArduPilotGains, speeds: Speeds) -> None:
         self.configure(gains, speeds)
         self.restart(ZERO, ZERO, ZERO)
 
     def configure(self, gains: ArduPilotGains, speeds: Speeds) -> None:
-        """Other parameters from now on."""
+        """Use new parameters from now on."""
         self._gains = gains
         self._speeds = speeds
 
     def restart(self, position: Vector, velocity: Vector, acceleration: Vector) -> None:
-        """Go on from this motion."""
+        """Continue from this motion."""
         self.position, self.velocity, self.acceleration = position, velocity, acceleration
 
     def advance(self, wanted: Motion, dt: float, limited: Pair, error: Pair, slip: Pair) -> None:
-        """Move by ``dt`` seconds after ``wanted``, which is valid at the end of them.
+        """Advance by ``dt`` seconds towards ``wanted``, which is valid at their end.
 
-        ``limited``: the direction in which the lean angle is at its limit, zero if it is not; then the
-        trajectory does not run further away from a vehicle whose position ``error`` (m) and velocity error
-        ``slip`` (m/s) point that way.
+        ``limited``: the direction in which the lean angle is at its limit, zero if it is not; the trajectory
+        then does not run further away from a vehicle whose position ``error`` (m) and velocity error ``slip``
+        (m/s) point in that direction.
         """
         self._move(dt, limited, error, slip)
         (x, y, z), (u, v, w), (a, b, c) = wanted
@@ -104,8 +104,10 @@ class Shaping:
 
 
 def _corrected(push: Pair, aim: Pair, most: float) -> Pair:
-    """A correcting acceleration within ``most``; what is across the wanted velocity ``aim`` keeps its part of
-    it."""
+    """Limit a correcting acceleration to ``most``.
+
+    The part across the wanted velocity ``aim`` keeps its share.
+    """
     along, across, direction = split(push, aim)
     if direction == _NONE or along * along <= across[0] ** 2 + across[1] ** 2:
         return cut(push, most)

@@ -1,8 +1,8 @@
-"""PX4 1.16's OFFBOARD position controller: set-point → position → velocity → tilt, with nothing in between.
+"""PX4 1.16's OFFBOARD position controller: set-point → position → velocity → tilt, without shaping.
 
-PX4 takes an offboard set-point as it is: no trajectory is shaped, and neither MPC_ACC_HOR nor MPC_JERK_MAX
-counts. What limits it is the tilt, the speed, and how late the attitude follows. Between two messages a
-set-point stands still.
+PX4 uses an offboard set-point as it is: it shapes no trajectory, and neither MPC_ACC_HOR nor MPC_JERK_MAX
+applies. The limits are those of tilt and speed, and the lag of the attitude. A set-point is constant between
+two messages.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sitl.values.setpoints import ZERO
 
 
 class Px4Response:
-    """Where a PX4 is that is sent set-points: ``motion``, local NED."""
+    """Response of a PX4 to set-points: ``motion``, local NED."""
 
     def __init__(self, gains: Px4Gains) -> None:
         self._gains = gains
@@ -26,21 +26,22 @@ class Px4Response:
         self.restart(ZERO)
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Other parameters from now on."""
+        """Use new parameters from now on."""
         self._gains = config.px4
 
     @property
     def motion(self) -> Motion:
+        """Motion of the vehicle."""
         mass = self._mass
         return mass.position, mass.velocity, mass.acceleration
 
     @property
     def desired(self) -> Motion:
-        """PX4 has no trajectory of its own: the vehicle's motion."""
+        """Motion of the vehicle, because PX4 has no trajectory of its own."""
         return self.motion
 
     def restart(self, position: Vector) -> None:
-        """Rest at ``position``, with nothing learnt."""
+        """Rest at ``position``, with the integrals reset."""
         self._mass.restart(position)
         self._asked: Vector = ZERO
         self._learnt: Vector = ZERO
@@ -48,12 +49,12 @@ class Px4Response:
         self._change: Pair = (0.0, 0.0)
 
     def relocate(self, position: Vector, velocity: Vector) -> None:
-        """The estimate has jumped to here."""
+        """Handle a jump of the estimate to ``position`` and ``velocity``."""
         self._mass.position, self._mass.velocity = position, velocity
         self._speed = velocity
 
     def advance(self, wanted: Motion, dt: float, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
-        """Move by ``dt`` seconds after ``wanted``, in air that moves with ``wind`` (m/s)."""
+        """Advance by ``dt`` seconds towards ``wanted``, in air that moves with ``wind`` (m/s)."""
         self._mass.advance(self._asked, wind, dt, drift)
         gains, mass = self._gains, self._mass
         self._differentiate(dt)
@@ -79,7 +80,7 @@ class Px4Response:
         self._learn(slip, (north - tilted[0], east - tilted[1]), dt)
 
     def _differentiate(self, dt: float) -> None:
-        """The vehicle's acceleration as it is read from its velocity."""
+        """Update the vehicle's acceleration by filtered differentiation of its velocity."""
         share = dt / (dt + 1.0 / (2.0 * math.pi * self._gains.filter_hz))
         u, v, _ = self._mass.velocity
         before = self._change
@@ -90,7 +91,7 @@ class Px4Response:
         self._speed = self._mass.velocity
 
     def _learn(self, slip: Vector, excess: Pair, dt: float) -> None:
-        """The integrals; what tilt could not give is taken back from them."""
+        """Update the integrals; acceleration that the tilt limit cut off is subtracted from them."""
         gains = self._gains
         back = 2.0 / gains.velocity
         x, y, z = self._learnt
@@ -101,8 +102,7 @@ class Px4Response:
 
 
 def _within(first: Pair, second: Pair, most: float) -> Pair:
-    """The sum of two velocities, no faster than ``most``; ``first`` is kept where only the other has to be
-    cut."""
+    """Return the sum of two velocities, limited to ``most``; ``second`` is shortened before ``first``."""
     total = first[0] + second[0], first[1] + second[1]
     if math.hypot(*total) <= most:
         return total

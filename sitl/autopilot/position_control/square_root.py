@@ -1,17 +1,19 @@
-"""Parts of the firmwares' control laws: the square-root law, and vectors that are cut to a length."""
+"""Parts of the firmwares' control laws: the square-root law, and limits of vector length."""
 
 from __future__ import annotations
 
 import math
 
 Pair = tuple[float, float]
-"""A horizontal vector: north, east."""
+"""Horizontal vector: north, east."""
 
 
 def square_root_law(error: float, gain: float, limit: float, dt: float = 0.0) -> float:
-    """The rate that closes ``error``: proportional (``gain``, 1/s) near zero, and √(2·limit·(|e| − e₀/2))
-    beyond, so that the rate itself never has to change faster than ``limit``. With ``dt`` (s) it never
-    overshoots within one step."""
+    """Return the rate that closes ``error`` by the square-root law.
+
+    It is proportional (``gain``, 1/s) near zero, and √(2·limit·(|e| − e₀/2)) beyond, so that the rate never
+    has to change faster than ``limit``. With ``dt`` (s) it never overshoots within one step.
+    """
     near = limit / (gain * gain)
     size = abs(error)
     rate = gain * size if size <= near else math.sqrt(2.0 * limit * (size - 0.5 * near))
@@ -21,14 +23,14 @@ def square_root_law(error: float, gain: float, limit: float, dt: float = 0.0) ->
 
 
 def inverse_square_root_law(rate: float, gain: float, limit: float) -> float:
-    """The error whose ``rate`` (not negative) the square-root law gives."""
+    """Return the error for which the square-root law gives ``rate`` (not negative)."""
     if rate <= limit / gain:
         return rate / gain
     return 0.5 * limit / (gain * gain) + rate * rate / (2.0 * limit)
 
 
 def directed(error: Pair, gain: float, limit: float, dt: float = 0.0) -> Pair:
-    """The square-root law along a horizontal ``error``."""
+    """Return the square-root law along a horizontal ``error``."""
     size = math.hypot(*error)
     if size < 1e-12:
         return 0.0, 0.0
@@ -37,7 +39,7 @@ def directed(error: Pair, gain: float, limit: float, dt: float = 0.0) -> Pair:
 
 
 def cut(vector: Pair, most: float) -> Pair:
-    """``vector``, no longer than ``most``."""
+    """Return ``vector``, shortened to the length ``most``."""
     size = math.hypot(*vector)
     if size <= most:
         return vector
@@ -45,8 +47,10 @@ def cut(vector: Pair, most: float) -> Pair:
 
 
 def split(vector: Pair, along: Pair) -> tuple[float, Pair, Pair]:
-    """The part of ``vector`` along the direction of ``along``, what is across it, and that direction; along
-    nothing all of it is across."""
+    """Return the part of ``vector`` along the direction of ``along``, the part across it, and that direction.
+
+    If ``along`` is near zero, all of ``vector`` is across.
+    """
     size = math.hypot(*along)
     if size < 1e-9:
         return 0.0, vector, (0.0, 0.0)
@@ -56,10 +60,10 @@ def split(vector: Pair, along: Pair) -> tuple[float, Pair, Pair]:
 
 
 def joined(part: float, across: Pair, direction: Pair) -> Pair:
-    """What ``split`` has taken apart."""
+    """Return the vector that ``split`` has taken apart."""
     return across[0] + part * direction[0], across[1] + part * direction[1]
 
 
 def same_way(a: Pair, b: Pair) -> bool:
-    """Whether two vectors have a positive product."""
+    """Return whether two vectors have a positive scalar product."""
     return a[0] * b[0] + a[1] * b[1] > 0.0

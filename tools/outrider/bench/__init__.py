@@ -1,0 +1,1 @@
+"""Benchmarks of ``outrider bench``: take a number of rounds, give CPU times of each part."""

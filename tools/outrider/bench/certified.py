@@ -1,5 +1,4 @@
-"""The certified plan step of ``outrider bench``: ledger and surroundings in, committed plan and set-point
-out."""
+"""Certified plan step of ``outrider bench``: from peer plans and constraints to plan and set-point."""
 
 from __future__ import annotations
 
@@ -29,7 +28,7 @@ _SCENES = 60
 
 
 class Scene(NamedTuple):
-    """A vehicle under way among eight neighbours that all act, ready to plan."""
+    """Vehicle in motion among eight neighbours that all matter, ready to plan."""
 
     flight: CertifiedFlight
     world: World
@@ -38,7 +37,10 @@ class Scene(NamedTuple):
 
 
 def plan_step(rounds: int) -> Array:
-    """CPU ms of each plan step. RuntimeError if the scenes are not solved: the figure would be another's."""
+    """Return the CPU time (ms) of each plan step.
+
+    Raises RuntimeError if a scene is not solved: the figure would measure something else.
+    """
     scenario = load(find("scenarios", "antipodal-8"), Scenario)
     config = scenario.companion.model_copy(update={"avoidance": "certified", "turning_sense": "right"})
     epoch = 10 * config.certified.epoch_us
@@ -69,7 +71,7 @@ def plan_step(rounds: int) -> Array:
 
 
 def _scene(config: CompanionConfig, seed: int, epoch: int) -> Scene:
-    """Eight neighbours around, 1.5 to 3 m off at nearly the same height, all under way together."""
+    """Return a scene: eight neighbours around, 1.5 to 3 m away at nearly the same height, moving together."""
     random = np.random.default_rng(seed)
     fleet = FleetFrame(47.397742, 8.545594, 488.0)
     flight = CertifiedFlight(config, Source(1, 195), fleet)
@@ -89,7 +91,7 @@ def _scene(config: CompanionConfig, seed: int, epoch: int) -> Scene:
 
 
 def _braking(config: CompanionConfig, epoch: int, place: Array, speed: Array, origin: int) -> WirePlan:
-    """From a state straight to rest, all along the horizon."""
+    """Return a plan that brakes evenly from the given state to rest over the horizon."""
     n, dt = config.horizon.steps + 1, config.certified.dt_us
     start = quantise(epoch, dt, place, speed, np.zeros((n, 3)), origin)
     return committed(start, np.broadcast_to(-speed / (n * dt * 1e-6), (n, 3)))

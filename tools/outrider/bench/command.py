@@ -1,5 +1,8 @@
-"""``outrider bench``: what this machine makes of each part. CPU time, medians over rounds; what is compared
-is interleaved, so that a machine that slows down slows all of it."""
+"""Command ``outrider bench``: speed of each part on this machine.
+
+Figures are CPU times, medians over rounds. Parts that are compared are interleaved, so that a machine that
+slows down slows all of them.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ _STEPS_A_CALL = 8
 
 
 class Scene(NamedTuple):
-    """One instant of a companion with eight neighbours that all act, ready to plan."""
+    """One instant of a companion with eight neighbours that all matter, ready to plan."""
 
     world: World
     position: np.ndarray
@@ -52,8 +55,7 @@ class Scene(NamedTuple):
 
 
 def measure(progress: Progress, *, quick: bool) -> dict[str, object]:
-    """All figures that exist; keys as in the design. ``quick`` leaves out the flights and takes fewer
-    rounds."""
+    """Return all figures. ``quick`` leaves out the flights and takes fewer rounds."""
     rounds = 3 if quick else 9
     progress("plan step", 0.0)
     steps, piqp = plan_step(rounds)
@@ -79,15 +81,17 @@ def measure(progress: Progress, *, quick: bool) -> dict[str, object]:
 
 
 def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
-    """CPU ms of (World in → Plan and set-point out), and of its three QPs solved once more, over crowded
-    scenes."""
+    """Return CPU times (ms) of plan steps and of their three QPs alone, over crowded scenes.
+
+    A plan step goes from the world to plan and set-point; its QPs are then solved once more.
+    """
     config = load(find("scenarios", "antipodal-8"), Scenario).companion
     scenes = [_scene(config, seed) for seed in range(60)]
-    # Each scene has its own vehicle: a planner remembers its field and its gradient.
+    # Each scene has its own planner, which stores its field and its gradient.
     planners = [Planner(config) for _ in scenes]
     headings = [Heading(config.heading, config.horizon) for _ in scenes]
     for scene, heading in zip(scenes, headings, strict=True):
-        # As in flight, the nose is on the target when the planning begins.
+        # As in flight, the vehicle faces the target when planning begins.
         heading.reset(bearing(scene.position, scene.aim.target))
     fleet = scenes[0].world.fleet
     local = fleet.local(fleet.latitude, fleet.longitude, fleet.altitude)
@@ -117,7 +121,10 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def physics(rounds: int) -> dict[str, float]:
-    """Vehicle-steps per CPU-second with the controller at every step, by the number of vehicles in a call."""
+    """Return vehicle-steps per CPU-second by the number of vehicles per call.
+
+    The controller runs at every step.
+    """
     config = load(find("vehicles", "firefly"), VehicleConfig)
     record = airframe_record(airframe(config))
     rates: dict[int, list[float]] = {count: [] for count in _FLEETS}
@@ -143,7 +150,7 @@ def physics(rounds: int) -> dict[str, float]:
 
 
 def codec(rounds: int) -> dict[str, float]:
-    """CPU µs to pack and to parse a GLOBAL_POSITION_INT."""
+    """Return the CPU time (µs) to pack and to parse a GLOBAL_POSITION_INT."""
     message = GlobalPosition(Source(11, 1), 1_000_000, 47.0, 8.0, 500.0, 5.0, (1.0, 2.0, 0.5), 1.0)
     sender, receiver = Codec(), Codec()
     pack_us, parse_us = [], []
@@ -155,7 +162,7 @@ def codec(rounds: int) -> dict[str, float]:
 
 
 def real_time_factor(replan_hz: float | None) -> float:
-    """Simulated seconds per CPU-second of antipodal-8 in lock-step on one core, seed 1, logs included."""
+    """Return simulated seconds per CPU-second of antipodal-8 in lock-step on one core, seed 1, with logs."""
     prepared = prepare("antipodal-8", Options(replan_hz=replan_hz))
     with tempfile.TemporaryDirectory() as folder:
         flight = Flight(*prepared, 1, config_root() / "logs", run_directory=Path(folder))
@@ -167,8 +174,10 @@ def real_time_factor(replan_hz: float | None) -> float:
 
 
 def _scene(config: CompanionConfig, seed: int) -> Scene:
-    """Eight neighbours around, 1.5 to 3 m off at nearly the same height, as in a swap, each with a shared
-    horizon, the goal behind them."""
+    """Return a scene as in a swap: eight neighbours around, the goal behind them.
+
+    The neighbours are 1.5 to 3 m away at nearly the same height, each with a shared horizon.
+    """
     random = np.random.default_rng(seed)
     fleet = FleetFrame(47.397742, 8.545594, 488.0)
     world = World(config, 1, 101, fleet)
@@ -196,7 +205,10 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
 
 
 def _all_act(obstacles: Obstacles) -> None:
-    """The claim of the figure: all eight neighbours are there and within the reach of the field."""
+    """Check the figure's claim: all eight neighbours are there and within the reach of the field.
+
+    Raises RuntimeError if it does not hold.
+    """
     distance = np.linalg.norm(obstacles.positions[:, 0] - (0.0, 0.0, 5.0), axis=1)
     if len(distance) != _NEIGHBOURS or distance.max() >= obstacles.d_safe.max() + 0.5:
         raise RuntimeError("the benchmark's scene is not what it says")

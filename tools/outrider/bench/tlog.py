@@ -1,4 +1,4 @@
-"""How fast a tlog is read, beside pymavlink's own reader on the same log."""
+"""Speed of reading a tlog, compared with pymavlink's reader on the same log."""
 
 from __future__ import annotations
 
@@ -20,8 +20,11 @@ _SOURCE = Source(11, 1)
 
 
 def reading(rounds: int) -> dict[str, float]:
-    """Messages per CPU-second, one core: of the reader, of the census that ``replay --list`` takes, and of
-    pymavlink's mavlogfile (which decodes them too: it has no other way). Interleaved, medians."""
+    """Return messages per CPU-second on one core, medians over interleaved rounds.
+
+    The figures are those of the reader, of the census that ``replay --list`` takes, and of pymavlink's
+    mavlogfile, which always decodes messages too.
+    """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.tlog"
         _write(path)
@@ -48,7 +51,7 @@ def _census(path: Path) -> int:
 
 
 def _by_pymavlink(path: Path) -> int:
-    # Otherwise it begins as MAVLink 1.
+    # Without this setting pymavlink begins with MAVLink 1.
     os.environ["MAVLINK20"] = "1"
     from pymavlink import mavutil
 
@@ -63,7 +66,7 @@ def _by_pymavlink(path: Path) -> int:
 
 
 def _write(path: Path) -> None:
-    """Telemetry as an autopilot sends it: short messages and longer ones."""
+    """Write telemetry as an autopilot sends it: short messages and longer ones."""
     codec = Codec()
     with TlogWriter(path) as log:
         for number in range(_FRAMES):

@@ -1,6 +1,5 @@
-"""Whether a run kept its promise, from the plans on the wire alone, whoever made them and however:
+"""Certification of a run: takes a run directory, gives a verdict from the transmitted plans alone.
 
-    directory → reading → evidence → histories (each vehicle's plans) → pairs (of one epoch) → verdict
-
-Nothing here knows how plans are made.
+The steps are directory → ``reading`` → ``evidence`` → ``histories`` (each vehicle's plans) → ``pairs`` (of
+one epoch) → ``verdict``. The package uses no code that makes plans.
 """

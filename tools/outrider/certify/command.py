@@ -1,4 +1,4 @@
-"""``outrider replay --certify``: from a run directory to its verdict."""
+"""Command ``outrider replay --certify``: from a run directory to its verdict."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ MOST_SHOWN = 20
 
 
 def certify(directory: Path, as_json: bool = False) -> int:
-    """Judge the run in ``directory`` and say so; the exit status: 0 certified, 1 there are findings.
+    """Judge the run in ``directory`` and report; return 0 if it is certified, 1 if there are findings.
 
-    InputError for a directory without evidence.
+    Raises InputError for a directory without evidence.
     """
     with share_progress() as watch:
         evidence = read(directory, watch)
@@ -34,7 +34,7 @@ def certify(directory: Path, as_json: bool = False) -> int:
 
 
 def show(name: str, verdict: Verdict) -> None:
-    """The verdict as a table, then each finding and each anchor in a line."""
+    """Print the verdict as a table, then one line for each finding and each anchor."""
     pairs, nearest = verdict.pairs, verdict.pairs.nearest
     anchors = verdict.steps(Kind.ANCHOR)
     word = "certified" if verdict.certified else "not certified"
@@ -62,7 +62,7 @@ def show(name: str, verdict: Verdict) -> None:
     for words, value in rows.items():
         table.add_row(words, str(value))
     console = Console()
-    # Above the table, where a long name breaks no words.
+    # Printed above the table, so that a long name is not broken.
     console.print(Text(f"{name} · {word}"), soft_wrap=True)
     console.print(table)
     lines = [verdict.line(finding) for finding in verdict.findings]

@@ -1,4 +1,4 @@
-"""What a run leaves that tells of its plans, and what is found in it: values only."""
+"""Values that describe the recorded plans of a run, and the findings about them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from mavlink_bridge.wire.plan import Integers, WirePlan
 
 
 class Terms(NamedTuple):
-    """What the vehicles agreed on before they flew.
+    """Terms that the vehicles agreed on before the flight.
 
-    ``fleet``: system ids that share committed plans; ``apart``: those whose plans are none of these. ``dt``
-    and ``epoch`` in µs; ``steps``: knots of a plan; ``origin``: the fingerprint of its frame; ``required``:
-    least distance (m) between two plans; ``a_max``: mm/s² on each axis; ``upright``: heights do not count.
+    ``fleet``: system ids that share committed plans; ``apart``: those whose plans are not committed plans.
+    ``dt`` and ``epoch`` in µs; ``steps``: knots of a plan; ``origin``: fingerprint of its frame;
+    ``required``: least distance (m) between two plans; ``a_max``: mm/s² on each axis; ``upright``: heights do
+    not count.
     """
 
     fleet: tuple[int, ...]
@@ -27,8 +28,10 @@ class Terms(NamedTuple):
 
 
 class Sighting(NamedTuple):
-    """A plan of ``sender`` in the log of ``owner``: at first at ``time`` (µs, the owner's clock), ``copies``
-    in all."""
+    """Plan of ``sender`` in the log of ``owner``.
+
+    ``time``: of its first copy (µs, the owner's clock); ``copies``: their number.
+    """
 
     owner: int
     sender: int
@@ -38,7 +41,7 @@ class Sighting(NamedTuple):
 
 
 class Garbled(NamedTuple):
-    """Payloads that claim to be plans or rosters and are not: the first at ``time`` (µs)."""
+    """Payloads of the type of plans or rosters that cannot be read; the first one at ``time`` (µs)."""
 
     owner: int
     sender: int
@@ -47,14 +50,14 @@ class Garbled(NamedTuple):
 
 
 class Word(NamedTuple):
-    """From ``time`` (µs) on the owner of a log says farewell in its rosters, or no longer does."""
+    """Change at ``time`` (µs): from then on the owner's rosters say farewell, or no longer do."""
 
     time: int
     farewell: bool
 
 
 class Log(NamedTuple):
-    """One vehicle's tlog. ``damaged``: its records that could not be read."""
+    """Contents of one vehicle's tlog; ``damaged``: number of records that could not be read."""
 
     owner: int
     sightings: tuple[Sighting, ...]
@@ -64,14 +67,14 @@ class Log(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """All of a run."""
+    """Terms and logs of a run."""
 
     terms: Terms
     logs: tuple[Log, ...]
 
 
 class Finding(NamedTuple):
-    """Something that must not be: what, who (system ids), when (µs), and its figures."""
+    """Violation: kind, system ids, time (µs) and figures."""
 
     what: str
     who: tuple[int, ...]

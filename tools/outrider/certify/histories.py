@@ -1,7 +1,7 @@
-"""One vehicle's plans, one for each epoch: what it told against what the others heard, and each plan against
-the one before.
+"""Plans of one vehicle, one for each epoch.
 
-Whoever hears a plan refuses one that does not fit, and counts on the one before, carried on; so does this.
+What it sent is compared with what the others received, and each plan with the one before. A receiver refuses
+a plan that does not fit and relies on the one before, carried on; so does this module.
 """
 
 from __future__ import annotations
@@ -16,12 +16,15 @@ from mavlink_bridge.wire.plan import WirePlan, pack
 from outrider.certify.evidence import Finding, Log, Sighting, Terms
 
 _FAR = 4
-"""Epochs between the beginning of a plan and when it is heard: more, and nobody takes it."""
+"""Largest interval between the start of a plan and its reception (epochs).
+
+Receivers refuse a plan beyond it.
+"""
 _AXES = ("east", "north", "up")
 
 
 class Kind(Enum):
-    """How a plan relates to the one before."""
+    """Relation of a plan to the one before."""
 
     FIRST = "begins"
     MADE = "made anew from where the plan before is"
@@ -30,34 +33,36 @@ class Kind(Enum):
 
 
 class Step(NamedTuple):
-    """The plan of one epoch."""
+    """Plan of one epoch."""
 
     plan: WirePlan
     kind: Kind
 
 
 class Leave(NamedTuple):
-    """A farewell at ``said`` (µs), and the epoch (µs) from which on it is there again, if it is."""
+    """Farewell at ``said`` (µs), and the epoch (µs) of the first plan after its withdrawal, if any."""
 
     said: int
     back: int | None
 
 
 class History(NamedTuple):
-    """Of one vehicle: its plans in the order of their epochs, and when it was not there."""
+    """Plans of one vehicle in the order of their epochs, and the times at which it had left."""
 
     system: int
     steps: tuple[Step, ...]
     leaves: tuple[Leave, ...]
 
     def left(self, epoch: int) -> bool:
-        """Whether it had said farewell before ``epoch`` (µs) began: it may be landing, and its last plan is
-        no longer flown."""
+        """Return whether the vehicle had said farewell before ``epoch`` (µs) began.
+
+        It may then be landing, and its last plan is no longer flown.
+        """
         return any(leave.said < epoch and (leave.back is None or epoch < leave.back) for leave in self.leaves)
 
 
 def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, list[Finding]]:
-    """What ``system`` told, by all ``logs``, and what is wrong with it."""
+    """Return the plans that ``system`` sent, according to all ``logs``, and what is wrong with them."""
     own = next((log for log in logs if log.owner == system), None)
     by_epoch: dict[int, list[Sighting]] = {}
     for log in logs:
@@ -79,7 +84,7 @@ def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, li
             else:
                 findings.append(Finding(flaw[0], (system,), of_it[0].time, flaw[1]))
         if sound:
-            # Of several, what most hold; and of those what is flown, which is the last.
+            # Of several plans the one with most copies counts; on a tie the last one sent, which is flown.
             chosen.append(max(sound)[-1])
     leaves = () if own is None else tuple(_leaves(own, chosen))
     steps = tuple(_steps(chosen, leaves))
@@ -88,7 +93,7 @@ def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, li
 
 
 def _disagreements(system: int, found: Sequence[Sighting], *, logged: bool) -> list[Finding]:
-    """What was told differs from what was told otherwise, or from what was heard; all are of one epoch."""
+    """Return differences among the plans sent, and between those sent and received; all are of one epoch."""
     epoch = found[0].plan.epoch
     told = list(dict.fromkeys(sighting.plan for sighting in found if sighting.owner == system))
     heard = [sighting for sighting in found if sighting.owner != system and sighting.plan not in told]
@@ -109,13 +114,16 @@ def _disagreements(system: int, found: Sequence[Sighting], *, logged: bool) -> l
 
 
 def _differ(plan: WirePlan, others: Iterable[WirePlan]) -> str:
-    """By how many bits a plan differs from the one most like it."""
+    """Return by how many bits a plan differs from the most similar one of ``others``."""
     bits = min((int.from_bytes(pack(plan)) ^ int.from_bytes(pack(other))).bit_count() for other in others)
     return f"{bits} bit differs" if bits == 1 else f"{bits} bits differ"
 
 
 def _flaw(plan: WirePlan, terms: Terms, seen: Sequence[int]) -> tuple[str, str] | None:
-    """Why nobody takes a plan that was told or heard at ``seen`` (µs): what is wrong, and figures."""
+    """Return why receivers refuse a plan that was sent or received at ``seen`` (µs): kind and figures.
+
+    None if they accept it.
+    """
     if not rests(plan):
         left = plan.states()[-1, 1] * 1e-3 * plan.dt * 1e-6
         return "a plan that does not end at rest", f"{float((left @ left) ** 0.5):.4f} m/s left"
@@ -131,7 +139,7 @@ def _flaw(plan: WirePlan, terms: Terms, seen: Sequence[int]) -> tuple[str, str] 
 
 
 def _leaves(own: Log, plans: Sequence[WirePlan]) -> Iterable[Leave]:
-    """Farewells, and the first of ``plans`` after each that was told when it no longer said farewell."""
+    """Yield each farewell, with the first of ``plans`` that was sent after the farewell was withdrawn."""
     told = {sighting.plan: sighting.time for sighting in own.sightings if sighting.sender == own.owner}
     for word, following in zip_longest(own.words, own.words[1:]):
         if word.farewell:
@@ -140,7 +148,10 @@ def _leaves(own: Log, plans: Sequence[WirePlan]) -> Iterable[Leave]:
 
 
 def _steps(plans: Sequence[WirePlan], leaves: Sequence[Leave]) -> Iterable[Step]:
-    """How each plan relates to the one before. In a gap that one goes on: nobody can have heard another."""
+    """Yield the relation of each plan to the one before.
+
+    In a gap the one before goes on: no vehicle can have received another one.
+    """
     back = {leave.back for leave in leaves}
     last: WirePlan | None = None
     for plan in plans:
@@ -158,7 +169,7 @@ def _steps(plans: Sequence[WirePlan], leaves: Sequence[Leave]) -> Iterable[Step]
 
 
 def _limits(system: int, step: Step, terms: Terms) -> Iterable[Finding]:
-    """A plan that is carried on was within them when it was made."""
+    """Yield accelerations beyond the limits. A plan that is carried on was checked when it was made."""
     if step.kind is Kind.CARRIED_ON:
         return
     for axis, (name, most) in enumerate(zip(_AXES, terms.a_max, strict=True)):

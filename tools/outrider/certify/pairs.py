@@ -1,8 +1,11 @@
-"""All pairs of plans of one epoch, at every epoch: by the hulls of the differences of their control points,
-so that what holds, holds at all times between the knots too.
+"""Distances of all pairs of plans of one epoch, at every epoch.
 
-A pair has to stay as far apart as is required, or as it ever was if that is less. It begins as it is. After
-an anchor its promise rests until a later plan of each is as far from the other's as is required.
+They are computed from the hulls of the differences of the control points, so a bound also holds at all times
+between the knots.
+
+A pair has to stay as far apart as is required, or, if that is less, as the largest distance it has had so
+far. It begins with the distance it has. After an anchor the bound is suspended until later plans of the two
+are as far apart as is required.
 """
 
 from __future__ import annotations
@@ -21,11 +24,11 @@ from outrider.certify.evidence import Finding, Terms
 from outrider.certify.histories import History, Kind
 
 SLACK = 1e-6
-"""m: what floating point may cost."""
+"""Tolerance for floating-point errors (m)."""
 
 
 class Nearest(NamedTuple):
-    """The least distance (m) of plans that were checked, whose, and of which epoch (µs)."""
+    """Least distance (m) of checked plans, their vehicles and their epoch (µs)."""
 
     distance: float
     who: tuple[int, int]
@@ -33,8 +36,12 @@ class Nearest(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """How many pairs of plans were ``checked``, and how many not, because one of the two had said farewell or
-    was ``resting`` after an anchor. ``epochs`` (µs): all that somebody has a plan of."""
+    """Result for all pairs.
+
+    ``checked`` is the number of pairs of plans checked. The others were not, because one of the two had said
+    ``farewell`` or the pair was ``resting`` after an anchor. ``epochs`` (µs): all epochs of which a vehicle
+    has a plan.
+    """
 
     epochs: tuple[int, ...]
     checked: int
@@ -45,18 +52,18 @@ class Pairs(NamedTuple):
 
 
 class _Pair:
-    """What two vehicles have to keep, from epoch to epoch."""
+    """Distance that two vehicles have to keep, from epoch to epoch."""
 
     def __init__(self, who: tuple[int, int], required: float) -> None:
         self._who, self._required = who, required
         self._keeps = 0.0
         self._rests = False
         self._breach: tuple[Nearest, int, int] | None = None
-        """The worst, since when (µs), in how many epochs."""
+        """Worst distance of the current breach, its first epoch (µs) and its number of epochs."""
         self.findings: list[Finding] = []
 
     def see(self, epoch: int, distance: float, *, anchored: bool) -> bool:
-        """Their plans of ``epoch`` (µs) are ``distance`` (m) apart; whether that was checked."""
+        """Add the distance (m) of the plans of ``epoch`` (µs); return whether it was checked."""
         if anchored:
             self.close()
             self._rests, self._keeps = True, 0.0
@@ -74,7 +81,7 @@ class _Pair:
         return True
 
     def close(self) -> None:
-        """What was too near is so no longer, or is not looked at any more: one finding for all of it."""
+        """End the current breach, if any: it becomes one finding."""
         if self._breach is not None:
             worst, since, count = self._breach
             for_long = (
@@ -86,7 +93,7 @@ class _Pair:
 
 
 def check(histories: Sequence[History], terms: Terms) -> Pairs:
-    """All pairs of ``histories`` at all epochs."""
+    """Check all pairs of ``histories`` at all epochs."""
     plans = [{step.plan.epoch: step for step in history.steps} for history in histories]
     epochs = tuple(sorted({epoch for told in plans for epoch in told}))
     current: dict[int, WirePlan] = {}
@@ -105,7 +112,7 @@ def check(histories: Sequence[History], terms: Terms) -> Pairs:
         there = [k for k in sorted(current) if not histories[k].left(epoch)]
         together = list(combinations(there, 2))
         farewell += len(current) * (len(current) - 1) // 2 - len(together)
-        # Who comes back after a farewell begins anew with everybody.
+        # A vehicle that returns after a farewell starts anew with all others.
         findings += _concluded(pairs.pop(who) for who in set(pairs).difference(together))
         for (i, j), distance in zip(together, _distances(current, epoch, together, terms), strict=True):
             who = histories[i].system, histories[j].system
@@ -123,7 +130,7 @@ def check(histories: Sequence[History], terms: Terms) -> Pairs:
 def _distances(
     current: dict[int, WirePlan], epoch: int, together: Sequence[tuple[int, int]], terms: Terms
 ) -> list[float]:
-    """Least distance (m) of each pair of plans; who is silent carries its last one on."""
+    """Return the least distance (m) of each pair of plans; a silent vehicle's last plan is carried on."""
     if not together:
         return []
     goes_on = {

@@ -1,4 +1,4 @@
-"""A run directory to evidence: the configuration says what was agreed on, the logs what was told."""
+"""Evidence from a run directory: the configuration gives the terms, the logs give the plans."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from outrider.scenarios.scenario import Scenario
 _TUNNEL = 385
 _ALLOWED = "allowed: what outrider swarm SCENARIO --avoidance certified --out leaves"
 _OFTEN = 4096
-"""Records from one look at the progress to the next."""
+"""Number of records between two progress reports."""
 
 Watch = Callable[[str, float], None]
 
 
 def read(directory: Path, watch: Watch) -> Evidence:
-    """All evidence in ``directory``; ``watch`` hears which log is read, and the share that is done.
+    """Read all evidence in ``directory``; ``watch`` receives the log's name and the share that is done.
 
     Raises InputError where there is none.
     """
@@ -63,7 +63,7 @@ def read(directory: Path, watch: Watch) -> Evidence:
 
 
 def terms_of(scenario: Scenario) -> Terms:
-    """What the companions of a scenario agree on."""
+    """Return the terms on which the companions of a scenario agree."""
     config = settings_of(scenario)
     certified, limits, origin = config.certified, config.limits, scenario.origin
     x, y, z = (round(1e3 * most) for most in limits.u_max)
@@ -81,7 +81,7 @@ def terms_of(scenario: Scenario) -> Terms:
 
 
 class _Tally:
-    """What one log holds so far. A payload that is told again is counted, and not read twice."""
+    """Contents of one log so far; a repeated payload is counted and decoded once."""
 
     def __init__(self, owner: int) -> None:
         self._owner = owner
@@ -91,7 +91,7 @@ class _Tally:
         self._roster = b""
 
     def add(self, time: int, message: Tunnel) -> None:
-        """A TUNNEL of any kind."""
+        """Add a TUNNEL of any kind."""
         sender, payload = message.source.system, message.payload
         if message.payload_type == PLAN:
             first, copies = self._plans.get((sender, payload), (time, 0))
@@ -111,7 +111,7 @@ class _Tally:
         self._garbled[sender] = bad._replace(copies=bad.copies + copies)
 
     def log(self, damaged: int) -> Log:
-        """All of it, with so many records that could not be read."""
+        """Return the contents; ``damaged`` records could not be read."""
         sightings = []
         for (sender, payload), (time, copies) in self._plans.items():
             try:
@@ -122,7 +122,7 @@ class _Tally:
 
 
 def _read(owner: int, path: Path, at: Callable[[int], None]) -> Log:
-    """One log; ``at`` hears how many bytes have been read. Raises LogError."""
+    """Read one log; ``at`` receives the number of bytes read. Raises LogError."""
     tally, codec = _Tally(owner), Codec(lambda identifier, _system, _component: identifier == _TUNNEL)
     reader, size = read_tlog(path), 0
     for number, record in enumerate(reader):

@@ -1,4 +1,4 @@
-"""What the evidence of a run comes to."""
+"""Verdict on a run from its evidence."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from outrider.certify.pairs import Pairs, check
 
 
 class Verdict(NamedTuple):
-    """``findings`` in the order of time; without any, the run is certified. ``began``: the first epoch (µs),
-    from which on seconds are counted."""
+    """Verdict on a run; without ``findings``, which are in the order of time, the run is certified.
+
+    ``began``: the first epoch (µs), from which seconds are counted.
+    """
 
     histories: tuple[History, ...]
     pairs: Pairs
@@ -22,27 +24,30 @@ class Verdict(NamedTuple):
 
     @property
     def certified(self) -> bool:
-        """Whether every pair was certified at every epoch, as far as the logs tell."""
+        """Whether every pair was certified at every epoch, as far as the logs show."""
         return not self.findings
 
     def seconds(self, time: int) -> float:
-        """``time`` (µs) from the beginning on, s."""
+        """Return ``time`` (µs) as seconds from the beginning."""
         return round(1e-6 * (time - self.began), 3)
 
     def steps(self, *kinds: Kind) -> list[tuple[int, int]]:
-        """System id and epoch (µs) of all plans of these ``kinds``."""
+        """Return system id and epoch (µs) of all plans of these ``kinds``, by epoch."""
         found = [(h.system, s.plan.epoch) for h in self.histories for s in h.steps if s.kind in kinds]
         return sorted(found, key=lambda one: one[::-1])
 
     def line(self, finding: Finding) -> str:
-        """A finding for people: what, who, when, figures."""
+        """Return a finding as text: kind, vehicles, time, figures."""
         who = ", ".join(map(str, finding.who))
         parts = [f"{finding.what}: {who}", f"{self.seconds(finding.time):g} s", finding.figures]
         return ", ".join(part for part in parts if part)
 
     def document(self) -> dict[str, Any]:
-        """Values of JSON. ``plans``: those that were not carried on, anchors among them; ``unchecked``: pairs
-        left out, by why."""
+        """Return the verdict as JSON values.
+
+        ``plans``: number of those that were not carried on, anchors among them; ``unchecked``: pairs left
+        out, by reason.
+        """
         pairs, nearest = self.pairs, self.pairs.nearest
         return {
             "certified": self.certified,
@@ -67,7 +72,7 @@ class Verdict(NamedTuple):
 
 
 def judge(evidence: Evidence) -> Verdict:
-    """The verdict on a run."""
+    """Return the verdict on a run."""
     terms, logs = evidence
     histories, findings = [], _strange(terms, logs)
     for system in terms.fleet:
@@ -83,7 +88,7 @@ def judge(evidence: Evidence) -> Verdict:
 
 
 def _strange(terms: Terms, logs: tuple[Log, ...]) -> list[Finding]:
-    """Payloads that are no plan, and plans of those of whom nobody knows."""
+    """Return findings for payloads that are no plan, and for plans of unknown vehicles."""
     known = terms.apart.union(terms.fleet)
     findings = [
         Finding("what is no plan was sent as one", (one.sender, one.owner), one.time, f"{one.copies} times")
@@ -99,7 +104,7 @@ def _strange(terms: Terms, logs: tuple[Log, ...]) -> list[Finding]:
 
 
 def _absent(histories: list[History], logs: tuple[Log, ...], began: int) -> list[Finding]:
-    """Those of whom too little is left."""
+    """Return findings for vehicles without a readable log or without a plan."""
     owners = {log.owner for log in logs}
     findings = [
         Finding("no log of its own that can be read", (one.system,), began, "its plans are as heard")

@@ -1,4 +1,4 @@
-"""The commands of ``outrider``: what each takes, and whom it asks.
+"""Definitions of the commands of ``outrider``: their options, and the module that runs each.
 
-Heavy imports wait until one of them needs them.
+Heavy imports wait until a command needs them.
 """

@@ -1,4 +1,4 @@
-"""Commands that fly many times."""
+"""Commands that run many flights."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def sweep(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly many seeds of a grid of scenarios or random scenes. What was killed can be gone on with."""
+    """Fly many seeds of a grid of scenarios or random scenes. A sweep that was interrupted can be resumed."""
     from outrider.sweep.command import sweep as sweeping
 
     raise typer.Exit(
@@ -46,7 +46,7 @@ def paper(
         ),
     ] = "exact",
 ) -> None:
-    """Fly the paper's methods and scenarios, and put its table beside ours."""
+    """Fly the paper's methods and scenarios, and compare the results with the paper's table."""
     from outrider.paper.command import paper as comparing
 
     raise typer.Exit(comparing(seeds, jobs, out, as_json, response=response))

@@ -1,4 +1,4 @@
-"""Commands that fly: swarms of our own, emulated vehicles, and a companion on whatever autopilot there is."""
+"""Commands that fly: own swarms, emulated vehicles, and a companion on any supported autopilot."""
 
 from __future__ import annotations
 
@@ -51,8 +51,7 @@ def swarm(
     out: RunDirectory = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly a scenario, in lock-step unless told otherwise, and leave logs, summary and picture in a run
-    directory."""
+    """Fly a scenario, in lock-step by default, and write logs, summary and picture to a run directory."""
     from outrider.report.command import NAME, make, write
     from outrider.runs.summary import exit_status
     from outrider.scenarios.options import Options
@@ -86,7 +85,7 @@ def swarm(
         with progress(prepared.scenario.duration_s) as watch:
             pace = flying.Pace(real_time or realtime, realtime)
             summary = flying.fly(prepared, seed, directory, watch, pace, shown)
-        # What many vehicles leave behind is a gigabyte, and their logs are read next.
+        # Many vehicles leave a gigabyte of garbage, and their logs are read next.
         gc.collect()
         with share_progress() as reading:
             made = make(directory, reading)
@@ -183,8 +182,10 @@ def doctor(
     key: Annotated[Path | None, typer.Option(help="Key file of a link that is signed.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say what is at an endpoint or in a log, what an escort misses there, and what to do about it. It asks,
-    and changes nothing. Ends with 1 if something is in the way of an escort."""
+    """List what is at an endpoint or in a log, what an escort lacks there, and the remedies.
+
+    It only sends requests and changes nothing. Exits with 1 if something prevents an escort.
+    """
     from outrider.doctor.command import doctor as examining
 
     raise typer.Exit(examining(endpoint, system, seconds, key, as_json))
@@ -215,8 +216,11 @@ def fly(
         bool, typer.Option("--go", help="The operator's go, given as soon as all is ready: it takes off.")
     ] = False,
 ) -> None:
-    """Fly one vehicle as part of a swarm: a companion on a real or emulated autopilot, until it has landed
-    or Ctrl-C, which leaves it holding its place. Orders are typed: go, hold, return, land (docs/fly.md)."""
+    """Fly one vehicle of a swarm: a companion on a real or emulated autopilot.
+
+    It runs until the vehicle has landed, or until Ctrl-C, which leaves the vehicle holding its position.
+    Orders are typed: go, hold, return, land (docs/fly.md).
+    """
     from outrider.fly.command import run
     from outrider.fly.request import Options, checked
 

@@ -13,7 +13,7 @@ from outrider.commands.options import AsJson
 
 
 def key(file: Annotated[Path, typer.Argument(help="New; only you may read it.")]) -> None:
-    """Make a key with which vehicles and those who may command them sign what they say (docs/signing.md)."""
+    """Create a key with which vehicles and their commanders sign their messages (docs/signing.md)."""
     from outrider.key_files import new_key
 
     sys.stdout.write(f"{new_key(file)}\n")

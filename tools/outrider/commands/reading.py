@@ -1,4 +1,4 @@
-"""Commands that show, check or change the form of what was flown."""
+"""Commands that show, check or convert recorded flights."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ def view(
     ] = None,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End by itself after that.")] = None,
 ) -> None:
-    """Show vehicles in the browser, in three dimensions: a run that is played, or a live flight that is
-    listened to; nothing is sent there."""
+    """Show vehicles in the browser in 3D: a recorded run, or a live flight, to which nothing is sent."""
     from outrider.view.command import Terms
     from outrider.view.command import view as viewing
 
@@ -55,9 +54,12 @@ def replay(
     out: Annotated[Path | None, typer.Option(help="Directory; new or empty.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Replay a log: what would a companion have sent (--own), or a vehicle of ours around what is recorded
-    (--target)? Or a flight of ours: does each companion, given what it received, send what it sent? Ends with
-    1 if not, or if there are findings."""
+    """Replay a log, or check a flight from its log.
+
+    With --own: what would a companion have sent? With --target: fly own vehicles around a recorded target.
+    For a run of outrider: does each companion, given what it received, send the same messages again? Exits
+    with 1 if not, or if there are findings.
+    """
     if listing and certify:
         raise InputError(f"replay {log}: both at once; allowed: one of --list, --certify")
     others = {"own": own, "neighbours": neighbours, "target": target, "speed": speed, "to": to, "out": out}
@@ -83,7 +85,7 @@ def export(
     out: Annotated[Path | None, typer.Option(help="File (mcap) or directory; new.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Turn a run or a log into files for Foxglove, PlotJuggler, tables or PX4's tools."""
+    """Convert a run or a log into files for Foxglove, PlotJuggler, tables or PX4's tools."""
     from outrider.export.command import export as exporting
 
     exporting(source, form, out, as_json)

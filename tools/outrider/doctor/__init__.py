@@ -1,7 +1,8 @@
-"""What is at the other end of a link, and what an escort misses there:
+"""Examination of a vehicle: takes frames of a link or a log, gives what an escort lacks there.
 
-    frames → hearing (who says what, how often, last) → checks (a finding each) → verdict → page, or JSON
+The steps are frames → ``hearing`` (senders, messages, rates, last reception) → checks (findings) → verdict →
+``page``, or JSON.
 
-The examination is pure: time and frames come in, findings go out. On a live link ``consultation`` asks a few
-polite questions as well; a log is read at once.
+The examination is pure: times and frames go in, findings come out. On a live link ``consultation`` also sends
+a few requests that change nothing; a log is read at once.
 """

@@ -1,4 +1,7 @@
-"""What the autopilot can follow, from its parameters: against the stock firmware and the shipped files."""
+"""Limits that the autopilot can follow, from its parameters.
+
+They are compared with the stock firmware and with the shipped companion files.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +20,20 @@ from outrider.yaml_files.yaml_file import load
 
 _FILES: Final = {ARDUPILOT_NUMBER: "ardupilot", PX4_NUMBER: "px4"}
 _SPEED: Final = 5.0
-"""m/s at which the way to stop is told: v_max of the shipped companions when they were first flown."""
+"""Speed for which the stopping distance is given (m/s).
+
+It was v_max of the shipped companions at their first flights.
+"""
 _LOWER: Final = 0.99
-"""Share of the stock value from which on a limit counts as lower: float32 is a little off."""
+"""Share of the stock value below which a limit counts as lower: float32 is not exact."""
 
 
 class Demand(NamedTuple):
-    """What a companion asks of its autopilot horizontally: ``acceleration`` (m/s²) and ``speed`` (m/s) on one
-    axis, and ``total`` acceleration (m/s²) with what its field adds."""
+    """Horizontal demand of a companion on its autopilot.
+
+    ``acceleration`` (m/s²) and ``speed`` (m/s) are on one axis; ``total`` is the acceleration (m/s²)
+    including that of the field.
+    """
 
     acceleration: float
     speed: float
@@ -33,13 +42,13 @@ class Demand(NamedTuple):
 
 @lru_cache
 def shipped(autopilot: int) -> Demand:
-    """The limits of the companion file that is shipped for a MAV_AUTOPILOT."""
+    """Return the demand of the companion file that is shipped for a MAV_AUTOPILOT."""
     limits = load(find("companions", _FILES[autopilot]), FlyConfig).companion.limits
     return Demand(max(limits.u_max[:2]), max(limits.v_max[:2]), limits.a_total)
 
 
 def agility(case: Case) -> Iterator[Finding]:
-    """What it can follow, and each parameter that makes that less than stock."""
+    """Yield what the autopilot can follow, and each parameter that lowers this below stock."""
     beat = case.vehicle.vehicle.heartbeat
     if case.profile is None or beat is None or beat.type not in ROTORCRAFT:
         return
@@ -63,7 +72,7 @@ def agility(case: Case) -> Iterator[Finding]:
 
 
 def summary(limits: Limits, demand: Demand, file: str) -> Finding:
-    """All limits in one finding, against what the companion ``file`` asks."""
+    """Return all limits as one finding, compared with the demand of the companion ``file``."""
     what = (
         f"it follows up to {limits.acceleration:.3g} m/s², {limits.jerk:.3g} m/s³, {limits.speed:.3g} m/s "
         f"and {math.degrees(limits.tilt):.0f}° of tilt"
@@ -92,7 +101,7 @@ def summary(limits: Limits, demand: Demand, file: str) -> Finding:
 
 
 def lowered(autopilot: int, name: str, value: float) -> Iterator[Finding]:
-    """A warning if the parameter ``name`` alone makes a limit lower than that of the stock firmware."""
+    """Yield a warning if the parameter ``name`` alone makes a limit lower than the stock firmware's."""
     stock, limits = STOCK[autopilot], limits_of(autopilot, {name: value})
     costs = list(_costs(limits, stock))
     if not costs:

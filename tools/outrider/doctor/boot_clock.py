@@ -1,4 +1,4 @@
-"""A vehicle's own clock (time_boot) against the one of whoever listens."""
+"""Clock of a vehicle (time_boot), compared with the receiver's clock."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from mavlink_bridge.messages import Message
 _RESTART: Final = 1_000_000
 _LEAP: Final = 5_000_000
 _FASTEST: Final = 100
-"""Times: simulations are rarely sped up by more."""
+"""Largest factor by which a simulation may be sped up; more is rare."""
 
 
 class BootClock:
-    """Fed with pairs of times. ``restarts``: it went back by more than a second; ``backward``: it went back
-    at all, or said something else of the same instant, of ``stamps``; ``leaps``: it went ahead by far more
-    than the time that passed."""
+    """Comparison of two clocks, fed with pairs of times.
+
+    ``restarts``: number of times the clock went back by more than a second. ``backward``: number of times,
+    among ``stamps``, that it went back at all, or that two different messages had the same time. ``leaps``:
+    number of times it went ahead by far more than the time that passed.
+    """
 
     def __init__(self) -> None:
         self.restarts = self.backward = self.leaps = self.stamps = 0
@@ -24,7 +27,7 @@ class BootClock:
         self._end = (0, 0)
 
     def tell(self, now: int, message: Message, boot: int) -> None:
-        """``message``, which came at ``now``, says ``boot`` (both µs)."""
+        """Add ``message``, which was received at ``now`` and has the time stamp ``boot`` (both µs)."""
         kind = type(message)
         self.stamps += 1
         before = self._before.get(kind)
@@ -35,7 +38,8 @@ class BootClock:
             self.restarts += restarted
             self.leaps += leapt
             if restarted or leapt:
-                # What other messages said before is of the old count: the same step would count again.
+                # The earlier stamps of other messages are from the old count: the same step would count
+                # again.
                 self._start = None
                 self._before.clear()
         self._before[kind] = now, boot, message
@@ -44,13 +48,15 @@ class BootClock:
 
     @property
     def seconds(self) -> float:
-        """For how long (s of the listener) it has run without a step."""
+        """Time without a step (s of the receiver's clock)."""
         return 0.0 if self._start is None else (self._end[0] - self._start[0]) * 1e-6
 
     @property
     def rate(self) -> float | None:
-        """Its seconds per second of the listener's, since its last step; None if that is too short to
-        say."""
+        """Rate of the clock since its last step: its seconds per second of the receiver's.
+
+        None if the time is too short to tell.
+        """
         if self._start is None or self.seconds < 1.0:
             return None
         rate = (self._end[1] - self._start[1]) * 1e-6 / self.seconds
@@ -58,5 +64,5 @@ class BootClock:
 
     @property
     def doubled(self) -> bool:
-        """Whether two clocks are in it: it goes back and ahead again and again."""
+        """Whether the stamps come from two clocks: they go back and ahead again and again."""
         return self.backward >= 5 and self.backward >= 0.02 * self.stamps

@@ -1,4 +1,4 @@
-"""What a check looks at."""
+"""Input of a check."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from outrider.doctor.hearing import Hearing
 from outrider.doctor.speaker import Speaker
 
 PX4_NUMBER, ARDUPILOT_NUMBER = 12, 3
-"""MAV_AUTOPILOT."""
+"""Values of MAV_AUTOPILOT."""
 _BYTEWISE = 0x10
 
 
 class Case(NamedTuple):
-    """One vehicle on one link. ``log``: it is a recording, so nobody could ask for what is not in it;
-    ``me``: as whom the doctor speaks, None if it does not; ``baud`` of a serial port."""
+    """One vehicle on one link.
+
+    ``log``: it is a recording, so missing messages could not be requested. ``me``: sender id of the doctor,
+    None if it sends nothing. ``baud``: of a serial port.
+    """
 
     hearing: Hearing
     vehicle: Speaker
@@ -27,32 +30,35 @@ class Case(NamedTuple):
 
     @property
     def profile(self) -> Profile | None:
-        """The autopilot's ways, None for one that is not known."""
+        """Profile of the autopilot, None for an unknown one."""
         return self.vehicle.vehicle.profile
 
     @property
     def autopilot(self) -> int:
-        """MAV_AUTOPILOT."""
+        """Value of MAV_AUTOPILOT; 0 before the first heartbeat."""
         beat = self.vehicle.vehicle.heartbeat
         return beat.autopilot if beat is not None else 0
 
     @property
     def px4(self) -> bool:
-        """Whether it is PX4."""
+        """Whether the autopilot is PX4."""
         return self.autopilot == PX4_NUMBER
 
     def parameter(self, name: str) -> float | None:
-        """Its value, None if it was not told, or is no number."""
+        """Return the value of a parameter, None if it was not received or is no number."""
         message: ParamValue | None = self.vehicle.parameters.get(name)
         return None if message is None else number_of(message, bytewise=self.px4)
 
     @property
     def silent(self) -> float:
-        """s from the last thing that the vehicle said to the end."""
+        """Time from the vehicle's last message to the end (s)."""
         return (self.hearing.end - self.vehicle.last) * 1e-6
 
     def silent_for(self, message_id: int) -> float:
-        """s from the last such message to the end, in a log to the vehicle's last word; all if none came."""
+        """Return the time (s) from the last message of that id to the end.
+
+        In a log the end is the vehicle's last message. Without such a message it is the whole duration.
+        """
         stream = self.vehicle.streams.get(message_id)
         end = self.vehicle.last if self.log else self.hearing.end
         return self.hearing.seconds if stream is None else (end - stream.last) * 1e-6

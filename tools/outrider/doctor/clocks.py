@@ -1,4 +1,4 @@
-"""The vehicle's clock against ours."""
+"""Comparison of the vehicle's clock with this machine's."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 
 _RIGHT, _JITTER = 0.005, 0.1
-"""Share, and s over the time that was listened: messages are late by that much."""
+"""Tolerance of the rate: a share, and an error (s) over the duration, as messages are late by that much."""
 _SIMULATED: Final = 0.2
 
 
 def clock(case: Case) -> Iterator[Finding]:
-    """time_boot: how fast, and whether it steps."""
+    """Yield findings on the rate and the steps of time_boot."""
     ticking = case.vehicle.clock
     if ticking.restarts and not ticking.doubled:
         yield Finding(

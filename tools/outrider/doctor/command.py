@@ -1,4 +1,4 @@
-"""``outrider doctor``: on a live link, or of a log."""
+"""Command ``outrider doctor`` for a live link or a log."""
 
 from __future__ import annotations
 
@@ -27,14 +27,17 @@ from outrider.terminal.share_progress import share_progress
 
 READY, NOT_READY = 0, 1
 _STEP: Final = 20_000
-"""µs between two looks at the link."""
+"""Time between two polls of the link (µs)."""
 _OFTEN: Final = 4096
-"""Records from one look at the progress to the next."""
+"""Number of records between two progress reports."""
 
 
 def doctor(endpoint: str, system: int | None, seconds: float, key: Path | None, as_json: bool) -> int:
-    """Examine what is at ``endpoint``, for ``seconds`` at most, with the key in a file if there is one; the
-    exit status. InputError for an endpoint that is none or cannot be opened, and for a key that is none."""
+    """Examine the vehicle at ``endpoint``, for ``seconds`` at most, and return the exit status.
+
+    ``key``: key file, None without one. Raises InputError for an endpoint that is invalid or cannot be
+    opened, and for an invalid key.
+    """
     try:
         place = parse_endpoint(endpoint)
         if isinstance(place, Replay):
@@ -53,7 +56,7 @@ def doctor(endpoint: str, system: int | None, seconds: float, key: Path | None, 
 
 
 def of_log(place: Replay, system: int | None) -> Verdict:
-    """Of a whole log, read at once. LogError if it cannot be read."""
+    """Return the verdict on a whole log. Raises LogError if it cannot be read or has no MAVLink frame."""
     path = Path(place.path)
     if not path.is_file():
         raise LogError(
@@ -84,7 +87,7 @@ def _of_link(place: Endpoint, system: int | None, seconds: float, key: Path | No
 
 
 def consult(link: Link, clock: Clock, consultation: Consultation) -> Verdict:
-    """Over ``link``, by ``clock``, until it is over."""
+    """Run ``consultation`` over ``link``, by ``clock``, until it is over; return the verdict."""
     now = clock.now()
     with share_progress() as watch:
         while not consultation.over(now):

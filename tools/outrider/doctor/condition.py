@@ -1,15 +1,19 @@
-"""Something that is so or not, over time."""
+"""History of a condition that is true or false over time."""
 
 from __future__ import annotations
 
 from typing import Final
 
 _BRIEF: Final = 1.0
-"""s that are not worth a word."""
+"""Shortest time worth reporting (s)."""
 
 
 class Condition:
-    """``holds``: whether it is so, None if nobody said; ``lost``: how often it was so and then was not."""
+    """Condition over time.
+
+    ``holds``: its latest value, None before the first; ``lost``: number of times it was true and then became
+    false.
+    """
 
     def __init__(self) -> None:
         self.holds: bool | None = None
@@ -17,7 +21,7 @@ class Condition:
         self._since = self._missing = 0
 
     def tell(self, now: int, holds: bool) -> None:
-        """What is said at ``now`` (µs)."""
+        """Add the value at ``now`` (µs)."""
         if self.holds is False:
             self._missing += max(now - self._since, 0)
         self.lost += self.holds is True and not holds
@@ -25,7 +29,7 @@ class Condition:
 
     @property
     def history(self) -> str:
-        """A sentence on what was not so before; empty if all was well."""
+        """Sentence on the times at which the condition was false; empty if they are negligible."""
         if self.missing < _BRIEF:
             return ""
         times = f", and it was lost {self.lost} times" if self.lost > 1 else ", and it was lost once"
@@ -33,5 +37,5 @@ class Condition:
 
     @property
     def missing(self) -> float:
-        """For how long it was said not to be so, s."""
+        """Time for which the condition was reported false (s)."""
         return self._missing * 1e-6

@@ -1,4 +1,4 @@
-"""An examination on a live link, without I/O: bytes in, bytes out, and when it is over."""
+"""Examination on a live link, without I/O: bytes in, bytes out, and whether it is over."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from outrider.doctor.px4_events import genuine
 from outrider.doctor.questions import Questions
 
 _LONG_ENOUGH: Final = 5_000_000
-"""µs of listening that show rates and a clock."""
+"""Time of reception that suffices for rates and a clock (µs)."""
 
 
 class Consultation:
-    """Of the autopilot ``system`` (None: the lowest), for ``limit`` µs at most, and longer only where a
-    pre-arm check fails whose reasons are not said yet. With ``signing`` it asks signed, counts only what is,
-    and has to be told Unix time."""
+    """Examination of the autopilot ``system`` (None: the lowest id), for ``limit`` µs at most.
+
+    It lasts longer only where a pre-arm check fails whose reasons have not been reported yet. With
+    ``signing`` it signs its requests and accepts signed frames only; the times must then be Unix time.
+    """
 
     def __init__(self, limit: int, system: int | None = None, signing: Signing | None = None) -> None:
         self.examination = Examination(system)
@@ -30,7 +32,7 @@ class Consultation:
         self._start: int | None = None
 
     def step(self, now: int, arrived: Sequence[bytes]) -> list[bytes]:
-        """Take in what has ``arrived`` by ``now`` (µs); what to send."""
+        """Process what has ``arrived`` by ``now`` (µs); return what to send."""
         self._start = now if self._start is None else self._start
         hearing = self.examination.hearing
         hearing.wait(now)
@@ -49,21 +51,21 @@ class Consultation:
         return [self._codec.encode(message) for message in self._questions.due(now)]
 
     def over(self, now: int) -> bool:
-        """Whether there is nothing more to wait for."""
+        """Return whether there is nothing more to wait for."""
         if self._start is None or self._questions.listening(now):
             return False
         passed = now - self._start
         return passed >= self._limit or (passed >= _LONG_ENOUGH and self._questions.done(now))
 
     def share(self, now: int) -> float:
-        """Of the longest that it may take, how much has passed, 0…1."""
+        """Return the share of the longest duration that has passed, 0…1."""
         if self._start is None:
             return 0.0
         passed = now - self._start
         return passed / max(self._limit, passed + self._questions.listening(now), 1)
 
     def doing(self, now: int) -> str:
-        """What it waits for, in a few words."""
+        """Return a short description of what it waits for."""
         if not self.examination.hearing.frames and not self.examination.hearing.refused:
             return "waiting for MAVLink"
         if self.examination.vehicle is None:

@@ -1,4 +1,4 @@
-"""The whole examination, without I/O: frames in, a verdict out, at any time."""
+"""Complete examination without I/O: frames in, a verdict out at any time."""
 
 from __future__ import annotations
 
@@ -35,24 +35,27 @@ _WORST_FIRST: Final = (Severity.BLOCKING, Severity.WARNING, Severity.NOTE, Sever
 
 
 class Examination:
-    """Of the autopilot ``system`` (None: the lowest, in a log the one that says most). ``log``: it is a
-    recording; ``me``: as whom the doctor speaks."""
+    """Examination of the autopilot ``system``.
+
+    None selects the lowest id, in a log the vehicle with the most messages. ``log``: it is a recording;
+    ``me``: sender id of the doctor.
+    """
 
     def __init__(self, system: int | None = None, *, log: bool = False, me: Source | None = None) -> None:
         self.hearing = Hearing()
         self.system, self.log, self.me = system, log, me
         self.baud: int | None = None
-        """Of the serial port that it is behind."""
+        """Baud rate of the serial port, None for other links."""
         self.asked: dict[int, int] = {}
-        """How often the doctor asked for a message, by its id."""
+        """Number of requests by the doctor for each message id."""
 
     @property
     def vehicle(self) -> Speaker | None:
-        """Who is examined, as far as it has shown itself."""
+        """Examined vehicle, None before it is received."""
         return self.hearing.vehicle(self.system, lowest=not self.log)
 
     def verdict(self) -> Verdict:
-        """By what was heard until now."""
+        """Return the verdict on everything received so far."""
         vehicle = self.vehicle
         if vehicle is None:
             return Verdict((presence.nobody(self.hearing, self.system, self.log),))

@@ -1,4 +1,4 @@
-"""What a doctor says: values only."""
+"""Findings of the doctor; values only."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import NamedTuple
 
 
 class Severity(Enum):
-    """How much it matters to an escort."""
+    """Severity for an escort."""
 
     OK = "ok"
     NOTE = "note"
-    """To be known; nothing is wrong with it."""
+    """For information; nothing is wrong."""
     WARNING = "warning"
-    """It flies, and something can go badly."""
+    """The vehicle flies, but something can go badly."""
     BLOCKING = "blocking"
-    """It does not fly, or must not."""
+    """The vehicle does not fly, or must not."""
 
 
 class Finding(NamedTuple):
-    """``what`` is there, ``why`` that matters to an escort, what to ``do`` about it (empty: nothing)."""
+    """One finding: ``what`` was found, ``why`` it matters to an escort, what to ``do`` (empty: nothing)."""
 
     what: str
     severity: Severity
@@ -38,5 +38,5 @@ class Verdict(NamedTuple):
         return all(finding.severity is not Severity.BLOCKING for finding in self.findings)
 
     def of(self, severity: Severity) -> tuple[Finding, ...]:
-        """Those that matter so much."""
+        """Return the findings of that severity."""
         return tuple(finding for finding in self.findings if finding.severity is severity)

@@ -1,4 +1,4 @@
-"""Whether it may be armed: pre-arm check, sensors, battery."""
+"""Readiness for arming: pre-arm check, sensors, battery."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _SENSORS: Final = {
     if entry.name.startswith(_PREFIX) and number != PREARM_OK
 }
 _RC: Final = 0x10000
-"""MAV_SYS_STATUS_SENSOR_RC_RECEIVER: an escort needs none."""
+"""MAV_SYS_STATUS_SENSOR_RC_RECEIVER, which an escort does not need."""
 _LOW, _EMPTY = 0.3, 0.15
 
 
 def checks(case: Case) -> Iterator[Finding]:
-    """What SYS_STATUS says of arming and sensors."""
+    """Yield findings from SYS_STATUS on arming and sensors."""
     status = case.vehicle.latest(SysStatus)
     if status is None:
         return
@@ -55,7 +55,7 @@ def checks(case: Case) -> Iterator[Finding]:
 
 
 def _failing(case: Case) -> Finding:
-    """The pre-arm check fails: why, as far as it was said."""
+    """Return the finding on a failing pre-arm check, with the reasons received so far."""
     what, why = "the pre-arm check fails (SYS_STATUS, health 0x10000000)", "The autopilot will refuse to arm."
     said = case.vehicle.objections
     if said:
@@ -74,7 +74,7 @@ def _failing(case: Case) -> Finding:
 
 
 def battery(case: Case) -> Iterator[Finding]:
-    """SYS_STATUS and BATTERY_STATUS, against what the autopilot itself calls low."""
+    """Yield a finding from SYS_STATUS and BATTERY_STATUS, by the autopilot's own thresholds."""
     status, told = case.vehicle.latest(SysStatus), case.vehicle.latest(BatteryStatus)
     remaining = told.remaining if told is not None else None
     voltage = status.battery_voltage if status is not None else None

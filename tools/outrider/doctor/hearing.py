@@ -1,4 +1,4 @@
-"""Everyone on the link, as heard."""
+"""Everything received on a link, by sender."""
 
 from __future__ import annotations
 
@@ -10,16 +10,19 @@ from mavlink_bridge.wire.framing import Frame
 from outrider.doctor.speaker import Speaker
 
 MOST: Final = 128
-"""Speakers of whom note is taken: a flood of made-up ones must not fill the memory."""
+"""Maximum number of senders that are recorded: a flood of invented ones must not fill the memory."""
 SETPOINTS: Final = frozenset((82, 84, 86))
 """SET_ATTITUDE_TARGET, SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT."""
 
 
 class Hearing:
-    """Fed with frames. ``begin``, ``end``: of all that was heard or waited for (µs); ``octets`` of frames;
-    ``bad``, ``skipped_bytes``: frames whose checksum failed, and bytes that belong to no frame; ``unheard``:
-    frames of those beyond the number of whom note is taken; ``refused``: frames that do not count for who has
-    the key, and ``refusal`` why the last did not."""
+    """Record of a link, fed with frames.
+
+    ``begin`` and ``end`` span all that was received or waited for (µs). ``octets``: bytes of frames. ``bad``,
+    ``skipped_bytes``: frames with a wrong checksum, and bytes that belong to no frame. ``unheard``: frames of
+    senders beyond the recorded number. ``refused``: frames that failed the signature check; ``refusal``: why
+    the last one did.
+    """
 
     def __init__(self) -> None:
         self.speakers: dict[Source, Speaker] = {}
@@ -29,7 +32,7 @@ class Hearing:
         self.refusal = ""
 
     def receive(self, now: int, frame: Frame) -> None:
-        """``frame`` arrived at ``now`` (µs); a time that goes back counts as the one before."""
+        """Add ``frame``, which arrived at ``now`` (µs); a time that goes back counts as the previous one."""
         now = self.wait(now)
         self.frames += 1
         self.octets += len(frame.data)
@@ -44,26 +47,28 @@ class Hearing:
         speaker.tell(now, frame, None if row is None else row.parse(source, frame.payload))
 
     def wait(self, now: int) -> int:
-        """It is ``now`` (µs), whether or not somebody spoke; the time that counts."""
+        """Advance the time to ``now`` (µs), with or without a frame; return the time that counts."""
         self.begin = now if self.begin is None else self.begin
         self.end = max(self.end, now)
         return self.end
 
     @property
     def seconds(self) -> float:
-        """How long, s."""
+        """Duration (s)."""
         return 0.0 if self.begin is None else (self.end - self.begin) * 1e-6
 
     @property
     def autopilots(self) -> list[Speaker]:
-        """Those that fly something, by system id."""
+        """Senders that are autopilots, by system id."""
         return [
             self.speakers[source] for source in sorted(self.speakers) if self.speakers[source].is_autopilot
         ]
 
     def vehicle(self, system: int | None = None, *, lowest: bool = False) -> Speaker | None:
-        """The autopilot of ``system``, or the one that says most; ``lowest``: rather that with the lowest id,
-        which does not change as they speak."""
+        """Return the autopilot of ``system``, or the one with the most messages.
+
+        ``lowest`` selects the lowest id instead, which does not change while messages arrive.
+        """
         found = [one for one in self.autopilots if system is None or one.source.system == system]
         return max(
             found,

@@ -1,4 +1,4 @@
-"""What flies there: firmware, version, vehicle, mode, how it speaks."""
+"""Identity of the vehicle: firmware, version, type, mode, MAVLink version."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ from outrider.logs.flight_modes import mode_name
 from outrider.logs.words import enumerated
 
 ROTORCRAFT: Final = {2, 3, 4, 13, 14, 15, 29, 35, 43}
-"""MAV_TYPE of what can hover: quadrotor, coaxial, helicopter, hexa-, octo-, tri-, dodeca-, decarotor, generic
-multirotor."""
+"""Values of MAV_TYPE that can hover.
+
+Quadrotor, coaxial, helicopter, hexa-, octo-, tri-, dodeca-, decarotor, generic multirotor.
+"""
 _TRIED: Final = {ARDUPILOT_NUMBER: (4, 6), PX4_NUMBER: (1, 16)}
 _TAKES_SETPOINTS: Final = 0x80
-"""MAV_PROTOCOL_CAPABILITY."""
+"""Bit of MAV_PROTOCOL_CAPABILITY."""
 _SILENT: Final = 5.0
 _STARTING: Final = (1, 2)
-"""MAV_STATE: boot, calibrating."""
+"""Values of MAV_STATE: boot, calibrating."""
 
 
 def firmware(case: Case) -> Iterator[Finding]:
-    """Which autopilot, and which vehicle."""
+    """Yield findings on the kind of autopilot and vehicle."""
     beat = case.vehicle.vehicle.heartbeat
     if beat is None:
         return
@@ -93,7 +95,7 @@ def _version(case: Case, kind: str) -> Iterator[Finding]:
 
 
 def dialect(case: Case) -> Iterator[Finding]:
-    """MAVLink 1 or 2, signed or not."""
+    """Yield findings on MAVLink 1 or 2 and on signing."""
     vehicle = case.vehicle
     if vehicle.versions == {1}:
         yield Finding(
@@ -113,7 +115,7 @@ def dialect(case: Case) -> Iterator[Finding]:
 
 
 def state(case: Case) -> Iterator[Finding]:
-    """Mode, motors, on the ground or not, its own opinion of itself."""
+    """Yield findings on mode, motors, landed state and system status."""
     beat = case.vehicle.vehicle.heartbeat
     if beat is None:
         return
@@ -187,7 +189,7 @@ def state(case: Case) -> Iterator[Finding]:
 
 def _mode(case: Case, beat: Heartbeat) -> str:
     if not case.px4 and beat.type not in ROTORCRAFT:
-        return str(beat.custom_mode)  # other ArduPilots have other numbers
+        return str(beat.custom_mode)  # Other ArduPilot vehicles number their modes differently.
     return mode_name("px4" if case.px4 else "ardupilot", beat.custom_mode)
 
 

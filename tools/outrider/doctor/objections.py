@@ -1,7 +1,7 @@
-"""Asking why the pre-arm check fails, and waiting for the answer.
+"""Requests for the reasons of a failing pre-arm check.
 
-ArduPilot answers MAV_CMD_RUN_PREARM_CHECKS (401) with a text for each reason, and says them again every 30 s.
-PX4 answers with EVENT messages, and with texts where it hears a ground station.
+ArduPilot answers MAV_CMD_RUN_PREARM_CHECKS (401) with one text per reason, and repeats them every 30 s. PX4
+answers with EVENT messages, and with texts on links where it receives a ground station's heartbeat.
 """
 
 from __future__ import annotations
@@ -14,25 +14,27 @@ from outrider.doctor.speaker import Speaker
 RUN_CHECKS: Final = 401
 _PX4: Final = 12
 _LISTEN: Final = 35_000_000
-"""µs: ArduPilot's own texts come every 30 s, whoever asks."""
+"""µs; ArduPilot sends its texts every 30 s even without a request."""
 _LISTEN_PX4: Final = 6_000_000
-"""µs: PX4 reports when it is asked, and does not repeat it."""
+"""µs; PX4 reports on request and does not repeat it."""
 _SETTLED: Final = 2_000_000
-"""µs after a reason: others follow at once."""
+"""Time to wait after a reason (µs): others follow at once."""
 _AGAIN: Final = 5_000_000
 _TRIES: Final = 3
 
 
 class Objections:
-    """Of one vehicle: when to ask, and for how long to listen. It asks only a vehicle that is disarmed and
-    whose check fails: running the checks changes nothing of it."""
+    """Timing of the requests to one vehicle, and of waiting for the answers.
+
+    Requests go only to a disarmed vehicle whose check fails: running the checks changes nothing there.
+    """
 
     def __init__(self) -> None:
         self._first: int | None = None
         self._last = self._times = 0
 
     def due(self, vehicle: Speaker, me: Source, now: int) -> list[Message]:
-        """What to send at ``now`` (µs)."""
+        """Return the messages to send at ``now`` (µs)."""
         if not self._open(vehicle) or self._known(vehicle) or self._times >= _TRIES:
             return []
         if self._first is not None and now - self._last < _AGAIN:
@@ -44,7 +46,7 @@ class Objections:
         return [CommandLong(me, system, component, RUN_CHECKS, 0, (0.0,) * 7)]
 
     def left(self, vehicle: Speaker, now: int) -> int:
-        """For how long (µs) to listen on at most; 0 when there is nothing to wait for."""
+        """Return the longest time (µs) left to wait; 0 when there is nothing to wait for."""
         if not self._open(vehicle):
             return 0
         if self._known(vehicle):
@@ -57,7 +59,7 @@ class Objections:
         return fails and not vehicle.vehicle.armed and (vehicle.tells_checks or _is_px4(vehicle))
 
     def _known(self, vehicle: Speaker) -> bool:
-        """Whether it was asked and has named a reason, be it before."""
+        """Return whether the vehicle was asked and has named a reason, possibly before the request."""
         return bool(vehicle.objections) and self._first is not None
 
 

@@ -1,4 +1,4 @@
-"""A verdict for people, and as JSON."""
+"""Output of a verdict as text and as JSON."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ _STYLES: Final = {
 
 
 def show(name: str, verdict: Verdict) -> None:
-    """On standard output: the verdict in one line, then the findings, the worst first. Of what is well only
-    that it is there."""
+    """Print the verdict in one line, then the findings, the worst first.
+
+    For findings of severity OK the reason is omitted.
+    """
     console = Console(highlight=False)
     told = [(severity, len(verdict.of(severity))) for severity in reversed(Severity)]
     counts = ", ".join(f"{count} {severity.value}" for severity, count in told if count)
     ready = "ready for an escort" if verdict.ready else "NOT ready for an escort"
-    # Not wrapped: how long the name is must not decide where a line breaks that scripts look for.
+    # Not wrapped: the length of the name must not move line breaks within text that scripts search for.
     console.print(Text(f"{name}: {ready} ({counts})", style="bold"), soft_wrap=True)
     table = Table.grid(padding=(0, 2))
     for what, severity, why, do in verdict.findings:
@@ -40,7 +42,7 @@ def show(name: str, verdict: Verdict) -> None:
 
 
 def document(verdict: Verdict) -> dict[str, Any]:
-    """Values of JSON."""
+    """Return the verdict as JSON values."""
     findings = [
         {"what": what, "severity": severity.value, "why": why, "do": do}
         for what, severity, why, do in verdict.findings
@@ -49,5 +51,5 @@ def document(verdict: Verdict) -> dict[str, Any]:
 
 
 def _plain(text: str) -> str:
-    """Without what would steer a terminal: vehicles' own words are in it."""
+    """Replace unprintable characters: texts of vehicles could otherwise control the terminal."""
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)

@@ -1,4 +1,4 @@
-"""Where its local frame begins, where home is, and whether its positions agree."""
+"""Origin of the local frame, home, and agreement of the vehicle's positions."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 
 _APART: Final = 3.0
-"""m between the same place said in two ways, horizontally."""
+"""Largest horizontal distance between two reports of the same place (m)."""
 _FAR_HOME: Final = 500.0
 _WRONG_SIGN: Final = -0.5
 
 
 def origin(case: Case) -> Iterator[Finding]:
-    """GPS_GLOBAL_ORIGIN: every set-point counts from there."""
+    """Yield findings on GPS_GLOBAL_ORIGIN, to which every set-point is relative."""
     origins = case.vehicle.origins
     if len(origins) > 1:
         frame = _frame(origins[0])
@@ -71,7 +71,7 @@ def origin(case: Case) -> Iterator[Finding]:
 
 
 def home(case: Case) -> Iterator[Finding]:
-    """HOME_POSITION against the origin: return goes to the one, set-points count from the other."""
+    """Yield findings on HOME_POSITION: return flies to home, set-points are relative to the origin."""
     told, origins = case.vehicle.latest(HomePosition), case.vehicle.origins
     if told is None:
         yield Finding(
@@ -100,7 +100,10 @@ def home(case: Case) -> Iterator[Finding]:
 
 
 def agreement(case: Case) -> Iterator[Finding]:
-    """LOCAL_POSITION_NED from the origin against GLOBAL_POSITION_INT, and its climb against its height."""
+    """Yield findings on the agreement of LOCAL_POSITION_NED and GLOBAL_POSITION_INT.
+
+    Positions are compared through the origin, and the climb rate with the change of height.
+    """
     pair, origins = case.vehicle.pair, case.vehicle.origins
     if pair is not None and origins:
         there, here = pair
@@ -137,7 +140,7 @@ def _frame(place: GpsGlobalOrigin) -> FleetFrame:
 
 
 def _worked_out(case: Case) -> tuple[float, float, float] | None:
-    """Where the local frame begins, from one place in both."""
+    """Return the origin of the local frame, computed from one position in both frames."""
     if case.vehicle.pair is None:
         return None
     there, here = case.vehicle.pair
@@ -148,5 +151,5 @@ def _worked_out(case: Case) -> tuple[float, float, float] | None:
 
 
 def _placed(place: GlobalPosition) -> bool:
-    """Without a fix it is all zeros."""
+    """Return whether ``place`` is valid: without a fix it is all zeros."""
     return bool(place.latitude or place.longitude)

@@ -1,4 +1,4 @@
-"""Whether it knows where it is: estimator and GPS."""
+"""Position estimate of the vehicle: estimator and GPS."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from outrider.doctor.speaker import ABSOLUTE_POSITION, FIX_3D
 _CONSTANT_POSITION: Final = 0x80
 _RELATIVE_POSITION: Final = 0x8
 _UNINITIALISED: Final = 0x400
-"""ArduPilot's, of EKF_STATUS_REPORT."""
+"""Bit of ArduPilot's EKF_STATUS_REPORT."""
 _POOR_HDOP, _POOR_ACCURACY = 2.0, 2.5
 
 
 def estimator(case: Case) -> Iterator[Finding]:
-    """EKF_STATUS_REPORT of ArduPilot, ESTIMATOR_STATUS of PX4."""
+    """Yield findings from ArduPilot's EKF_STATUS_REPORT or PX4's ESTIMATOR_STATUS."""
     told: EkfStatus | EstimatorStatus | None
     told = case.vehicle.latest(EstimatorStatus) if case.px4 else case.vehicle.latest(EkfStatus)
     if told is None:
@@ -55,7 +55,7 @@ def estimator(case: Case) -> Iterator[Finding]:
 
 
 def gps(case: Case) -> Iterator[Finding]:
-    """GPS_RAW_INT."""
+    """Yield findings from GPS_RAW_INT."""
     told = case.vehicle.latest(GpsRaw)
     if told is None:
         yield Finding(

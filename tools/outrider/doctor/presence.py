@@ -1,4 +1,4 @@
-"""Who is on the link, and whether anybody is."""
+"""Senders on the link, and the case that there is none."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from outrider.doctor.speaker import Speaker
 from outrider.logs.words import enumerated
 
 COMPANION: Final = 195
-"""The component that ``fly`` speaks as."""
+"""Component id of ``fly``."""
 
 
 def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
-    """Why there is no vehicle to examine."""
+    """Return the reason why there is no vehicle to examine."""
     severity = Severity.BLOCKING
     if not hearing.frames:
         if hearing.refused:
@@ -65,7 +65,7 @@ def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
 
 
 def company(case: Case) -> Iterator[Finding]:
-    """Others on the link."""
+    """Yield findings on other senders on the link."""
     others = [one for one in case.hearing.autopilots if one is not case.vehicle]
     systems = sorted({one.source.system for one in others} - {case.vehicle.source.system})
     if systems:
@@ -126,5 +126,5 @@ def _about(case: Case, speaker: Speaker) -> Iterator[Finding]:
 
 
 def listed(numbers: list[int]) -> str:
-    """With commas; not all of very many."""
+    """Return the numbers with commas, at most twelve of them."""
     return ", ".join(map(str, numbers[:12])) + (" …" if len(numbers) > 12 else "")

@@ -1,8 +1,8 @@
-"""What PX4 has against arming, as EVENT messages (410) say it.
+"""PX4's reasons against arming, from EVENT messages (410).
 
-PX4 1.16 sends STATUSTEXT only over links on which it hears a ground station, but EVENT over every link; and
-that its mode is the reason it says by EVENT alone. pymavlink's dialects have no EVENT, so it is read here. An
-id is the low 24 bits of the FNV-1a hash of the event's name.
+PX4 1.16 sends STATUSTEXT only over links on which it receives a ground station's heartbeat, but EVENT over
+every link. If its mode is the reason, only an EVENT says so. pymavlink's dialects have no EVENT, so it is
+decoded here. An id is the low 24 bits of the FNV-1a hash of the event's name.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ from mavlink_bridge.wire.framing import SIGNATURE_LENGTH, Frame
 EVENT: Final = 410
 CRC_EXTRA: Final = b"\xa0"
 LAYOUT: Final = Struct("<IIHBBBI")
-"""Id, boot time (ms), sequence, destination, log levels; the first argument of a check: the modes that it
-concerns, a bit for each navigation state."""
+"""Id, boot time (ms), sequence, destination, log levels, and the first argument of a check.
+
+That argument holds the modes that the check concerns, one bit for each navigation state.
+"""
 _WARNING: Final = 4
 _OFFSET, _PRIME = 0x811C9DC5, 0x01000193
 
@@ -117,7 +119,7 @@ _STATES: Final = {
 
 
 def event_id(name: str) -> int:
-    """The id of an event of the autopilot (component 1), without that component."""
+    """Return the id of an event of the autopilot (component 1), without that component."""
     value = _OFFSET
     for byte in name.encode():
         value = ((value ^ byte) * _PRIME) & 0xFFFFFFFF
@@ -128,7 +130,7 @@ _WORDS: Final = {event_id(name): words for name, words in _CHECKS.items()}
 
 
 def genuine(frame: Frame) -> bool:
-    """Whether it is an EVENT whose checksum holds."""
+    """Return whether ``frame`` is an EVENT with a correct checksum."""
     if frame.message_id != EVENT or frame.version != 2:
         return False
     end = len(frame.data) - 2 - (SIGNATURE_LENGTH if frame.signed else 0)
@@ -136,7 +138,7 @@ def genuine(frame: Frame) -> bool:
 
 
 def reason(frame: Frame, custom_mode: int) -> str | None:
-    """What an EVENT has against arming in the mode ``custom_mode``; None for all other frames."""
+    """Return the reason against arming in mode ``custom_mode`` from an EVENT; None for all other frames."""
     if not genuine(frame):
         return None
     payload = frame.payload.ljust(LAYOUT.size, b"\0")

@@ -1,8 +1,8 @@
-"""What a doctor asks on a live link, and how: little, slowly, and nothing that changes anything.
+"""Requests that the doctor sends on a live link: few, slow, and without effect on the vehicle.
 
 It sends HEARTBEAT, REQUEST_MESSAGE and PARAM_REQUEST_READ, and asks a disarmed vehicle whose pre-arm check
-fails for the reasons. No rate is set: REQUEST_MESSAGE shows as well whether there is such a message, and
-whoever watches the vehicle at that moment keeps the rates that they have asked for.
+fails for the reasons. It sets no rate: REQUEST_MESSAGE also shows whether a message exists, and other
+receivers keep the rates that they have requested.
 """
 
 from __future__ import annotations
@@ -17,24 +17,30 @@ from outrider.doctor.settings import names
 from outrider.doctor.speaker import Speaker
 
 COMPONENT: Final = 193
-"""MAV_COMP_ID_ONBOARD_COMPUTER3. Not a ground station: its HEARTBEAT, once heard and then lost, is what
-FS_GCS_ENABLE and NAV_DLL_ACT act upon. Not 195, which is ``fly``'s: others would take the doctor for it."""
+"""MAV_COMP_ID_ONBOARD_COMPUTER3.
+
+It is not a ground station: FS_GCS_ENABLE and NAV_DLL_ACT act when a ground station's HEARTBEAT, once
+received, is lost. It is not 195, the id of ``fly``: others would take the doctor for a companion.
+"""
 STRANGER: Final = Source(245, COMPONENT)
-"""Who speaks before the vehicle's system id is known: a serial link, say, may wait to be spoken to."""
+"""Sender id before the vehicle's system id is known.
+
+A serial link, for example, may wait for a first message.
+"""
 _ONBOARD_CONTROLLER, _INVALID, _ACTIVE = 18, 8, 4
 _HEARTBEAT_EVERY: Final = 1_000_000
 _PATIENCE: Final = 700_000
-"""µs until it asks again, and a moment for what flows by itself."""
+"""Time until a request is repeated (µs), and until streams that flow unasked have arrived."""
 _LISTEN: Final = 2_000_000
 _TRIES: Final = 3
 _AT_ONCE: Final = 2
-"""Questions in one step: 57 600 baud carry a hundred a second, but have other things to do."""
+"""Maximum number of requests in one step: 57 600 baud carry a hundred a second, but also other traffic."""
 _REQUEST_MESSAGE: Final = 512
 _ONCE: Final = (148, 49, 242)
-"""AUTOPILOT_VERSION, GPS_GLOBAL_ORIGIN, HOME_POSITION: asked for at once, as they rarely flow."""
+"""AUTOPILOT_VERSION, GPS_GLOBAL_ORIGIN, HOME_POSITION: requested at once, as they are rarely streamed."""
 _FLOWING: Final = (1, 32, 30, 33, 245, 24, 147, 2)
 _ESTIMATOR: Final = {True: 230, False: 193}
-"""Its state's message, by whether it is PX4."""
+"""Id of the estimator's status message, by whether the autopilot is PX4."""
 
 
 class _Asked(NamedTuple):
@@ -43,7 +49,7 @@ class _Asked(NamedTuple):
 
 
 class Questions:
-    """Of one vehicle. ``examination`` says who it is, and what has been answered."""
+    """Requests to one vehicle; ``examination`` identifies it and holds the answers."""
 
     def __init__(self, examination: Examination) -> None:
         self._examination = examination
@@ -55,11 +61,11 @@ class Questions:
         self.me = STRANGER
 
     def due(self, now: int) -> list[Message]:
-        """What to say at ``now`` (µs)."""
+        """Return the messages to send at ``now`` (µs)."""
         vehicle = self._examination.vehicle
         if vehicle is not None:
             if vehicle.source != self._whom:
-                # One with a lower id has spoken up: begin anew.
+                # A vehicle with a lower id was received: start again with it.
                 self._whom, self._met = vehicle.source, now
                 self._asked.clear()
                 self._examination.asked.clear()
@@ -76,7 +82,7 @@ class Questions:
         return said
 
     def done(self, now: int) -> bool:
-        """Whether everything was answered, or asked for often enough."""
+        """Return whether every request was answered, or sent often enough."""
         vehicle = self._examination.vehicle
         if vehicle is None or self._met is None or now - self._met < _LISTEN:
             return False
@@ -87,7 +93,7 @@ class Questions:
         )
 
     def listening(self, now: int) -> int:
-        """For how long (µs) it waits at most for the reasons of a failed pre-arm check."""
+        """Return the longest time (µs) left to wait for the reasons of a failed pre-arm check."""
         vehicle = self._examination.vehicle
         return 0 if vehicle is None else self._objections.left(vehicle, now)
 

@@ -1,4 +1,4 @@
-"""What a parameter means to an escort, and what both firmwares have in common."""
+"""Meaning of a parameter for an escort, and rules that both firmwares share."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from outrider.doctor.finding import Severity
 
 
 class Said(NamedTuple):
-    """What a value means."""
+    """Meaning of a value."""
 
     severity: Severity
     why: str
@@ -18,7 +18,7 @@ class Said(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """One parameter; ``unknown``: what to be aware of while it was not told."""
+    """Rule for one parameter; ``unknown``: what to consider while it was not received."""
 
     name: str
     judge: Callable[[float, Case], Said]
@@ -29,7 +29,7 @@ OK, NOTE, WARNING, BLOCKING = Severity.OK, Severity.NOTE, Severity.WARNING, Seve
 
 
 def number(value: float, case: Case) -> Said:
-    """MAV_SYS_ID and SYSID_THISMAV."""
+    """Judge MAV_SYS_ID and SYSID_THISMAV."""
     here = case.vehicle.source.system
     if value == here:
         return Said(OK, "It is the id that it speaks with.")
@@ -41,7 +41,7 @@ def number(value: float, case: Case) -> Said:
 
 
 def fence(value: float, _case: Case) -> Said:
-    """GF_ACTION and FENCE_ENABLE."""
+    """Judge GF_ACTION and FENCE_ENABLE."""
     if value == 0:
         return Said(
             NOTE,
@@ -52,7 +52,7 @@ def fence(value: float, _case: Case) -> Said:
 
 
 def low_battery(value: float, _case: Case) -> Said:
-    """COM_LOW_BAT_ACT and BATT_FS_LOW_ACT."""
+    """Judge COM_LOW_BAT_ACT and BATT_FS_LOW_ACT."""
     if value == 0:
         return Said(NOTE, "A low battery is only told, nothing is done: the companion alone sees to it.")
     return Said(OK, "On a low battery it lands or returns.")

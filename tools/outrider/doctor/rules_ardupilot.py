@@ -1,4 +1,4 @@
-"""ArduCopter's parameters that decide what becomes of an escort."""
+"""Rules for ArduCopter's parameters that affect an escort."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from outrider.doctor.case import Case
 from outrider.doctor.rule import NOTE, OK, WARNING, Rule, Said, fence, low_battery, number
 
 _BRIEF, _STOCK = 1.0, 3.0
-"""s of GUID_TIMEOUT: what is recommended, and the firmware's default."""
+"""GUID_TIMEOUT (s): the recommended value, and the firmware's default."""
 
 
 def _guided_timeout(value: float, _case: Case) -> Said:
@@ -83,4 +83,4 @@ ARDUPILOT_RULES: Final = (
     Rule("BATT_FS_LOW_ACT", low_battery, "What it does when the battery is low."),
     Rule("SYSID_THISMAV", number, "Its id after the next start."),
 )
-"""In the order in which they are told."""
+"""Rules in the order in which they are reported."""

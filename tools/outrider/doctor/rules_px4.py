@@ -1,4 +1,4 @@
-"""PX4's parameters that decide what becomes of an escort."""
+"""Rules for PX4's parameters that affect an escort."""
 
 from __future__ import annotations
 
@@ -95,4 +95,4 @@ PX4_RULES: Final = (
     Rule("MPC_JERK_AUTO", _own_jerk, "How fast its own modes change acceleration: 4 m/s³ by default."),
     Rule("MAV_SYS_ID", number, "Its id after the next start."),
 )
-"""In the order in which they are told."""
+"""Rules in the order in which they are reported."""

@@ -1,4 +1,4 @@
-"""The parameters that decide what becomes of an escort."""
+"""Check of the parameters that affect an escort."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ _ALSO: Final = {
     True: ("BAT_LOW_THR", *stock_parameters(PX4_NUMBER)),
     False: ("BATT_LOW_VOLT", *stock_parameters(ARDUPILOT_NUMBER)),
 }
-"""What other checks want to know, by whether it is PX4."""
+"""Parameters that other checks need, by whether the autopilot is PX4."""
 _URGENT: Final = frozenset(("COM_OBL_RC_ACT", "GUID_TIMEOUT"))
 
 
 def rules(*, px4: bool) -> tuple[Rule, ...]:
-    """Those of a firmware."""
+    """Return the rules of a firmware."""
     return PX4_RULES if px4 else ARDUPILOT_RULES
 
 
 def names(*, px4: bool) -> tuple[str, ...]:
-    """Which parameters to ask for."""
+    """Return the names of the parameters to request."""
     return tuple(rule.name for rule in rules(px4=px4)) + _ALSO[px4]
 
 
 def settings(case: Case) -> Iterator[Finding]:
-    """A finding for each that was told, and one for those that were not."""
+    """Yield one finding for each known parameter, and one for those that are not known."""
     if case.profile is None:
         return
     untold = []

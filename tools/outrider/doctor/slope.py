@@ -1,4 +1,4 @@
-"""By how much one thing changes when another does."""
+"""Slope of one quantity over another."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ _ENOUGH: Final = 0.5
 
 
 class Slope:
-    """Least squares through zero, of changes that have the same unit."""
+    """Least-squares slope through zero, of changes that have the same unit."""
 
     def __init__(self) -> None:
         self._both = self._square = 0.0
 
     def tell(self, change: float, answer: float) -> None:
-        """When one thing changed by ``change`` the other did by ``answer``."""
+        """Add a pair: when one quantity changed by ``change`` the other changed by ``answer``."""
         self._both += change * answer
         self._square += change * change
 
     @property
     def value(self) -> float | None:
-        """The slope; None if too little has changed to say."""
+        """Slope; None if too little has changed to tell."""
         return self._both / self._square if self._square > _ENOUGH else None

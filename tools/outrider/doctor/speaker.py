@@ -1,4 +1,4 @@
-"""One component on the link, as heard."""
+"""Record of one component on the link."""
 
 from __future__ import annotations
 
@@ -35,21 +35,21 @@ M = TypeVar("M", bound=Message)
 GROUND_STATION: Final = 6
 """MAV_TYPE_GCS."""
 ABSOLUTE_POSITION: Final = 0x10
-"""Of ESTIMATOR_STATUS_FLAGS, which EKF_STATUS_REPORT shares."""
+"""Bit of ESTIMATOR_STATUS_FLAGS, which EKF_STATUS_REPORT shares."""
 CRITICAL: Final = 5
-"""MAV_STATE; 6 is emergency."""
+"""Value of MAV_STATE; 6 is emergency."""
 FIX_3D: Final = 3
 _KEPT_FRAMES, _KEPT_TEXTS, _KEPT_PARAMETERS, _KEPT_PLACES = 32, 40, 4096, 8
 _KEPT_OBJECTIONS: Final = 16
 _OBJECTING: Final = ("prearm", "preflight", "arming denied", "arm:")
 _REPEATED: Final = 35_000_000
-"""µs: ArduPilot repeats its objections every 30 s; one that it does not repeat is answered."""
+"""µs; ArduPilot repeats its reasons every 30 s, so a reason that is not repeated is resolved."""
 _TOGETHER: Final = 60_000
-"""µs between two positions that are compared."""
+"""Largest time between two positions that are compared (µs)."""
 
 
 class Stream:
-    """One message of one component: how often, from when to when (µs), and its longest silence."""
+    """One message id of one component: count, first and last time (µs), longest silence (µs)."""
 
     __slots__ = ("count", "first", "last", "longest")
 
@@ -59,27 +59,27 @@ class Stream:
         self.longest = 0
 
     def tell(self, now: int) -> None:
-        """One more."""
+        """Count a message at ``now`` (µs)."""
         self.count += 1
         self.longest = max(self.longest, now - self.last)
         self.last = now
 
     @property
     def rate(self) -> float:
-        """Per second of the listener; 0 for fewer than two."""
+        """Messages per second of the receiver's clock; 0 for fewer than two."""
         return (self.count - 1) / ((self.last - self.first) * 1e-6) if self.last > self.first else 0.0
 
 
 _CLOCKED = (Attitude, AttitudeQuaternion, GlobalPosition, LocalPosition, PositionTarget, SystemTime)
-"""Those whose stamp is of the autopilot's one clock; RAW_IMU's, for one, is of a sensor's."""
+"""Messages whose time stamp is of the autopilot's one clock; RAW_IMU's, for example, is of a sensor's."""
 
 
 class Speaker:
-    """All that ``source`` has said. Repeated frames are counted in ``repeated``, and nowhere else.
+    """Record of all that ``source`` has sent. Repeated frames are counted in ``repeated`` only.
 
-    ``origins``: the different GPS_GLOBAL_ORIGINs in their order; ``pair``: the last global and local position
-    of about one instant; ``guided_losses``: how often its mode fell out of the one in which set-points steer,
-    while armed, as it does when they stop.
+    ``origins``: the different GPS_GLOBAL_ORIGINs in their order. ``pair``: the last global and local position
+    of about one instant. ``guided_losses``: number of times that its mode, while armed, changed from the one
+    that follows set-points to a fallback, as it does when set-points stop.
     """
 
     def __init__(self, source: Source) -> None:
@@ -92,7 +92,7 @@ class Speaker:
         self._objections: dict[str, int] = {}
         self.frames = self.repeated = self.signed = self.guided_losses = 0
         self.last = 0
-        """When it last spoke, µs."""
+        """Time of its last frame (µs)."""
         self.versions: set[int] = set()
         self.identities: set[tuple[int, bytes]] = set()
         self.origins: list[GpsGlobalOrigin] = []
@@ -100,12 +100,12 @@ class Speaker:
         self.armable, self.located, self.fixed = Condition(), Condition(), Condition()
         self.climb = Slope()
         self.tells_checks = False
-        """Whether SYS_STATUS ever mentioned the pre-arm check."""
+        """Whether SYS_STATUS ever contained the pre-arm check."""
         self._latest: dict[type, Message] = {}
         self._recent: deque[bytes] = deque(maxlen=_KEPT_FRAMES)
 
     def tell(self, now: int, frame: Frame, message: Message | None) -> None:
-        """It said ``message`` in ``frame`` at ``now`` (µs); None: one that nobody here reads."""
+        """Add ``frame`` at ``now`` (µs) with its ``message``, None for one that is not decoded."""
         if frame.data in self._recent:
             self.repeated += 1
             return
@@ -121,38 +121,38 @@ class Speaker:
             self._object(now, objection)
 
     def latest(self, kind: type[M]) -> M | None:
-        """The last message of ``kind``."""
+        """Return the last message of ``kind``, None if there is none."""
         return cast("M | None", self._latest.get(kind))
 
     def rate(self, message_id: int) -> float:
-        """Messages per second of *its* clock: a simulation may run faster than the wall's."""
+        """Return messages per second of the sender's clock: a simulation may run faster than the wall's."""
         stream = self.streams.get(message_id)
         return 0.0 if stream is None else stream.rate / (self.clock.rate or 1.0)
 
     @property
     def objections(self) -> list[str]:
-        """What it last had against arming, in its own words, or by its events."""
+        """Last reasons against arming, from its texts or its events."""
         return [text for text, then in self._objections.items() if self.objected_at - then <= _REPEATED]
 
     @property
     def objected_at(self) -> int:
-        """When (µs) it last said so."""
+        """Time of the last reason against arming (µs)."""
         return max(self._objections.values(), default=0)
 
     @property
     def heartbeat(self) -> Heartbeat | None:
-        """The last, of whatever kind."""
+        """Last heartbeat, of whatever kind."""
         return self.latest(Heartbeat)
 
     @property
     def is_autopilot(self) -> bool:
-        """Whether it flies something."""
+        """Whether it is an autopilot, by its heartbeat."""
         beat = self.heartbeat
         return beat is not None and beat.autopilot != INVALID and beat.type != GROUND_STATION
 
     @property
     def is_ground_station(self) -> bool:
-        """By its heartbeat."""
+        """Whether it is a ground station, by its heartbeat."""
         return self.heartbeat is not None and self.heartbeat.type == GROUND_STATION
 
     def _note(self, now: int, message: Message) -> None:

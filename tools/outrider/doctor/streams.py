@@ -1,4 +1,4 @@
-"""Which messages come, and how often: what an escort lives on."""
+"""Streams that an escort needs, and their rates."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 
 _ASKED: Final = {number: 1e6 / each for number, each in STREAMS.items()}
-"""Hz, by message id."""
+"""Requested rates (Hz) by message id."""
 
 
 class Need(NamedTuple):
-    """A message. ``wanted``: Hz that ``fly`` asks for; ``least``: what it can live with; ``essential``: there
-    is no escort without it."""
+    """Requirement for one message.
+
+    ``wanted``: rate (Hz) that ``fly`` requests; ``least``: rate that suffices; ``essential``: an escort is
+    impossible without the message.
+    """
 
     message_id: int
     name: str
@@ -48,12 +51,12 @@ NEEDS: Final = (
 )
 _NEARLY: Final = 0.85
 _GONE: Final = 5.0
-"""s of silence after which a message that flowed has stopped, at least."""
+"""Shortest silence (s) after which a streamed message counts as stopped."""
 _INTERVALS: Final = 10.0
 
 
 def streams(case: Case, asked: dict[int, int]) -> Iterator[Finding]:
-    """``asked``: how often the doctor itself asked for a message, by its id."""
+    """Yield a finding for each required message; ``asked``: the doctor's own requests by message id."""
     for need in NEEDS:
         yield _judge(case, need, asked.get(need.message_id, 0))
 

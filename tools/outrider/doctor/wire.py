@@ -1,4 +1,4 @@
-"""How the link itself is: ids that are not unique, copies, damage, strangers, room."""
+"""State of the link: duplicate ids, copies, damage, refused frames, capacity."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _WANTED: Final = 2500.0
 
 
 def wire(case: Case) -> Iterator[Finding]:
-    """Whether what comes is the vehicle's, whole, once, and not too much."""
+    """Yield findings on the link: unique ids, refused and damaged frames, load."""
     yield from _namesakes(case)
     if case.hearing.refused:
         yield Finding(
@@ -85,7 +85,7 @@ def _damage(hearing: Hearing) -> Iterator[Finding]:
 
 
 def _load(case: Case) -> Iterator[Finding]:
-    """How much of a serial port is taken, at ten bits a byte."""
+    """Yield a finding on the load of a serial port, at ten bits per byte."""
     hearing = case.hearing
     if not case.baud or hearing.seconds < _LONG_ENOUGH:
         return

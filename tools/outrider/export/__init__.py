@@ -1,4 +1,4 @@
-"""Runs and logs as files of other people's tools: MCAP, CSV, Parquet, ULog.
+"""Exports a run directory or a tlog to MCAP, CSV, Parquet or ULog.
 
 ::
 
@@ -8,6 +8,6 @@
                           ├─ motion_tables, mavlink_tables ─── table_export ─ table_files ─ NAME.csv, .parquet
                           └─ px4_topics ────────────────────── ulog_export ── ulog_file ─── vehicle-N.ulg
 
-A message is read by what the dialect says of it (``dialect``). Sources are iterators, so that memory does not
-grow with a log; those of an MCAP are merged in the order of time.
+Messages are decoded by the field definitions of the dialect (``dialect``). Sources are iterators, so that
+memory does not grow with the log; the sources of an MCAP are merged in order of time.
 """

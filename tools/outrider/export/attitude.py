@@ -1,5 +1,4 @@
-"""How vehicles lie in the air: yaw and tilt as they truly were; which way they leaned, their autopilots
-said."""
+"""Attitude of vehicles: true yaw and tilt angle, with the lean direction from ATTITUDE messages."""
 
 from __future__ import annotations
 
@@ -17,8 +16,11 @@ _AUTOPILOT_LINK = 0
 
 
 def leanings(messages: Iterable[Spoken], owner: int) -> tuple[Array, Array]:
-    """Unix µs (n,), and the horizontal part (n, 2), east and north, of the unit vector that points up out of
-    the vehicle, by the ATTITUDE messages of the owner's autopilot."""
+    """Return the lean of a vehicle as reported in the ATTITUDE messages of the owner's autopilot.
+
+    The result is Unix µs (n,), in order of time, and the horizontal part (n, 2), east and north, of the unit
+    vector that points up out of the vehicle. Messages with angles that are not finite are skipped.
+    """
     times, parts = [], []
     for spoken in messages:
         if spoken.kind.name == SAID and spoken.link == _AUTOPILOT_LINK and spoken.system == owner:
@@ -33,15 +35,18 @@ def leanings(messages: Iterable[Spoken], owner: int) -> tuple[Array, Array]:
 
 
 def along_down(roll: float, pitch: float, yaw: float) -> tuple[float, float, float]:
-    """The axis that points down out of a body (FRD), in NED: turned by yaw, pitch and roll in this order."""
+    """Return the down axis of a body (FRD) in NED, rotated by yaw, pitch and roll (rad) in this order."""
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)
     return cr * sp * cy + sr * sy, cr * sp * sy - sr * cy, cr * cp
 
 
 def up_vectors(motion: Motion, vehicle: int, said: tuple[Array, Array] | None) -> Array:
-    """Unit vectors (T, 3), ENU, that point up out of a vehicle at each sample: as far from the vertical as
-    its true tilt, to the side that it ``said``; upright where it said nothing."""
+    """Return the unit vectors (T, 3), ENU, that point up out of a vehicle at each sample.
+
+    The angle from the vertical is the true tilt; the direction of the lean is interpolated from ``said``. The
+    vector is vertical where no lean direction or no tilt is available.
+    """
     count = len(motion.time)
     up = np.zeros((count, 3))
     up[:, 2] = 1.0
@@ -57,11 +62,14 @@ def up_vectors(motion: Motion, vehicle: int, said: tuple[Array, Array] | None) -
 
 
 def quaternions(yaw: Array, up: Array) -> Array:
-    """(T, 4), w x y z: bodies (x forward, y left, z up) in ENU whose z is ``up`` (T, 3) and whose nose points
-    to ``yaw`` (T,), rad counter-clockwise from east, seen from above. A vehicle on its side has no such nose:
-    its forward axis is then as near to it as can be."""
+    """Return the quaternions (T, 4), w x y z, of bodies (x forward, y left, z up) in ENU.
+
+    The z axis is ``up`` (T, 3), and the nose points to ``yaw`` (T,), rad counter-clockwise from east, seen
+    from above. For a vehicle on its side no such nose exists; its forward axis is then as close to ``yaw`` as
+    possible.
+    """
     ahead = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)], axis=1)
-    # Along the vertical from the direction to the plane of the rotors, so that the bearing stays.
+    # Projected vertically onto the plane of the rotors, so that the bearing is preserved.
     steep = np.abs(up[:, 2]) > 1e-3
     ahead[steep, 2] = -(ahead[steep] * up[steep]).sum(axis=1) / up[steep, 2]
     ahead[~steep] -= (ahead[~steep] * up[~steep]).sum(axis=1)[:, None] * up[~steep]
@@ -71,9 +79,9 @@ def quaternions(yaw: Array, up: Array) -> Array:
 
 
 def _from_matrices(m: Array) -> Array:
-    """Rotation matrices (T, 3, 3) as quaternions (T, 4), w ≥ 0, each by its largest component."""
+    """Convert rotation matrices (T, 3, 3) to quaternions (T, 4), w ≥ 0, each by its largest component."""
     trace = np.trace(m, axis1=1, axis2=2)
-    # 4 q qᵀ, of which any column is the quaternion but for its length.
+    # 4 q qᵀ: each column is the quaternion times a factor.
     outer = np.empty((len(m), 4, 4))
     outer[:, 0, 0] = 1.0 + trace
     for i in range(3):

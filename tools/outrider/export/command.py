@@ -1,4 +1,4 @@
-"""``outrider export``: from a run directory or a log to files of other tools."""
+"""Command ``outrider export``: writes a run directory or a log in the file format of another tool."""
 
 from __future__ import annotations
 
@@ -22,8 +22,11 @@ from outrider.terminal.share_progress import share_progress
 
 
 class Result(NamedTuple):
-    """What was written, and what could not be read: damaged stretches of logs, messages that the dialect
-    lacks, and a line for each log that was no log."""
+    """Result of an export: the files written, and the records that could not be read.
+
+    The latter are damaged records of logs, messages that the dialect does not define, and one line for each
+    file that is not a readable log (``unread_logs``).
+    """
 
     format: str
     out: str
@@ -38,7 +41,10 @@ class Result(NamedTuple):
 
 
 def export(source: Path, form: str, out: Path | None, as_json: bool) -> None:
-    """Export, and say what came of it. Raises InputError for what cannot be exported, in one line."""
+    """Export ``source`` in the format ``form`` and print the result.
+
+    Raises InputError, with one line, if the source cannot be exported.
+    """
     _check(form)
     place = destination(source, form, out) if source.exists() else source
     run = read(source)
@@ -65,7 +71,7 @@ def _check(form: str) -> None:
 
 
 def _write(run: Run, place: Path, form: str, watch: Watch) -> Written:
-    """By the module of that format: each has needs of its own."""
+    """Write the export with the module of the format, imported only when it is needed."""
     if form == "mcap":
         from outrider.export import mcap_export
 
@@ -80,7 +86,7 @@ def _write(run: Run, place: Path, form: str, watch: Watch) -> Written:
 
 
 def show(result: Result) -> None:
-    """The result as a table."""
+    """Print the result as a table."""
     table = Table(show_header=False)
     rows = {
         "files": result.files,
@@ -94,7 +100,7 @@ def show(result: Result) -> None:
     for words, value in rows.items():
         table.add_row(words, str(value))
     console = Console()
-    # Above the table, where a long path is not broken.
+    # Printed above the table, because a table would break a long path.
     console.print(Text(result.out), soft_wrap=True)
     console.print(table)
     for line in result.unread_logs:

@@ -1,6 +1,6 @@
-"""Makes the values of Foxglove's well-known messages (``foxglove_schemas``).
+"""Values of Foxglove's well-known messages (``foxglove_schemas``).
 
-Lengths are m; a quaternion turns a body's frame (x forward, y left, z up) into its parent's.
+Lengths are in m. A quaternion rotates from a body's frame (x forward, y left, z up) to its parent's.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _SHAPES = ("arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "tex
 
 
 class Color(NamedTuple):
-    """Red, green, blue and opacity, 0…1."""
+    """Red, green, blue and opacity, each 0…1."""
 
     r: float
     g: float
@@ -23,34 +23,34 @@ class Color(NamedTuple):
     a: float = 1.0
 
     def faint(self, opacity: float) -> Color:
-        """The same, seen through."""
+        """Return the same colour with another opacity."""
         return self._replace(a=opacity)
 
 
 def stamp(time_us: int) -> Json:
-    """Unix µs."""
+    """Convert Unix µs to seconds and nanoseconds."""
     return {"sec": time_us // 1_000_000, "nsec": time_us % 1_000_000 * 1000}
 
 
 def point(at: Point) -> Json:
-    """A position, to a tenth of a millimetre."""
+    """Return a position (m), rounded to 0.1 mm."""
     x, y, z = (round(float(part), 4) for part in at)
     return {"x": x, "y": y, "z": z}
 
 
 def turn(quaternion: Sequence[float]) -> Json:
-    """From (w, x, y, z)."""
+    """Return a quaternion from (w, x, y, z)."""
     w, x, y, z = (round(float(part), 6) for part in quaternion)
     return {"x": x, "y": y, "z": z, "w": w}
 
 
 def pose(at: Point) -> Json:
-    """At a place, not turned."""
+    """Return the pose at a position, without rotation."""
     return {"position": point(at), "orientation": turn((1.0, 0.0, 0.0, 0.0))}
 
 
 def transform(time_us: int, parent: str, child: str, at: Point, quaternion: Sequence[float]) -> Json:
-    """Where the frame ``child`` is in its ``parent``."""
+    """Return the position and the attitude of the frame ``child`` in its ``parent``."""
     return {
         "timestamp": stamp(time_us),
         "parent_frame_id": parent,
@@ -63,8 +63,10 @@ def transform(time_us: int, parent: str, child: str, at: Point, quaternion: Sequ
 def entity(
     time_us: int, frame: str, name: str, shapes: Mapping[str, list[Json]], *, locked: bool = False
 ) -> Json:
-    """Something to be seen until another of its ``name`` comes; all arrays are there, as Foxglove's readers
-    expect."""
+    """Return a scene entity, which is shown until another with the same ``name`` replaces it.
+
+    All arrays of shapes are present, as Foxglove's readers expect.
+    """
     empty: dict[str, list[Json]] = {shape: [] for shape in _SHAPES}
     return {
         "timestamp": stamp(time_us),
@@ -79,12 +81,12 @@ def entity(
 
 
 def update(*entities: Json) -> Json:
-    """A scene, or what is new in it."""
+    """Return a scene update that adds or replaces ``entities``."""
     return {"deletions": [], "entities": list(entities)}
 
 
 def arrow(length: float, width: float, color: Color) -> Json:
-    """From the frame's origin forward; a third of it is its head."""
+    """Return an arrow from the frame's origin along x; the head is a third of its length."""
     return {
         "pose": pose((0.0, 0.0, 0.0)),
         "shaft_length": length * 2 / 3,
@@ -96,12 +98,12 @@ def arrow(length: float, width: float, color: Color) -> Json:
 
 
 def sphere(at: Point, diameter: float, color: Color) -> Json:
-    """A ball."""
+    """Return a sphere with its centre at ``at``."""
     return {"pose": pose(at), "size": point((diameter,) * 3), "color": color._asdict()}
 
 
 def cylinder(at: Point, diameter: float, height: float, color: Color) -> Json:
-    """Upright, ``at`` its middle."""
+    """Return an upright cylinder with its centre at ``at``."""
     return {
         "pose": pose(at),
         "size": point((diameter, diameter, height)),
@@ -112,7 +114,7 @@ def cylinder(at: Point, diameter: float, height: float, color: Color) -> Json:
 
 
 def line(points: Sequence[Point], pixels: float, color: Color) -> Json:
-    """A line through ``points``."""
+    """Return a line through ``points``, ``pixels`` wide."""
     return {
         "type": 0,
         "pose": pose((0.0, 0.0, 0.0)),
@@ -126,7 +128,7 @@ def line(points: Sequence[Point], pixels: float, color: Color) -> Json:
 
 
 def label(at: Point, text: str, size: float, color: Color) -> Json:
-    """A word that faces who looks; ``size`` in m."""
+    """Return a text that always faces the viewer; ``size`` in m."""
     return {
         "pose": pose(at),
         "billboard": True,

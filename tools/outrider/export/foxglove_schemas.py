@@ -1,4 +1,4 @@
-"""Foxglove's well-known messages, as far as they are needed here, as JSON Schemas.
+"""JSON Schemas of those Foxglove messages that the export uses.
 
 Names and fields are those of https://docs.foxglove.dev/docs/sdk/schemas.
 """

@@ -1,5 +1,8 @@
-"""JSON Schemas of what goes into an MCAP, as narrow as Foxglove and PlotJuggler read them: objects whose
-fields are numbers, texts, objects, or arrays of one of these; no unions, hence no nulls."""
+"""JSON Schemas of the messages in an MCAP, in the subset that Foxglove and PlotJuggler read.
+
+The subset is objects with fields that are numbers, texts, objects, or arrays of one of these; there are no
+unions, and therefore no nulls.
+"""
 
 from __future__ import annotations
 
@@ -10,65 +13,65 @@ Node = dict[str, Any]
 
 
 class Schema(NamedTuple):
-    """A schema with the name that tools know it by."""
+    """Schema and its name."""
 
     name: str
     document: Node
 
     @property
     def data(self) -> bytes:
-        """As it is written."""
+        """Schema as JSON bytes."""
         return json.dumps(self.document, separators=(",", ":"), ensure_ascii=False).encode()
 
 
 def schema(name: str, what: str, /, **fields: Node) -> Schema:
-    """Of messages ``name``; every field may be left out."""
+    """Return the schema of the messages ``name``; every field is optional."""
     return Schema(name, {"title": name, **struct(what, **fields)})
 
 
 def struct(what: str, /, **fields: Node) -> Node:
-    """An object with named fields."""
+    """Return the schema of an object with named fields."""
     return {"type": "object", "description": what, "properties": fields}
 
 
 def number(what: str = "") -> Node:
-    """A real number."""
+    """Return the schema of a real number."""
     return _described("number", what)
 
 
 def integer(what: str = "") -> Node:
-    """A whole number."""
+    """Return the schema of an integer."""
     return _described("integer", what)
 
 
 def words(what: str = "") -> Node:
-    """A text."""
+    """Return the schema of a text."""
     return _described("string", what)
 
 
 def flag(what: str = "") -> Node:
-    """True or false."""
+    """Return the schema of a boolean."""
     return _described("boolean", what)
 
 
 def base64(what: str = "") -> Node:
-    """Bytes, written in base 64; Foxglove shows them as bytes."""
+    """Return the schema of bytes in base 64; Foxglove shows them as bytes."""
     return {**words(what), "contentEncoding": "base64"}
 
 
 def many(item: Node, what: str = "", count: int | None = None) -> Node:
-    """An array of items of one kind."""
+    """Return the schema of an array of equal items, of fixed length if ``count`` is given."""
     limits = {} if count is None else {"minItems": count, "maxItems": count}
     return {**_described("array", what), "items": item, **limits}
 
 
 def choice(what: str, /, **values: int) -> Node:
-    """One of several numbers that have names."""
+    """Return the schema of an enumeration: named integers."""
     return {"description": what, "oneOf": [{"title": name, "const": value} for name, value in values.items()]}
 
 
 def enu(what: str) -> Node:
-    """A vector, fleet-local."""
+    """Return the schema of a fleet-local vector with the components east, north and up."""
     return struct(what, east=number(), north=number(), up=number())
 
 

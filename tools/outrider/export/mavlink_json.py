@@ -1,4 +1,4 @@
-"""MAVLink messages as JSON: a channel for each sender and type, with a schema out of the dialect."""
+"""MAVLink messages as JSON: one channel for each sender and message type, with a schema from the dialect."""
 
 from __future__ import annotations
 
@@ -18,13 +18,17 @@ from outrider.logs.message_stream import Log, Spoken
 POSITION, WORDS = "GLOBAL_POSITION_INT", "STATUSTEXT"
 _AUTOPILOT_LINK = 0
 _LEVELS: Final = (5, 5, 5, 4, 3, 2, 2, 1)
-"""Foxglove's levels for MAV_SEVERITY: emergency, alert and critical are all fatal."""
+"""Foxglove's levels for MAV_SEVERITY 0…7: emergency, alert and critical all map to fatal."""
 
 
 def entries(log: Log, messages: Iterable[Spoken]) -> Iterator[Entry]:
-    """Every message on ``/mavlink/SYSTEM/COMPONENT/NAME``, in a run ``/mavlink/vehicle-OWNER/…``: what the
-    companion of that vehicle heard and said. Besides, positions as LocationFix on ``/fix/SYSTEM`` and texts
-    on ``/log``: in a run those of the owner's autopilot, so that no message is there twice."""
+    """Yield every message on ``/mavlink/SYSTEM/COMPONENT/NAME``, and positions and texts in Foxglove's types.
+
+    In a run the topic is ``/mavlink/vehicle-OWNER/SYSTEM/COMPONENT/NAME``: the messages that the companion of
+    that vehicle received and sent. Positions (GLOBAL_POSITION_INT) are repeated as LocationFix on
+    ``/fix/SYSTEM``, and texts (STATUSTEXT) as Log on ``/log``; in a run only those of the owner's autopilot,
+    so that each occurs once.
+    """
     prefix = "/mavlink" if log.owner is None else f"/mavlink/vehicle-{log.owner}"
     for spoken in messages:
         kind = spoken.kind
@@ -38,7 +42,7 @@ def entries(log: Log, messages: Iterable[Spoken]) -> Iterator[Entry]:
 
 @cache
 def schema_of(kind: Kind) -> Schema:
-    """A field is what MAVLink calls it, in MAVLink's units; with it the link (0…3) that it went over."""
+    """Return the schema of a message type: MAVLink's field names and units, and ``_link``, the link (0…3)."""
     fields = {field.name: _node(field) for field in kind.fields}
     link = json_schema.integer("of the log: 0 autopilot, 1 swarm, 2 target, 3 ground in a run")
     return json_schema.schema(
@@ -57,7 +61,10 @@ def _node(field: Field) -> Node:
 
 
 class _Template:
-    """How messages of a kind without text, bytes and arrays become JSON in one go: they are nearly all."""
+    """Format string that encodes a message without text, bytes and arrays in one step.
+
+    Nearly all messages are of this kind.
+    """
 
     def __init__(self, kind: Kind) -> None:
         self.plain = not any(field.length or field.is_text for field in kind.fields)
@@ -67,13 +74,16 @@ class _Template:
 
 
 _FORMATS: Final = {"float": ".9g", "double": ".17g"}
-"""So many digits give the same number back."""
+"""Number of digits from which the same number can be read back."""
 _template = lru_cache(maxsize=None)(_Template)
 
 
 def encode(spoken: Spoken) -> bytes:
-    """Its fields. JSON has no NaN and no infinity: a field that is one, and an array that holds one, is left
-    out."""
+    """Return the fields of a message as JSON.
+
+    JSON has neither NaN nor infinity: a field that is not finite, or an array that has such an item, is
+    omitted.
+    """
     values = {"_link": spoken.link, **spoken.kind.read(spoken.payload)}
     template = _template(spoken.kind)
     if template.plain and all(math.isfinite(values[name]) for name in template.floats):

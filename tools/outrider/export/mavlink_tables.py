@@ -1,7 +1,7 @@
-"""The tables of logs: one for each system and type of message, ``mavlink/SYSTEM/NAME``.
+"""Tables of logs: one for each system and message type, ``mavlink/SYSTEM/NAME``.
 
-Values are raw, as MAVLink has them, and the unit stands in the column's name where the dialect knows it
-(``lat [degE7]``). An array is a column for each item (``q[0]``), bytes are hexadecimal.
+Values are raw, as in MAVLink; the column name has the unit where the dialect defines it (``lat [degE7]``). An
+array has one column for each item (``q[0]``); bytes are hexadecimal.
 """
 
 from __future__ import annotations
@@ -19,25 +19,30 @@ from outrider.logs.dialect import Field, Kind, text
 from outrider.logs.message_stream import Spoken
 
 HEAD: Final = ("time_us", "log", "link", "system", "component")
-"""Columns before the fields: Unix µs, the vehicle whose log it is (0 for a log of no run), the link (0…3),
-who said it."""
+"""Columns before the fields.
+
+They are Unix µs, the vehicle that recorded the log (0 for a log outside a run), the link (0…3), and the
+sender's system and component id.
+"""
 _HEAD = Struct("<qBBBB")
 _HEAD_TYPES = [("time_us", "<i8"), ("log", "u1"), ("link", "u1"), ("system", "u1"), ("component", "u1")]
 _ROWS: Final = 32_768
 _BYTES: Final = 32 << 20
-"""What waits in all tables together before it is written."""
+"""Total size of the buffered rows of all tables at which they are written."""
 
 
 class Heap:
-    """Messages that wait until they are worth writing, as they were on the wire: a small part of what they
-    would take as values."""
+    """Messages buffered until there are enough to write.
+
+    They are kept as raw bytes, which take a small part of the memory of decoded values.
+    """
 
     def __init__(self) -> None:
         self._waiting: dict[tuple[int, Kind], list[bytes]] = defaultdict(list)
         self._bytes = 0
 
     def add(self, owner: int, spoken: Spoken) -> Iterator[Part]:
-        """Take it in; what is then due to be written."""
+        """Add a message, and yield the parts that are due to be written."""
         key = spoken.system, spoken.kind
         rows = self._waiting[key]
         row = _HEAD.pack(spoken.time, owner, spoken.link, spoken.system, spoken.component) + spoken.payload
@@ -50,14 +55,14 @@ class Heap:
             yield _part(*key, self._waiting.pop(key))
 
     def rest(self) -> Iterator[Part]:
-        """All that waits."""
+        """Yield all buffered messages as parts, and empty the buffer."""
         waiting, self._waiting, self._bytes = self._waiting, defaultdict(list), 0
         for (system, kind), rows in waiting.items():
             yield _part(system, kind, rows)
 
 
 def parts(logs: Iterable[tuple[int, Iterable[Spoken]]]) -> Iterator[Part]:
-    """Of logs, each with its owner, one after the other."""
+    """Yield the tables' parts of ``logs``, pairs of an owner and its messages, one log after the other."""
     heap = Heap()
     for owner, messages in logs:
         for spoken in messages:
@@ -76,7 +81,7 @@ def _part(system: int, kind: Kind, rows: list[bytes]) -> Part:
 
 
 def columns(field: Field, values: NDArray[np.generic]) -> dict[str, Column]:
-    """The columns of a field (n,) or (n, count)."""
+    """Return the columns of a field with values (n,) or (n, count)."""
     unit = f" [{field.unit}]" if field.unit else ""
     if field.is_text:
         return {field.name: [text(raw) for raw in values.tolist()]}

@@ -1,4 +1,4 @@
-"""A run or a log as an MCAP, for Foxglove and PlotJuggler."""
+"""Export of a run or a log as an MCAP, for Foxglove and PlotJuggler."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from outrider.runs.source import Run
 
 _ATTACHED = ((CONFIGURATION, "application/yaml"), ("summary.json", "application/json"))
 _PREPARED = 0.15
-"""The share of the work that is done when all logs have been read for how vehicles lean."""
+"""Share of the work that is done after the first pass through the logs, which reads the attitudes."""
 
 
 def write(run: Run, path: Path, watch: Watch) -> Written:
-    """Everything of ``run``, in the order of time."""
+    """Write all data of ``run`` to the MCAP at ``path``, in order of time."""
     sources = _pictures(run, watch)
     logs = watched(list(run.logs), watch, (_PREPARED, 1.0))
     sources += [mavlink_json.entries(log, messages) for log, messages in zip(run.logs, logs, strict=True)]
@@ -32,7 +32,7 @@ def write(run: Run, path: Path, watch: Watch) -> Written:
 
 
 def _pictures(run: Run, watch: Watch) -> list[Iterator[Entry]]:
-    """What only a finished flight has."""
+    """Return the sources that only a finished flight has: the 3-D scene and the plots."""
     if run.scenario is None or run.motion is None:
         return []
     logs = list(run.logs)
@@ -46,7 +46,7 @@ def _pictures(run: Run, watch: Watch) -> list[Iterator[Entry]]:
 
 
 def _attach(run: Run, file: McapFile) -> None:
-    """What was flown and what came of it."""
+    """Attach the configuration and the summary of the run, if the run has a recorded motion."""
     for name, kind in _ATTACHED:
         path = run.source / name
         if run.motion is not None and path.is_file():

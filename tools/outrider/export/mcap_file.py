@@ -1,5 +1,4 @@
-"""An MCAP of JSON messages: a schema on every channel, chunks with checksums, an index and a summary at the
-end."""
+"""MCAP file of JSON messages: a schema for every channel, chunks with checksums, an index and a summary."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from outrider.export.json_schema import Schema
 
 
 class Entry(NamedTuple):
-    """A message: when (Unix µs), on which channel, and its JSON."""
+    """Message: its time (Unix µs), its channel, the schema of the channel, and the JSON data."""
 
     time: int
     topic: str
@@ -23,13 +22,15 @@ class Entry(NamedTuple):
 
 
 def entry(time: int, topic: str, schema: Schema, value: dict[str, Any]) -> Entry:
-    """Of a value without NaN. Raises ValueError for one."""
+    """Return an entry with ``value`` as JSON. Raises ValueError if ``value`` contains NaN or infinity."""
     return Entry(time, topic, schema, json.dumps(value, separators=(",", ":"), allow_nan=False).encode())
 
 
 class McapFile:
-    """Writes the file at ``path``; a context manager that finishes it only if all went well. Same entries,
-    same bytes."""
+    """Writer of the MCAP file at ``path``, as a context manager.
+
+    The file is finished only if no error occurred. The same entries give the same bytes.
+    """
 
     def __init__(self, path: Path) -> None:
         self.messages = 0
@@ -53,15 +54,15 @@ class McapFile:
 
     @property
     def channels(self) -> int:
-        """How many there are so far."""
+        """Number of channels so far."""
         return len(self._channels)
 
     def attach(self, name: str, kind: str, time: int, data: bytes) -> None:
-        """A whole file beside the messages, such as the configuration of the run."""
+        """Attach a whole file, such as the configuration of the run; ``time`` in Unix µs."""
         self._writer.add_attachment(0, time * 1000, name, kind, data)
 
     def write(self, one: Entry) -> None:
-        """A message; its channel is opened when it is the first."""
+        """Write a message, and open its channel if it is the first of that channel."""
         channel = self._channels.get(one.topic)
         if channel is None:
             channel = self._open(one.topic, one.schema)

@@ -1,5 +1,7 @@
-"""The tables of a flight: true motion, separation, plans. SI, radians, fleet-local ENU; NaN where there is
-nothing."""
+"""Tables of a flight: true motion, separation and plans.
+
+Units are SI and radians, coordinates fleet-local ENU. Missing values are NaN.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +16,16 @@ from outrider.runs.arrays import Motion, Plans, Whole
 from outrider.runs.source import Run
 
 _ROWS: Final = 65_536
-"""Of a part, or few more."""
+"""Rows of one part; a part may have a few more."""
 _AXES = ("east", "north", "up")
 
 
 def parts(run: Run) -> Iterator[Part]:
-    """``vehicles``, ``separation`` (with the target), ``moving``, ``plans`` and ``plan_times``. In all of
-    them ``time_s`` counts from the goal event and ``time_us`` is Unix time."""
+    """Yield the parts of all tables of a flight.
+
+    The tables are ``vehicles``, ``separation`` (with the target), ``moving``, ``plans`` and ``plan_times``.
+    In every table ``time_s`` counts from the goal event, and ``time_us`` is Unix time.
+    """
     motion = run.motion
     if motion is None:
         return
@@ -42,7 +47,7 @@ def parts(run: Run) -> Iterator[Part]:
 
 
 def _vehicles(motion: Motion) -> Iterator[Part]:
-    """A row for each vehicle at each sample."""
+    """Yield one row for each vehicle at each sample."""
     count = len(motion.system)
     for some in _slices(len(motion.time), count):
         length = len(motion.time[some])
@@ -87,7 +92,7 @@ def _when(seconds: NDArray[np.float64], unix: Whole) -> dict[str, Column]:
 
 
 def _vector(name: str, unit: str, values: NDArray[np.floating]) -> dict[str, Column]:
-    """Columns ``name_east_unit``, … of vectors (…, 3)."""
+    """Return the columns ``name_east_unit``, ``name_north_unit``, ``name_up_unit`` of vectors (…, 3)."""
     flat = values.reshape(-1, 3)
     prefix = f"{name}_" if name else ""
     return {f"{prefix}{axis}_{unit}": np.ascontiguousarray(flat[:, k]) for k, axis in enumerate(_AXES)}

@@ -1,4 +1,4 @@
-"""Where an export goes: beside what it is made from or where the user says, whole or not at all."""
+"""Destination of an export: beside the source or at ``--out``, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -17,8 +17,12 @@ _STEM: Final = "flight"
 
 
 def destination(source: Path, form: str, out: Path | None) -> Path:
-    """``out``, or by default ``flight.mcap`` or a folder ``csv``, ``parquet``, ``ulog`` in a run directory,
-    and ``NAME.mcap`` or ``NAME-csv``, … beside a log. Raises InputError if there is something already."""
+    """Return the path to write to: ``out``, or the default if it is None.
+
+    The default is ``flight.mcap`` or a folder ``csv``, ``parquet`` or ``ulog`` in a run directory, and
+    ``NAME.mcap`` or ``NAME-csv``, … beside a log. Raises InputError if the path exists, unless it is an empty
+    directory and the format needs one.
+    """
     if out is None:
         out = _default(source, form)
     if out.exists() and not (form in FOLDER and out.is_dir() and not any(out.iterdir())):
@@ -36,10 +40,10 @@ def _default(source: Path, form: str) -> Path:
 
 @contextmanager
 def fresh(path: Path, form: str) -> Iterator[Path]:
-    """Where to write: in a folder of its own beside ``path``, to which the result moves when all is done; the
-    folder vanishes in any case.
+    """Provide a temporary path to write to, and move the result to ``path`` if no error occurs.
 
-    Raises InputError if that cannot be made.
+    The temporary folder is beside ``path`` and is deleted in any case. Raises InputError if it cannot be
+    created.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,8 @@
-"""What a MAVLink message of an autopilot is in PX4's own words, where the meaning is the same: names, units
-and frames (NED, body FRD) of PX4's messages. A field that MAVLink does not tell is left out of the format,
-not made up; what it marks as unknown is NaN."""
+"""Conversion of an autopilot's MAVLink messages to PX4's topics, where the meaning is the same.
+
+Names, units and frames (NED, body FRD) are those of PX4's messages. A field that MAVLink does not provide is
+omitted from the format instead of being invented; a value that MAVLink marks as unknown is NaN.
+"""
 
 from __future__ import annotations
 
@@ -57,22 +59,24 @@ BATTERY = _topic("battery_status", "float voltage_v, float current_a, float rema
 
 
 class View(NamedTuple):
-    """A message as one of PX4's."""
+    """MAVLink message converted to a PX4 topic."""
 
     topic: Topic
     values: bytes
 
 
 class Px4Topics:
-    """Turns the messages of one autopilot, and the set-points that it is sent. It remembers the last
-    GPS_GLOBAL_ORIGIN, which PX4 tells with every local position."""
+    """Converter of the messages of one autopilot, and of the set-points sent to it.
+
+    It stores the last GPS_GLOBAL_ORIGIN, because PX4 includes the origin in every local position.
+    """
 
     def __init__(self, system: int, component: int) -> None:
         self._who = system, component
         self._origin: Origin | None = None
 
     def said(self, kind: Kind, payload: bytes) -> list[View]:
-        """A message of the autopilot."""
+        """Convert a message of the autopilot itself."""
         if kind.name == "GPS_GLOBAL_ORIGIN":
             values = kind.read(payload)
             self._origin = values["latitude"] / 1e7, values["longitude"] / 1e7, values["altitude"] / 1e3
@@ -81,7 +85,10 @@ class Px4Topics:
         return [] if make is None else make(self, kind.read(payload))
 
     def told(self, kind: Kind, payload: bytes) -> list[View]:
-        """A message of somebody else, to whomever."""
+        """Convert a message of another sender.
+
+        Only a set-point in local NED that is sent to this autopilot gives a topic.
+        """
         if kind.name != "SET_POSITION_TARGET_LOCAL_NED":
             return []
         values = kind.read(payload)
@@ -94,6 +101,7 @@ class Px4Topics:
         return [_view(ORDERED, *position, *velocity, *acceleration, yaw, yaw_rate)]
 
     def attitude(self, values: Values) -> list[View]:
+        """Convert ATTITUDE."""
         angles = values["roll"], values["pitch"], values["yaw"]
         rates = values["rollspeed"], values["pitchspeed"], values["yawspeed"]
         known = all(map(math.isfinite, angles))
@@ -101,30 +109,36 @@ class Px4Topics:
         return [_view(ATTITUDE, *turned), _view(RATES, *rates)]
 
     def local(self, values: Values) -> list[View]:
+        """Convert LOCAL_POSITION_NED."""
         place = tuple(values[name] for name in ("x", "y", "z", "vx", "vy", "vz"))
         known = self._origin is not None
         origin = self._origin or (_NAN, _NAN, _NAN)
         return [_view(LOCAL, True, True, True, True, *place, known, known, *origin)]
 
     def globally(self, values: Values) -> list[View]:
+        """Convert GLOBAL_POSITION_INT."""
         place = values["lat"] / 1e7, values["lon"] / 1e7, values["alt"] / 1e3
         return [_view(GLOBAL, *place, True, True)]
 
     def followed(self, values: Values) -> list[View]:
+        """Convert POSITION_TARGET_LOCAL_NED, if it is in local NED."""
         if values["coordinate_frame"] != _LOCAL_NED:
             return []
         position, velocity, acceleration, yaw, yaw_rate = _setpoint(values)
         return [_view(FOLLOWED, *position, yaw, yaw_rate, *velocity, *acceleration)]
 
     def status(self, values: Values) -> list[View]:
+        """Convert HEARTBEAT."""
         armed = _ARMED if values["base_mode"] & _ARMED_FLAG else _DISARMED
         return [_view(STATUS, armed, values["type"], *self._who)]
 
     def landed(self, values: Values) -> list[View]:
+        """Convert EXTENDED_SYS_STATE; an undefined landed state gives nothing."""
         state = values["landed_state"]
         return [_view(LANDED, state == _ON_GROUND)] if state else []
 
     def battery(self, values: Values) -> list[View]:
+        """Convert SYS_STATUS."""
         volts, current, left = (
             values["voltage_battery"],
             values["current_battery"],
@@ -168,8 +182,11 @@ def _view(topic: Topic, *values: float) -> View:
 
 
 def _setpoint(values: Values) -> tuple[Numbers, Numbers, Numbers, float, float]:
-    """Position, velocity, acceleration, yaw and yaw rate of a set-point; NaN where its type_mask says that it
-    does not count. A force is no acceleration."""
+    """Return position, velocity, acceleration, yaw and yaw rate of a set-point.
+
+    Values that its type_mask marks as ignored are NaN. If the mask marks the acceleration as a force, it is
+    NaN too.
+    """
     mask = values["type_mask"]
 
     def counts(names: tuple[str, str, str], first: int) -> Numbers:
@@ -186,7 +203,10 @@ def _setpoint(values: Values) -> tuple[Numbers, Numbers, Numbers, float, float]:
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """(w, x, y, z), Hamilton's, of a body (FRD) in NED: turned by yaw, then pitch, then roll."""
+    """Return the Hamilton quaternion (w, x, y, z) of a body (FRD) in NED.
+
+    The body is rotated by yaw, then pitch, then roll (rad).
+    """
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)

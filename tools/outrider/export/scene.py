@@ -1,7 +1,7 @@
-"""A flight to be looked at, for Foxglove's 3-D panel: frames that move, and bodies that hang on them.
+"""3-D scene of a flight for Foxglove's 3-D panel: moving frames, and bodies fixed to them.
 
-Bodies are told once, each fixed to a frame: ``fleet`` (ENU), ``vehicle-N``, ``target``, ``moving-N``. So
-whoever jumps to any moment sees them all, and only the frames cost.
+Bodies are written once, each fixed to a frame: ``fleet`` (ENU), ``vehicle-N``, ``target``, ``moving-N``. A
+viewer that jumps to any time therefore shows all bodies, and only the frames need space.
 """
 
 from __future__ import annotations
@@ -29,15 +29,17 @@ from sitl.vehicle.config import VehicleConfig
 FLEET: Final = "fleet"
 BYSTANDER, TARGET, SOLID, SHELL = Color(0.6, 0.6, 0.6), Color(1.0, 0.8, 0.1), Color(0.45, 0.4, 0.38), 0.12
 TRAIL_US, TRAIL_EVERY_US, TRAIL_POINT = 10_000_000, 200_000, 5
-"""A trail is so long, is drawn so often, and has every fifth sample."""
+"""Length of a trail (µs), its drawing period (µs), and the stride of its samples."""
 _NOT_TURNED = (1.0, 0.0, 0.0, 0.0)
 _SPAN = 0.6
-"""m, of a vehicle whose file is not here."""
+"""Span (m) of a vehicle whose file is not available."""
 
 
 class Stage(NamedTuple):
-    """What a scene is made of: what the run was, how it moved, and which way vehicles said that they lean (by
-    system id, see ``attitude.leanings``)."""
+    """Input of a scene: the scenario, the recorded motion, and the reported lean of the vehicles.
+
+    The lean is by system id, see ``attitude.leanings``.
+    """
 
     scenario: Scenario
     motion: Motion
@@ -45,7 +47,7 @@ class Stage(NamedTuple):
 
 
 def bodies(stage: Stage) -> Iterator[Entry]:
-    """All that does not change its shape, and the paths as a whole, at the first sample."""
+    """Yield all bodies of constant shape, and the complete paths, at the time of the first sample."""
     scenario, motion = stage.scenario, stage.motion
     if not len(motion.time):
         return
@@ -72,7 +74,7 @@ def bodies(stage: Stage) -> Iterator[Entry]:
 
 
 def frames(stage: Stage) -> Iterator[Entry]:
-    """Where every frame is, at each sample. What is nowhere has no transform."""
+    """Yield the transforms of all frames at each sample. A frame without a finite position is omitted."""
     scenario, motion = stage.scenario, stage.motion
     turned = [
         quaternions(motion.yaw[:, k].astype(np.float64), up_vectors(motion, k, stage.said.get(system)))
@@ -95,7 +97,7 @@ def frames(stage: Stage) -> Iterator[Entry]:
 
 
 def trails(stage: Stage) -> Iterator[Entry]:
-    """Where vehicles have been in the last ten seconds, five times a second."""
+    """Yield the paths of the vehicles over the last ten seconds, five times a second."""
     motion, paint = stage.motion, colors(stage.scenario)
     due = -1
     for row, time in enumerate(motion.time.tolist()):
@@ -103,7 +105,7 @@ def trails(stage: Stage) -> Iterator[Entry]:
             continue
         due = time + TRAIL_EVERY_US
         first = int(np.searchsorted(motion.time, time - TRAIL_US))
-        # Counted from the same samples each time, so that a trail does not shiver.
+        # The same samples are chosen each time, so that a trail does not jitter.
         chosen = [*range(-(-first // TRAIL_POINT) * TRAIL_POINT, row, TRAIL_POINT), row]
         drawn = [
             foxglove.entity(
@@ -119,7 +121,7 @@ def trails(stage: Stage) -> Iterator[Entry]:
 
 
 def colors(scenario: Scenario) -> dict[int, Color]:
-    """Of the vehicles by system id: round the circle of hues; bystanders are grey."""
+    """Return the colour of each vehicle by system id: hues round the colour circle; bystanders are grey."""
     result = {}
     for k, system in enumerate(scenario.systems):
         red, green, blue = colorsys.hsv_to_rgb(k / max(scenario.vehicles, 1), 0.8, 0.95)
@@ -136,7 +138,10 @@ def _span(scenario: Scenario) -> float:
 
 
 def _vehicle(now: int, system: int, span: float, d_min: float, color: Color) -> Json:
-    """A disc with an arrow to where its nose points, in half of d_min: shells that touch are d_min apart."""
+    """Return a disc with an arrow along its nose, inside a shell of diameter d_min.
+
+    Two shells that touch are d_min apart.
+    """
     return foxglove.entity(
         now,
         f"vehicle-{system}",
@@ -159,7 +164,7 @@ def _target(now: int, scenario: Scenario) -> Json:
 
 
 def _obstacle(one: Obstacle, d_min: float) -> dict[str, list[Json]]:
-    """A ball, or a post from the ground up, and around it where no vehicle's centre may be."""
+    """Return a ball, or a post from the ground up, and the shell that no vehicle's centre may enter."""
     if isinstance(one, Post):
         return _post((one.at[0], one.at[1], 0.5 * one.height), one.radius, one.height, d_min)
     return _ball(one.at, one.radius, d_min)
@@ -168,7 +173,7 @@ def _obstacle(one: Obstacle, d_min: float) -> dict[str, list[Json]]:
 def _moving(now: int, scenario: Scenario) -> Iterator[Json]:
     for system, one in zip(scenario.moving_systems, scenario.moving, strict=True):
         if isinstance(one, MovingPostPart):
-            # Its frame goes along the ground.
+            # The frame moves along the ground.
             shapes = _post((0.0, 0.0, 0.5 * one.height), one.radius, one.height, scenario.d_min_obstacle)
         else:
             shapes = _ball((0.0, 0.0, 0.0), one.radius, scenario.d_min_obstacle)

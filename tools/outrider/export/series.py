@@ -1,6 +1,6 @@
-"""A flight to be plotted: the true motion, separation and plans as channels of numbers, SI, fleet-local ENU.
+"""Channels of numbers for plots: true motion, separation and plans; SI units, fleet-local ENU.
 
-JSON has no NaN: what is nowhere is left out of its message.
+JSON has no NaN: missing values are omitted from the message.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _AXES = ("east", "north", "up")
 
 
 def entries(run: Run) -> Iterator[Entry]:
-    """All of them in the order of time."""
+    """Return the entries of all channels in order of time."""
     sources = []
     if run.motion is not None:
         d_min = None if run.scenario is None else run.scenario.d_min
@@ -108,6 +108,8 @@ def _vector(at: Single) -> dict[str, float]:
 
 
 def _short(value: np.floating[Any]) -> float:
-    """The number with the fewest digits that is this one in single precision again; of double precision, as
-    it is."""
+    """Return the number with the fewest digits that reads back as the same single-precision value.
+
+    A double-precision value is returned unchanged.
+    """
     return float(str(value))

@@ -1,4 +1,4 @@
-"""A run or a log as tables."""
+"""Export of a run or a log as tables."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from outrider.runs.source import Run
 
 
 def write(run: Run, folder: Path, form: str, watch: Watch) -> Written:
-    """Everything of ``run`` into ``folder``; ``form`` is csv or parquet."""
+    """Write all data of ``run`` to ``folder``; ``form`` is ``csv`` or ``parquet``."""
     messages = watched(list(run.logs), watch)
     logs = ((log.owner or 0, spoken) for log, spoken in zip(run.logs, messages, strict=True))
     with TableFiles(folder, form) as files:

@@ -1,4 +1,4 @@
-"""Tables as files of a folder, CSV or Parquet: written by parts, so that none has to fit into memory."""
+"""Tables as CSV or Parquet files in a folder, written in parts so that no table has to fit into memory."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ Column = NDArray[np.generic] | list[str]
 
 
 class Part(NamedTuple):
-    """Some rows of the ``table`` (a path without ending below the folder), column by column."""
+    """Some rows of a ``table`` (a path below the folder, without suffix), column by column."""
 
     table: str
     columns: dict[str, Column]
 
 
 class TableFiles:
-    """Writes tables into ``folder``; a context manager. Same parts, same bytes."""
+    """Writer of tables to ``folder``; a context manager. The same parts give the same bytes."""
 
     def __init__(self, folder: Path, form: str) -> None:
         self.rows = 0
         self._folder, self._form = folder, form
         self._open: dict[str, pyarrow.csv.CSVWriter | pyarrow.parquet.ParquetWriter] = {}
-        # A large fleet has more tables than a process may have files open at first.
+        # A large fleet has more tables than the default limit of open files.
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
         if soft != hard:
             resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
@@ -49,11 +49,11 @@ class TableFiles:
 
     @property
     def tables(self) -> int:
-        """How many there are so far."""
+        """Number of tables so far."""
         return len(self._open)
 
     def write(self, part: Part) -> None:
-        """Append it; in Parquet it becomes a row group."""
+        """Append a part to its table; in Parquet the part becomes a row group."""
         batch = pa.table({name: pa.array(column) for name, column in part.columns.items()})
         writer = self._open.get(part.table)
         if writer is None:

@@ -1,7 +1,7 @@
-"""Logs as ULogs, one for each vehicle.
+"""Export of logs as ULogs, one for each vehicle.
 
-Every message is a ``mavlink_name`` topic as it was on the wire, with an instance for each sender and link;
-what the vehicle's own autopilot says, and is ordered to do, is there in PX4's words too.
+Every message is a topic ``mavlink_name`` with its raw payload, and an instance for each sender and link. The
+messages of the vehicle's own autopilot, and the set-points sent to it, are also converted to PX4's topics.
 """
 
 from __future__ import annotations
@@ -26,13 +26,15 @@ AUTOPILOT: Final = 1
 SECOND: Final = 1_000_000
 _NO_AUTOPILOT = 8
 _SURVEYED = 0.3
-"""The share of the work that is done when it is known who speaks."""
+"""Share of the work that is done after the first pass, which finds the senders."""
 _HEAD = (("uint8_t", "link"), ("uint8_t", "system"), ("uint8_t", "component"))
 
 
 class Survey(NamedTuple):
-    """Who is in a log: its first time (Unix µs), the types of its messages, and the system ids of vehicles:
-    those with an autopilot."""
+    """Contents of a log: its first time (Unix µs), its message types, and the system ids of vehicles.
+
+    A vehicle is a system with an autopilot.
+    """
 
     first: int
     kinds: frozenset[Kind]
@@ -40,8 +42,11 @@ class Survey(NamedTuple):
 
 
 def write(run: Run, folder: Path, watch: Watch) -> Written:
-    """``vehicle-N.ulg`` in ``folder`` for each vehicle. All begin a second before the first message of any,
-    to the whole second, so that they can be laid on each other. Raises InputError if there is no vehicle."""
+    """Write ``vehicle-N.ulg`` for each vehicle to ``folder``.
+
+    All files start at the same time, one second before the first message of any log, rounded down to a whole
+    second, so that they can be overlaid. Raises InputError if there is no vehicle.
+    """
     logs = list(run.logs)
     streams = watched(logs, watch, (0.0, _SURVEYED))
     found = [survey(messages) for messages in streams]
@@ -55,7 +60,7 @@ def write(run: Run, folder: Path, watch: Watch) -> Written:
 
 
 def survey(messages: Iterable[Spoken]) -> Survey:
-    """Go through a log once."""
+    """Read a log once and return its contents."""
     first, kinds, vehicles = -1, set(), set()
     for spoken in messages:
         first = spoken.time if first < 0 else min(first, spoken.time)
@@ -66,14 +71,14 @@ def survey(messages: Iterable[Spoken]) -> Survey:
 
 
 def _is_vehicle(spoken: Spoken) -> bool:
-    """Whether an autopilot gives a sign of life."""
+    """Return whether the message is the heartbeat of an autopilot."""
     if spoken.kind.name != "HEARTBEAT" or spoken.component != AUTOPILOT:
         return False
     return bool(spoken.kind.read(spoken.payload)["autopilot"] != _NO_AUTOPILOT)
 
 
 def _vehicles(log: Log, found: Survey) -> list[int]:
-    """Whose files a log becomes: in a run its owner's, else those of all that fly in it."""
+    """Return the vehicles that get a file: the owner of a log in a run, otherwise every vehicle in it."""
     return sorted(found.vehicles) if log.owner is None else [log.owner]
 
 
@@ -109,8 +114,11 @@ def _file(folder: Path, system: int, zero: int, kinds: list[Kind]) -> UlogFile:
 
 
 class _Book:
-    """The file of one vehicle, and what goes into it. ``by_link``: whether links are told apart; where a log
-    is nobody's own, the low bits of its stamps may be no links at all."""
+    """Converter of messages to the file of one vehicle.
+
+    ``by_link`` tells whether links are distinguished: in a log outside a run the low bits of the time stamps
+    may not be link numbers.
+    """
 
     def __init__(self, file: UlogFile, system: int, zero: int, by_link: bool) -> None:
         self.file = file
@@ -118,7 +126,7 @@ class _Book:
         self._px4 = Px4Topics(system, AUTOPILOT)
 
     def add(self, spoken: Spoken) -> None:
-        """A message."""
+        """Write a message, its conversion to PX4's topics, and its text if it is a STATUSTEXT."""
         kind, payload, time = spoken.kind, spoken.payload, spoken.time - self._zero
         link = spoken.link if self._by_link else 0
         head = bytes((spoken.link, spoken.system, spoken.component))
@@ -134,8 +142,10 @@ class _Book:
 
 @cache
 def mavlink_topic(kind: Kind) -> Topic:
-    """Its fields in the order of the wire, so that a payload is written as it is. A field that is called as
-    one of ours gets an underscore."""
+    """Return the topic of a message type: its fields in wire order, so that the payload is written unchanged.
+
+    A field with the name of one of the added fields gets an underscore.
+    """
     taken = {"timestamp", *(name for _, name in _HEAD)}
     fields = []
     for field in kind.wire:

@@ -1,5 +1,7 @@
-"""A ULog, written from its public specification (https://docs.px4.io/main/en/dev_log/ulog_file_format.html):
-header, flag bits, information, formats; then subscriptions, data and texts. Little endian, times in µs.
+"""ULog writer, after the public specification.
+
+The specification is https://docs.px4.io/main/en/dev_log/ulog_file_format.html. A file has a header, flag
+bits, information and formats; then subscriptions, data and texts. Numbers are little-endian, times in µs.
 """
 
 from __future__ import annotations
@@ -14,32 +16,34 @@ from typing import Final, NamedTuple, Self
 from outrider.errors import OutriderError
 
 MAGIC: Final = b"ULog\x01\x12\x35\x01"
-"""Its last byte is the version."""
+"""Header; its last byte is the version."""
 MOST_INSTANCES: Final = 256
 _HEADER = Struct("<HB")
 _FLAGS = bytes(40)
-"""No feature that a reader would have to know of, and no data appended."""
+"""Flag bits: no feature that a reader must support, and no appended data."""
 _SUBSCRIBE = Struct("<BH")
 _DATA = Struct("<HQ")
 _TEXT = Struct("<BQ")
 
 
 class Topic(NamedTuple):
-    """A format: ``fields`` are (type, name) after the time stamp, which every message begins with."""
+    """Message format: its name, and its ``fields`` (type, name) after the time stamp of every message."""
 
     name: str
     fields: tuple[tuple[str, str], ...]
 
     @property
     def format(self) -> str:
-        """As the file defines it."""
+        """Format definition as written to the file."""
         fields = (("uint64_t", "timestamp"), *self.fields)
         return f"{self.name}:" + "".join(f"{kind} {name};" for kind, name in fields)
 
 
 class UlogFile:
-    """Writes the file at ``path``; a context manager. ``start``: when the log begins; all topics that may
-    come are told in advance. Same calls, same bytes."""
+    """Writer of the ULog at ``path``; a context manager. The same calls give the same bytes.
+
+    ``start`` is the time of the log's start in µs; ``topics`` lists all topics that may be written.
+    """
 
     def __init__(
         self, path: Path, start: int, information: dict[str, str | int], topics: Iterable[Topic]
@@ -67,13 +71,15 @@ class UlogFile:
 
     @property
     def subscriptions(self) -> int:
-        """How many there are so far."""
+        """Number of subscriptions so far."""
         return len(self._subscriptions)
 
     def data(self, time: int, topic: Topic, source: object, values: bytes) -> None:
-        """A message of ``topic``; each ``source`` has an instance of its own. One that is earlier than the
-        one before it is left out and counted: a series has to go forward. Raises OutriderError for the 257th
-        source."""
+        """Write a message of ``topic``; each ``source`` has an instance of its own.
+
+        A message earlier than the one before it is omitted and counted, because a series must not go back in
+        time. Raises OutriderError for the 257th source of a topic.
+        """
         key = topic.name, source
         number = self._subscriptions.get(key)
         if number is None:
@@ -86,7 +92,7 @@ class UlogFile:
         self.messages += 1
 
     def say(self, time: int, severity: int, text: str) -> None:
-        """A text; ``severity`` 0…7 as of MAVLink, which is that of the Linux kernel."""
+        """Write a text; ``severity`` 0…7 is MAVLink's, which equals that of the Linux kernel."""
         self._write("L", _TEXT.pack(ord("0") + min(severity, 7), time) + text.encode())
 
     def _subscribe(self, topic: Topic, key: tuple[str, object]) -> int:

@@ -1,4 +1,4 @@
-"""What an export has become."""
+"""Counts of what an export wrote."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from typing import NamedTuple
 
 
 class Written(NamedTuple):
-    """How many channels, tables or subscriptions, how many messages or rows are in them, and how many had to
-    be left out because a series may not go back in time."""
+    """Counts of an export.
+
+    They are the number of channels, tables or subscriptions, the number of messages or rows in them, and the
+    number of messages omitted because a series must not go back in time.
+    """
 
     topics: int
     messages: int

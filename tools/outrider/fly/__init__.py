@@ -1,5 +1,7 @@
-"""``outrider fly``: one companion on an autopilot, under the wall clock.
+"""Command ``outrider fly``: takes options and endpoints, flies one companion, gives logs and a summary.
 
-request: options, checked → wiring opens the links → identify hears the autopilot → crew forks the worker that
-flies → flight gives orders, hears how it is, and has the last word → screen or lines, events, summary.
+``request`` checks the options. ``wiring`` opens the links. ``identify`` waits for the autopilot's heartbeat.
+``child_process`` forks the worker that flies. ``flight`` gives orders, receives status and sends the hold
+request at the end. ``screen`` or lines of text, events and a summary show the flight. The process runs under
+the wall clock.
 """

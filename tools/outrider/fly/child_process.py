@@ -1,4 +1,4 @@
-"""The process that flies, as the one that looks after it has it."""
+"""Child process that flies, as seen by its parent."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from typing import Final
 from outrider.fly.worker import Worker
 
 FAREWELL: Final = 10.0
-"""s that it has to leave its files."""
+"""Time limit for the child to write its files (s)."""
 KILLED: Final = 1.0
-"""s until one that was killed is waited for no longer: it is in the kernel, which waits for a disk, and flies
-no more."""
+"""Time limit for a killed child to end (s).
+
+After that it is blocked in the kernel, waiting for a disk, and no longer flies.
+"""
 
 
 class Crew:
-    """Forks ``worker``."""
+    """Child process that runs ``worker.main``, started by fork."""
 
     def __init__(self, worker: Worker) -> None:
         fork = multiprocessing.get_context("fork")
@@ -24,32 +26,32 @@ class Crew:
         self._killed = False
 
     def start(self) -> int:
-        """Its process id."""
+        """Start the process and return its process id."""
         self._process.start()
         return self._process.pid or 0
 
     @property
     def sentinel(self) -> int:
-        """Readable: it has ended."""
+        """File descriptor that becomes readable when the process has ended."""
         return self._process.sentinel
 
     @property
     def status(self) -> int | None:
-        """Its exit status, negative for a signal; None while it runs."""
+        """Exit status, negative for a signal; None while the process runs."""
         return self._process.exitcode
 
     @property
     def killed(self) -> bool:
-        """Whether it has been, and has nothing more to say."""
+        """Whether the process has been killed, and so sends nothing more."""
         return self._killed
 
     def kill(self) -> None:
-        """At once."""
+        """Kill the process immediately."""
         self._killed = True
         self._process.kill()
 
     def join(self) -> None:
-        """Wait until it has ended, by force if it takes too long."""
+        """Wait until the process has ended; kill it if it takes longer than ``FAREWELL``."""
         if not self._killed:
             self._process.join(FAREWELL)
             if not self._process.is_alive():

@@ -1,4 +1,4 @@
-"""``outrider fly``: opens the links, looks after one flight, and says how it was."""
+"""Command ``outrider fly``: opens the links, supervises one flight and reports the result."""
 
 from __future__ import annotations
 
@@ -33,12 +33,15 @@ FAULT: Final = 3
 CONFIGURATION, SUMMARY = "configuration.yaml", "summary.json"
 _STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
-"""Ctrl-Z, and what a terminal says to those in its background."""
+"""Signals that suspend a process: Ctrl-Z, and a terminal's signals to background processes."""
 
 
 def run(asked: Request) -> int:
-    """Until it has landed, Ctrl-C, SIGTERM, or the time is over; the exit status. InputError for what cannot
-    be opened, and for an autopilot that is not the own one."""
+    """Fly until landing, Ctrl-C, SIGTERM or the end of the time limit, and return the exit status.
+
+    A log in the request runs a shadow run instead. Raises InputError if a link or file cannot be opened, and
+    if the autopilot is not that of the own vehicle.
+    """
     if asked.log is not None:
         from outrider.fly.shadow_run import rehearsed
 
@@ -75,7 +78,7 @@ def _live(asked: Request) -> int:
 
 
 def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wiring: Wiring) -> Flight:
-    """On a terminal with a picture; elsewhere with a line for each event."""
+    """Fly with a live display on a terminal, otherwise with one line per event."""
     console = Console(stderr=True)
     with typing(console.is_terminal) as typed:
         if not console.is_terminal:
@@ -88,7 +91,7 @@ def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wir
 
         def look() -> None:
             screen.pending = typed.pending
-            # A terminal that is gone must not end a flight.
+            # A closed terminal must not end a flight.
             with suppress(OSError):
                 screen.look()
 
@@ -105,7 +108,7 @@ def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wir
 
 @contextmanager
 def _never_stopped() -> Iterator[None]:
-    """It would leave a vehicle to its last set-point."""
+    """Ignore the suspending signals: a suspended process would leave the vehicle on its last set-point."""
     before = {which: signal.signal(which, signal.SIG_IGN) for which in _SUSPENDING}
     try:
         yield

@@ -1,4 +1,4 @@
-"""What happened, as one line of JSON for each event, and as one for people."""
+"""Event log: one line of JSON per event, and one line of text for people."""
 
 from __future__ import annotations
 
@@ -24,30 +24,35 @@ _SENTENCES: Final = {
 
 
 _MOST: Final = 10_000
-"""Lines that wait for the disk."""
+"""Maximum number of lines that wait for the disk; further lines are dropped."""
 _PATIENCE: Final = 5.0
-"""s for which the end waits until all are written."""
+"""Time limit for writing the remaining lines at the end (s)."""
 
 
 class Diary:
-    """Has ``events.jsonl`` in ``directory`` written by a thread; ``tell`` gets the lines for people.
-    ``phases``: each with when it began, s; ``concerns``: how often each began. A disk that is full or stands
-    still, and people who do not listen any more, hold up nobody."""
+    """Event log that a thread writes to ``events.jsonl`` in ``directory``.
+
+    ``tell`` receives the lines of text. ``phases`` holds each phase with its start time (s), ``concerns`` the
+    number of times each concern began. A full or blocked disk, or a closed terminal, never blocks the caller.
+    """
 
     def __init__(self, directory: Path, clock: Callable[[], float]) -> None:
-        """``clock``: s since the beginning."""
+        """Open the file and start the thread; ``clock`` returns the time since the beginning (s)."""
         self.phases: list[tuple[str, float]] = []
         self.concerns: Counter[str] = Counter()
         self.tell: Callable[[str], None] = lambda _line: None
         self._clock = clock
-        # Without a buffer, whose lock a process that is forked meanwhile would inherit.
+        # Unbuffered: a process forked meanwhile would inherit the lock of a buffer.
         self._file = os.open(directory / NAME, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
         self._lines: SimpleQueue[bytes | None] = SimpleQueue()
         self._writer = Thread(target=self._write, name="diary", daemon=True)
         self._writer.start()
 
     def note(self, what: str, text: str, at: float | None = None) -> None:
-        """An event; ``at``: s of the companion's clock since it began, if it is that who tells."""
+        """Record an event of kind ``what``.
+
+        ``at``: time since the companion's start on its own clock (s), if the companion reported the event.
+        """
         now = round(self._clock(), 2)
         if what == "phase":
             self.phases.append((text, now))
@@ -61,12 +66,12 @@ class Diary:
             self.tell(f"{now:8.1f} s  {_SENTENCES.get(what, '{}').format(text)}")
 
     def close(self) -> None:
-        """Finish the file, if the disk lets it; nothing is noted afterwards."""
+        """Finish the file, if the disk allows it; no event may be noted afterwards."""
         self._lines.put(None)
         self._writer.join(_PATIENCE)
 
     def _write(self) -> None:
-        """The thread."""
+        """Write queued lines to the file (thread body)."""
         while (line := self._lines.get()) is not None:
             with suppress(OSError):
                 while line:

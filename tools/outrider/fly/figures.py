@@ -1,4 +1,4 @@
-"""What a flight comes to, as numbers for scripts."""
+"""Summary of a flight, as numbers for scripts."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from companion.flight.autopilots.known import KNOWN
 from outrider.fly.flight import Flight
 
 _NUMBER = 1
-"""Of MAV_AUTOPILOT in a state's heartbeat."""
+"""Index of MAV_AUTOPILOT in ``State.beat``."""
 
 
 def summary(flight: Flight, directory: Path) -> dict[str, object]:
-    """One JSON object. What only the process that flew knows is missing if that was killed; the last it said
-    of itself stands in ``state``."""
+    """Return the summary as one JSON object.
+
+    Fields known to the worker alone are absent if it was killed; its last report is in ``state``.
+    """
     asked, state, diary = flight.asked, flight.state, flight.diary
     profile = None if state.beat is None else KNOWN.get(state.beat[_NUMBER])
     return {

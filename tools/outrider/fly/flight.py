@@ -1,8 +1,11 @@
-"""One flight, as seen by the process that looks after it: it hears who is there, lets the other fly, hands
-orders on, and has the last word when that ends, whatever the reason.
+"""One flight, seen by the supervising parent process.
 
-Where that was no order, another process follows. It flies nothing without a new go, but tells the others
-where the vehicle is that holds its place among them."""
+The parent identifies the autopilot, starts the child that flies, forwards orders to it, and asks the
+autopilot to hold when the child ends, for whatever reason.
+
+If the child ended without an order, another child follows. It does not fly without a new go, but tells the
+other companions the position of the vehicle that holds its place among them.
+"""
 
 from __future__ import annotations
 
@@ -38,18 +41,21 @@ from outrider.fly.worker import Worker
 from outrider.interruption import Came, insisted
 
 LOOK: Final = 0.05
-"""s between two looks."""
+"""Time between two polls (s)."""
 MOST: Final = 5
 WITHIN: Final = 60.0
-"""So many processes lost in so many seconds are the end."""
+"""``MOST`` processes lost within ``WITHIN`` seconds end the flight."""
 _LEAVING: Final = 2.0
-"""s that it has to stop flying when it is told to."""
+"""Time limit for the child to stop flying after the stop request (s)."""
 _QUICK: Final = 0.01
 
 
 class Flight:
-    """``look`` is called some times a second with the latest ``state``. ``stops``: the signals that have
-    come; the first ends the flight, one that is a second later ends it at once."""
+    """Supervisor of one flight.
+
+    ``look`` is called some times a second with the latest ``state``. ``stops`` lists the signals received so
+    far: the first one ends the flight, one that comes a second or more later ends it at once.
+    """
 
     def __init__(
         self,
@@ -68,7 +74,7 @@ class Flight:
         self.ended = ""
         self.fault = False
         self.restarts: list[tuple[float, str]] = []
-        """When (s) a process that flew was lost, and why."""
+        """Times (s) at which a flying process was lost, with the reasons."""
         self.last_word = ""
         self._wiring, self._directory = wiring, directory
         self._typed, self._stops, self._look = typed, stops, look
@@ -78,14 +84,17 @@ class Flight:
         self._began = time.monotonic()
         self._pulse = Pulse(self._began)
         self.landing = Landing(False, None)
-        """The last, where it ended on the ground."""
+        """Last landing, if the flight ended on the ground."""
         self._left = self._go_given = self._failed = self._elsewhere = False
         self._trouble = ""
         self._simulated: bool | None = None
 
     def run(self) -> None:
-        """From the first heartbeat to the end; ``ended`` then says why, ``fault`` whether it should not
-        have. InputError for an autopilot that is not the own one."""
+        """Run the flight from the first heartbeat to the end.
+
+        Afterwards ``ended`` gives the reason, ``fault`` whether it counts as a fault. Raises InputError for
+        an autopilot that is not the own one.
+        """
         place = self._directory
         crew, desk, orders = self._crew(place)
         if not self._identify():
@@ -101,7 +110,8 @@ class Flight:
                 self._look_after(desk, crew)
             finally:
                 self._finish(desk, crew)
-                # Not before: an end that nobody has open takes with it, at the next beat, what waits at ours.
+                # Not earlier: once no process has this end open, the next beat discards the messages that
+                # wait at the parent's end.
                 orders.release()
             if self._over():
                 self.fault = self.fault or self._failed or self._elsewhere
@@ -110,13 +120,14 @@ class Flight:
             if self._signing is not None:
                 self._signing.resume(self.state.stamp)
             if self.state.simulated is not None:
-                # Found out once: the next need not be silent until it has found out again.
+                # The rate is known from the previous process: the next one need not be silent while it
+                # measures again.
                 self._simulated = self.state.simulated
             self.state, self.waiting = State(), ""
             crew, desk, orders = self._crew(place)
 
     def _crew(self, place: Path) -> tuple[Crew, Desk, OrderLink]:
-        """A process that is ready to be forked, and both ends of what joins it; ``place`` gets its log."""
+        """Return a process ready to fork, and both ends of its channel; its log goes to ``place``."""
         desk, orders = intercom()
         wiring = self._wiring
         worker = Worker(self.asked, wiring.ends, wiring.twin, orders, place, self._simulated)
@@ -126,7 +137,7 @@ class Flight:
 
     @property
     def seconds(self) -> float:
-        """Since the beginning."""
+        """Time since the beginning (s)."""
         return time.monotonic() - self._began
 
     def _identify(self) -> bool:
@@ -167,7 +178,7 @@ class Flight:
                 self.ended, self._elsewhere = verdict(landing.off, returning=landing.returning)
 
     def _over(self) -> bool:
-        """Whether it is time to end; ``ended`` says why."""
+        """Return whether the flight is over; ``ended`` gives the reason."""
         if not self.ended and self._stops:
             self.ended = f"stopped by {signal.Signals(self._stops[0].which).name}"
         if not self.ended and self.asked.seconds is not None and self.seconds >= self.asked.seconds:
@@ -175,7 +186,7 @@ class Flight:
         return bool(self.ended)
 
     def _lose(self, why: str) -> None:
-        """The process that flew is gone. Another one follows, unless they go on like that."""
+        """Record the loss of the flying process. Another one follows, unless too many were lost recently."""
         why = self._trouble or why
         self._trouble = ""
         now = self.seconds
@@ -210,8 +221,10 @@ class Flight:
                 self._left = True
 
     def _obey(self, desk: Desk | None) -> None:
-        """What was typed, and the go that a script has given beforehand. Without a ``desk`` nobody flies
-        yet."""
+        """Execute typed orders, and the go that was given on the command line.
+
+        Without a ``desk`` no process flies yet.
+        """
         for line in self._typed.lines():
             word, answer = understood(line)
             if word == QUIT:
@@ -228,7 +241,7 @@ class Flight:
             self._order("go", desk)
 
     def _refused(self, word: str, desk: Desk | None) -> str:
-        """Why an order is not handed on; empty if it is."""
+        """Return why an order is not forwarded; empty if it is forwarded."""
         if self.asked.dry_run:
             return f"{word}: a dry run takes no orders; allowed: {QUIT}"
         on_the_ground = self.state.phase == Phase.CONNECT.value
@@ -238,14 +251,15 @@ class Flight:
 
     def _order(self, word: str, desk: Desk) -> None:
         if self._signing is not None:
-            # As late as what the companion has heard last: its time may run faster than the wall's.
+            # Not older than the newest stamp the companion has received: a simulation's time may run ahead of
+            # the wall's.
             self._signing.resume(self.state.stamp)
             self._signing.present(self._wall.now())
         self.diary.note("order", word)
         desk.order(self._orders.frame(word))
 
     def _finish(self, desk: Desk, crew: Crew) -> None:
-        """The process that flies shall end, and then, whatever comes between, the vehicle is told to hold."""
+        """End the flying process; then, whatever happens meanwhile, ask the vehicle to hold."""
         try:
             self._dismiss(desk, crew)
         finally:
@@ -275,7 +289,7 @@ class Flight:
         return insisted(self._stops)
 
     def _say_last_word(self) -> None:
-        """Where the companion had the vehicle, ask for a hover."""
+        """Ask the autopilot to hold, if the companion was in control."""
         state = self.state
         if self.asked.dry_run or state.beat is None:
             return

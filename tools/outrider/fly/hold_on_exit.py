@@ -1,4 +1,4 @@
-"""Having the last word: the autopilot is asked to hold until it does, or is another's, or time is up."""
+"""Hold request at exit, repeated until the autopilot holds, another controller flies it, or time is up."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from mavlink_bridge.node import Datagram
 
 _STEP: Final = 10_000
 _HURRIED: Final = 300_000
-"""µs that it takes even where somebody is in a hurry."""
+"""Minimum duration of the request even in a hurry (µs)."""
 
 
 def farewell(word: LastWord, link: Link, clock: Clock, hurry: Callable[[], bool]) -> None:
-    """Say it over ``link``, the autopilot's; ``clock``: of the wall. ``hurry()``: whether to come to an
-    end."""
+    """Run ``word`` over ``link``, the autopilot's, on the wall's ``clock`` until it is over.
+
+    If ``hurry()`` returns true, it ends as soon as 0.3 s have passed.
+    """
     began = clock.now()
     while not word.over:
         now = clock.now()

@@ -1,4 +1,4 @@
-"""Who is on the autopilot's link: the own vehicle, another one, or nobody yet."""
+"""Identification of the vehicle on the autopilot's link: the own one, another one, or none yet."""
 
 from __future__ import annotations
 
@@ -14,13 +14,16 @@ from outrider.errors import InputError
 
 _BEAT = 1_000_000
 _PATIENCE = 60_000_000
-"""µs for which others may be heard before the own vehicle is: its autopilot may boot last."""
+"""Time for which only other vehicles may be received (µs): the own autopilot may boot last."""
 _HEARTBEAT = 0
 
 
 class Identification:
-    """Asked again and again until it answers. ``link``: the physical one, on which all are heard; ``own``:
-    who asks, with the system id of the own vehicle."""
+    """Search for the own vehicle's heartbeat, polled until it succeeds.
+
+    ``link`` is the physical link, on which all vehicles are received; ``own`` is the sender of the own
+    heartbeats, with the system id of the own vehicle.
+    """
 
     def __init__(self, link: Link, endpoint: str, own: Source, signing: Signing | None) -> None:
         self._link, self._endpoint, self._own, self._system = link, endpoint, own, own.system
@@ -34,12 +37,16 @@ class Identification:
         self._next = 0
 
     def look(self, now: int) -> Heartbeat | None:
-        """The own vehicle's heartbeat, None before it is heard; ``now``: µs of the wall. InputError where
-        there are only others, or an autopilot that is not known."""
+        """Return the own vehicle's heartbeat, None before one is received; ``now``: wall time (µs).
+
+        Raises InputError if only other vehicles are received for 60 s, or if the autopilot is of an unknown
+        kind.
+        """
         if self._signing is not None:
             self._signing.present(now)
         if now >= self._next:
-            # Routers and autopilots that wait to be spoken to learn by it that somebody is here.
+            # Routers and autopilots that wait for a first message learn the return address from this
+            # heartbeat.
             self._next = now + _BEAT
             beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
             self._link.send(self._codec.encode(beat))
@@ -56,7 +63,7 @@ class Identification:
 
     @property
     def waiting(self) -> str:
-        """What it waits for."""
+        """Description of the missing heartbeat, with the other systems received so far."""
         refused = self._codec.counters.refused
         unsigned = f"; {refused} heartbeats there are not signed with the key" if refused else ""
         others = f"; heard there: {', '.join(map(str, sorted(self._others)))}" if self._others else ""

@@ -1,7 +1,7 @@
-"""One companion for a vehicle on one computer: a second one at the same endpoint is refused.
+"""Instance lock: one companion per vehicle on one computer; a second one at the same endpoint is refused.
 
-The lock is a file in a folder of the user's own. Its name knows the network namespace, because the same port
-in another one is another place; a serial port is the same everywhere.
+The lock is a file in a folder of the user. Its name depends on the network namespace, because the same port
+in another namespace is another place; a serial port is the same in all namespaces.
 """
 
 from __future__ import annotations
@@ -22,22 +22,26 @@ from mavlink_bridge.links.endpoints import Endpoint, Serial
 from outrider.errors import InputError
 
 _LONGEST: Final = 200
-"""Characters of a command line that are shown."""
+"""Longest part of a command line that is shown (characters)."""
 _DIGITS: Final = 10
-"""Of a process id, at most."""
+"""Maximum number of digits of a process id."""
 
 
 @contextmanager
 def instance_lock(system: int, endpoint: Endpoint) -> Iterator[None]:
-    """The lock of vehicle ``system`` at ``endpoint``, held by this process and those that it forks, until the
-    last of them has ended. InputError, which names the holder, if another one has it."""
+    """Hold the lock of vehicle ``system`` at ``endpoint``.
+
+    This process and the processes that it forks hold it until the last of them has ended. Raises InputError,
+    which names the holder, if another process holds the lock. Without a place for the lock file there is no
+    lock.
+    """
     place = "" if isinstance(endpoint, Serial) else _network()
     name = sha256(f"{place} {system} {endpoint}".encode()).hexdigest()[:16]
     try:
         path = _folder() / f"fly-{name}.lock"
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
     except OSError:
-        # No place for it is no reason to stay on the ground.
+        # A missing place for the lock file is no reason to stay on the ground.
         yield
         return
     try:
@@ -55,8 +59,10 @@ def instance_lock(system: int, endpoint: Endpoint) -> Iterator[None]:
 
 
 def _folder() -> Path:
-    """XDG_RUNTIME_DIR or, where there is none, a folder below the temporary one. OSError if it is somebody
-    else's, or open to others."""
+    """Return the lock folder, below XDG_RUNTIME_DIR or else below the temporary directory.
+
+    Raises OSError if another user owns the folder or may enter it.
+    """
     given = os.environ.get("XDG_RUNTIME_DIR", "")
     if os.path.isabs(given) and _own(Path(given)):
         folder = Path(given) / "outrider"
@@ -69,7 +75,7 @@ def _folder() -> Path:
 
 
 def _own(folder: Path) -> bool:
-    """Whether it is a folder of this user that nobody else may enter."""
+    """Return whether ``folder`` is a folder of this user that no other user may enter."""
     try:
         found = folder.lstat()
     except OSError:
@@ -78,7 +84,7 @@ def _own(folder: Path) -> bool:
 
 
 def _network() -> str:
-    """This process's network namespace, empty where the system has none."""
+    """Return an id of this process's network namespace, empty where the system has none."""
     try:
         found = os.stat("/proc/self/ns/net")
     except OSError:
@@ -87,7 +93,7 @@ def _network() -> str:
 
 
 def _sign(file: int) -> None:
-    """Write down who holds it. A full disk costs the name only."""
+    """Write process id and command line of the holder. On a full disk only they are missing."""
     program, *arguments = sys.argv or [""]
     with suppress(OSError):
         os.ftruncate(file, 0)
@@ -96,7 +102,7 @@ def _sign(file: int) -> None:
 
 
 def _holder(file: int) -> str:
-    """Which process holds it, as it wrote; empty if that cannot be read."""
+    """Return a description of the holding process from the lock file; empty if it cannot be read."""
     try:
         said = os.pread(file, 4096, 0).decode(errors="replace").strip()
     except OSError:

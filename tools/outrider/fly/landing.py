@@ -1,25 +1,31 @@
-"""What is said of a landing: that it came back is claimed only by what was measured."""
+"""Report of a landing: the vehicle counts as back only if the position was measured."""
 
 from __future__ import annotations
 
 from typing import Final, NamedTuple
 
 _THERE: Final = 1.5
-"""m from its place, in the plane: estimates and touch-down take as much."""
+"""Largest horizontal distance from its place that counts as landed there (m).
+
+Estimates and touch-down take as much.
+"""
 _BESIDE: Final = 6.0
-"""m: the furthest that it lands beside a place that is taken."""
+"""Largest distance at which a vehicle lands beside a place that is taken (m)."""
 
 
 class Verdict(NamedTuple):
-    """``fault``: it is elsewhere than it should be, or that is not known."""
+    """Text for a landing; ``fault``: the vehicle is not where it should be, or its position is unknown."""
 
     text: str
     fault: bool
 
 
 def verdict(off: float | None, *, returning: bool) -> Verdict:
-    """Of a vehicle that has landed; ``off``: how far (m) from where it should have come back to, None where
-    nobody knows."""
+    """Return the verdict for a landed vehicle.
+
+    ``off`` is the distance (m) from the place to which it should have returned, None where it is unknown.
+    ``returning``: whether it was on its way back.
+    """
     if not returning:
         return Verdict("landed", False)
     if off is None:

@@ -1,4 +1,4 @@
-"""Lines that somebody types, or that come by a pipe, without waiting for them."""
+"""Lines from a terminal or a pipe, read without blocking."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _CHUNK: Final = 1024
 _ERASE: Final = (b"\x7f", b"\x08")
 _LONGEST: Final = 200
 FEW: Final = 10
-"""Lines that are handed over at once."""
+"""Maximum number of lines returned at once."""
 
 
 class Typed:
-    """``fileno``: of standard input, None without one. ``pending``: what has been typed of the next line."""
+    """Typed lines of standard input; ``fileno`` is its file descriptor, None without one."""
 
     def __init__(self, fileno: int | None) -> None:
         self._fileno = fileno
@@ -30,12 +30,14 @@ class Typed:
 
     @property
     def pending(self) -> str:
-        """For whoever shows it."""
+        """Incomplete next line, for display."""
         return self._line.decode(errors="replace")
 
     def lines(self) -> list[str]:
-        """Those that are complete; a few at a time, the next when it is asked again: who never stops writing
-        takes nobody's time for anything else."""
+        """Return complete lines, at most ``FEW`` at a time and the rest at the next call.
+
+        The limit keeps an endless writer from blocking everything else.
+        """
         if not self._complete:
             self._take(self._read())
         return [self._complete.popleft() for _ in range(min(len(self._complete), FEW))]
@@ -56,19 +58,23 @@ class Typed:
         try:
             data = os.read(self._fileno, _CHUNK)
         except OSError:
-            # No terminal of ours any more: nobody types.
+            # The terminal is no longer available: there is no more input.
             self._fileno = None
             return b""
         if not data:
-            # Who wrote has gone, with whatever was begun. Into a named pipe another may write.
+            # The writer has closed the pipe; its incomplete line is dropped. Another writer may open a named
+            # pipe.
             self._line = b""
         return data
 
 
 @contextmanager
 def typing(shown: bool) -> Iterator[Typed]:
-    """What comes by standard input. Where ``shown`` (somebody shows what is pending), a terminal hands on
-    each letter and echoes none; it is as it was afterwards."""
+    """Read lines from standard input.
+
+    If ``shown`` (another part displays the incomplete line), a terminal passes on each character and echoes
+    none; its settings are restored afterwards.
+    """
     fileno = _standard_input()
     if fileno is None or not shown or not os.isatty(fileno):
         yield Typed(fileno)
@@ -86,7 +92,10 @@ def typing(shown: bool) -> Iterator[Typed]:
 
 
 def _standard_input() -> int | None:
-    """None where there is none, and in the background of a terminal, which would stop who reads it."""
+    """Return the file descriptor of standard input, or None.
+
+    None without standard input, and in the background of a terminal, which would stop a reading process.
+    """
     try:
         fileno = sys.stdin.fileno()
         if os.isatty(fileno) and os.tcgetpgrp(fileno) != os.getpgrp():

@@ -1,5 +1,4 @@
-"""What a swarm says over its link each second, what goes to an autopilot and back, and what a line has room
-for."""
+"""Link budget: bytes per second on the swarm and autopilot links, and the capacity of a serial line."""
 
 from __future__ import annotations
 
@@ -29,12 +28,15 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE
 from outrider.errors import InputError
 
 SHARE: Final = 0.7
-"""Of a line's capacity. Half-duplex radios lose the rest to turning round, headers and what is sent again."""
+"""Usable share of a line's capacity.
+
+Half-duplex radios lose the rest to turnaround, headers and retransmission.
+"""
 FLEET: Final = 8
 TARGET_HZ: Final = 5.0
-"""GLOBAL_POSITION_INT of the target, on the same link."""
+"""Rate of the target's GLOBAL_POSITION_INT on the same link (Hz)."""
 _BITS: Final = 10
-"""A byte on the line, with start and stop bit."""
+"""Bits per byte on the line, with start and stop bit."""
 _SIGNATURE: Final = 13
 _SECOND: Final = 1e6
 _ONE: Final = Source(1, 1)
@@ -53,37 +55,41 @@ _HEALTH: Final[tuple[Message, ...]] = (
     GpsRaw(_ONE, 1, 3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 9, 1.0, 1.0, 1.0, 1.0),
     EstimatorStatus(_ONE, 1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1),
 )
-"""What its estimator says is shorter where it is an ArduPilot."""
+"""ArduPilot's estimator message is shorter."""
 _USB: Final = "ttyACM"
-"""A device whose baud rate is a number without a meaning."""
+"""Name of USB serial devices, whose baud rate has no meaning."""
 
 
 def said(config: CompanionConfig, signed: bool) -> float:
-    """Bytes a second of one companion on the swarm link, at most: MAVLink 2 leaves out zeros at a message's
-    end, so one that stands says less."""
+    """Return the maximum bytes per second that one companion sends on the swarm link.
+
+    MAVLink 2 truncates zeros at the end of a message, so a vehicle at rest sends less.
+    """
     rates = config.rates
     plans = _size(_PLAN, signed) * _SECOND / rates.plan_us if config.shares_plan else 0.0
     return _size(_STATE, signed) * _SECOND / rates.state_us + plans + _size(_BEAT, signed)
 
 
 def said_by_target(signed: bool) -> float:
-    """Bytes a second of the target."""
+    """Return the bytes per second that the target sends."""
     return TARGET_HZ * _size(_STATE, signed) + _size(_BEAT, signed)
 
 
 def room(baud: int) -> float:
-    """Bytes a second that a shared line of that ``baud`` carries, all senders together."""
+    """Return the bytes per second that a shared line of ``baud`` carries, for all senders together."""
     return SHARE * baud / _BITS
 
 
 def carried(baud: int, config: CompanionConfig, signed: bool) -> int:
-    """How many vehicles, and the target, a shared line of that ``baud`` has room for."""
+    """Return how many vehicles, besides the target, a shared line of ``baud`` has room for."""
     return max(0, int((room(baud) - said_by_target(signed)) / said(config, signed)))
 
 
 def doubts(endpoint: Endpoint, config: CompanionConfig, signed: bool) -> str:
-    """What is to be known of ``endpoint`` as the swarm link, for a fleet of eight; empty if it has room.
-    InputError where there is no room for two."""
+    """Return a warning about ``endpoint`` as swarm link of a fleet of eight; empty if it has room.
+
+    Raises InputError if there is no room for two vehicles.
+    """
     if not isinstance(endpoint, Serial):
         return ""
     vehicles = carried(endpoint.baud, config, signed)
@@ -100,21 +106,23 @@ def doubts(endpoint: Endpoint, config: CompanionConfig, signed: bool) -> str:
 
 
 def steered(config: CompanionConfig, signed: bool) -> float:
-    """Bytes a second that go to an autopilot that is steered, without ``voice``."""
+    """Return the bytes per second sent to an autopilot under control, without status texts."""
     setpoints = _size(_SETPOINT, signed) * _SECOND / config.rates.setpoint_us
     return setpoints + _size(_BEAT, signed)
 
 
 def told(signed: bool) -> float:
-    """Bytes a second that an autopilot says: what it is asked for, and its heartbeat."""
+    """Return the bytes per second that an autopilot sends: requested streams and its heartbeat."""
     streams = sum(_size(_TOLD[number], signed) * _SECOND / each for number, each in STREAMS.items())
     health = sum(_size(message, signed) for message in _HEALTH) * _SECOND / HEALTH
     return streams + health + _size(_BEAT, signed)
 
 
 def doubts_of_autopilot(endpoint: Endpoint, config: CompanionConfig, signed: bool, *, dry_run: bool) -> str:
-    """What is to be known of ``endpoint`` as the way to the autopilot; empty if a radio of that baud rate
-    would have room, in a dry run for as much again, which is a ground station's."""
+    """Return a warning about ``endpoint`` as autopilot link; empty if a radio of its baud rate has room.
+
+    A dry run requires room for twice the autopilot's traffic: the second half is a ground station's.
+    """
     if not isinstance(endpoint, Serial) or _USB in endpoint.device:
         return ""
     to, back = 0.0 if dry_run else steered(config, signed), told(signed)

@@ -1,5 +1,7 @@
-"""The log of a flight, which is worth less than the flight: a thread writes it, and where it cannot be
-written, or a disk stands still for too long, there is none from then on."""
+"""Log of a flight, written by a thread; it never delays the flight.
+
+If the log cannot be written, or a disk blocks for too long, logging stops for the rest of the flight.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +19,19 @@ from mavlink_bridge.node import Datagram
 from outrider.runs.recorder import Recorder
 
 BATCH: Final = 16
-"""Entries that are handed to the thread together: some hundredths of a second, which it writes within a
-fraction of a millisecond, as nobody else runs meanwhile."""
+"""Number of entries handed to the thread together: some hundredths of a second.
+
+The thread writes them within a fraction of a millisecond, during which no other thread runs.
+"""
 MOST: Final = 4096
-"""Batches that wait at most: a minute or two of a flight, and some 20 MB."""
+"""Maximum number of waiting batches: a minute or two of a flight, about 20 MB."""
 PATIENCE: Final = 5.0
-"""s for which the end waits until all is written; less than the process has to leave its files."""
+"""Time for which the end waits until all is written (s); less than the process has to write its files."""
 _STILL: Final = "the disk stands still"
 
 
 class _Entry(NamedTuple):
-    """What a tap is told; without ``datagram``: that a step begins."""
+    """Arguments of a tap call; without ``datagram``: the beginning of a step."""
 
     now: int
     node: str
@@ -36,13 +40,15 @@ class _Entry(NamedTuple):
 
 
 class Log:
-    """A tap that never waits, and a context manager: that of vehicle ``system`` in ``directory``. ``tell``
-    hears once why it ended, if it has to."""
+    """Log of vehicle ``system`` in ``directory``: a tap that never blocks, and a context manager.
+
+    ``tell`` receives once the reason, if logging has to stop.
+    """
 
     def __init__(
         self, directory: Path, system: int, tell: Callable[[str], None], patience: float = PATIENCE
     ) -> None:
-        """``patience``: s."""
+        """Prepare the log; ``patience``: time limit for writing the rest at the end (s)."""
         self._directory, self._system = directory, system
         self._tell, self._patience = tell, patience
         self._ended = False
@@ -54,7 +60,7 @@ class Log:
         try:
             self._thread.start()
         except RuntimeError as error:
-            # As many threads as the system allows.
+            # The system's limit of threads is reached.
             self._end(error)
         return self
 
@@ -70,9 +76,11 @@ class Log:
             self._end(_STILL)
 
     def begin(self, now: int, node: str, /) -> None:
+        """Record that a step of ``node`` begins at ``now`` (µs)."""
         self._add(_Entry(now, node, "in", None))
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
+        """Record a datagram that ``node`` receives or sends at ``now`` (µs)."""
         self._add(_Entry(now, node, direction, datagram))
 
     def _add(self, entry: _Entry) -> None:
@@ -84,12 +92,12 @@ class Log:
         self._waiting.put(self._batch)
         self._batch = []
         if self._waiting.qsize() >= MOST:
-            # What waits is written yet, should the disk go on.
+            # The waiting batches are still written, should the disk recover.
             self._waiting.put(None)
             self._end(_STILL)
 
     def _write(self) -> None:
-        """The thread: from the first file opened to the last closed."""
+        """Write queued entries, from opening the first file to closing the last (thread body)."""
         try:
             self._directory.mkdir(exist_ok=True)
             with ExitStack() as files:

@@ -1,4 +1,4 @@
-"""Words that the operator types, as commands to the companion (COMMAND_LONG)."""
+"""Orders that the operator types, as commands to the companion (COMMAND_LONG)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 
 OPERATOR = 190
-"""MAV_COMP_ID_MISSIONPLANNER, under the vehicle's own system id: no ground station's."""
+"""MAV_COMP_ID_MISSIONPLANNER, used under the vehicle's own system id, which no ground station uses."""
 QUIT = "quit"
 _COMMANDS = {"go": NAV_TAKEOFF, "hold": NAV_LOITER_UNLIM, "return": NAV_RETURN, "land": NAV_LAND}
 WORDS = (*_COMMANDS, QUIT)
@@ -22,22 +22,24 @@ _NAN = float("nan")
 
 
 class Orders:
-    """Makes frames of words; ``height``: m above the ground, of a go. ``signing``: its own."""
+    """Encoder of orders as frames; ``height``: take-off height above ground (m); ``signing``: of its own."""
 
     def __init__(self, system: int, height: float, signing: Signing | None = None) -> None:
         self._system, self._height = system, height
         self._codec = Codec(None, signing, LINKS.index("ground"))
 
     def frame(self, word: str) -> bytes:
-        """One of ``WORDS`` but to quit."""
+        """Return the frame for ``word``, one of ``WORDS`` except ``quit``."""
         params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, self._height if word == "go" else 0.0)
         source = Source(self._system, OPERATOR)
         return self._codec.encode(CommandLong(source, self._system, COMPONENT, _COMMANDS[word], 0, params))
 
 
 def answered(command: int, result: int, phase: str, waiting: str) -> str:
-    """In words, what the companion makes of an order (COMMAND_ACK); if nothing, in which ``phase`` it is, and
-    what it waits for there."""
+    """Return the companion's answer to an order (COMMAND_ACK) as text.
+
+    If the order was not accepted, the text names the current ``phase`` and what the companion waits for.
+    """
     word = next((word for word, number in _COMMANDS.items() if number == command), f"command {command}")
     if result == ACCEPTED:
         return f"{word}: taken"
@@ -46,7 +48,7 @@ def answered(command: int, result: int, phase: str, waiting: str) -> str:
 
 
 def understood(line: str) -> tuple[str | None, str]:
-    """The word of a typed ``line``; or None, and what to say to that, nothing for an empty line."""
+    """Return the word of a typed ``line``; or None and an answer, which is empty for an empty line."""
     word = line.strip().lower()
     if not word:
         return None, ""

@@ -1,5 +1,7 @@
-"""What joins the process that flies and the one that looks after it: orders there, news back. It never waits,
-and what one cannot take is lost to it."""
+"""Inter-process channel between the flying child and its parent: orders one way, status the other.
+
+It never blocks; what the receiver has no room for is lost.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +20,18 @@ _MOST: Final = 65536
 _STOP: Final = b"stop"
 _BEAT: Final = b"beat"
 ALONE: Final = 5.0
-"""s without a beat after which the child is on its own: nobody would hand on an order, nor have the last
-word."""
+"""Time without a beat after which the child acts alone (s).
+
+No parent then forwards orders or sends the hold request at the end.
+"""
 _BETWEEN: Final = 0.5
-"""s between two beats."""
+"""Time between two beats (s)."""
 _ACK: Final = 77
 _BUFFER: Final = 1 << 20
 
 
 def intercom() -> tuple[Desk, OrderLink]:
-    """The parent's end, and the child's."""
+    """Return both ends of a new channel: the parent's and the child's."""
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     for end in (there, here):
         end.setblocking(False)
@@ -36,37 +40,37 @@ def intercom() -> tuple[Desk, OrderLink]:
 
 
 class Desk:
-    """The parent's end."""
+    """Parent's end of the channel."""
 
     def __init__(self, end: socket.socket) -> None:
         self._end = end
         self._beaten = 0.0
 
     def beat(self, now: float) -> None:
-        """The parent looks after things at ``now`` (s); the child is told twice a second."""
+        """Report at ``now`` (s) that the parent is alive; at most two beats a second are sent."""
         if now - self._beaten >= _BETWEEN:
             self._beaten = now
             self._put(_BEAT)
 
     def fileno(self) -> int:
-        """Readable: there is news."""
+        """Return the file descriptor, readable when there is news."""
         return self._end.fileno()
 
     def order(self, frame: bytes) -> None:
-        """A MAVLink frame for the companion, as if from its ground link."""
+        """Send a MAVLink frame to the companion, as if from its ground link."""
         self._put(frame)
 
     def stop(self) -> None:
-        """The child shall end."""
+        """Ask the child to end."""
         self._put(_STOP)
 
     def news(self) -> Iterator[dict[str, Any]]:
-        """What the child has said since the last time."""
+        """Yield the child's messages since the last call."""
         while (data := _taken(self._end)) is not None:
             yield json.loads(data)
 
     def close(self) -> None:
-        """This end."""
+        """Close this end."""
         self._end.close()
 
     def _put(self, data: bytes) -> None:
@@ -74,11 +78,13 @@ class Desk:
 
 
 class OrderLink:
-    """The child's end: to the loop a ``Link`` like the others, by which orders arrive. ``stop``: whether it
-    has been told to end."""
+    """Child's end of the channel: a ``Link`` for the loop, over which orders arrive.
+
+    ``stop``: whether the parent has asked the child to end.
+    """
 
     def __init__(self, end: socket.socket, clock: Callable[[], float] = time.monotonic) -> None:
-        """``clock``: s."""
+        """Wrap the socket; ``clock`` returns seconds."""
         self._end, self._clock = end, clock
         self._codec = Codec(lambda identifier, _system, _component: identifier == _ACK)
         self._received = 0
@@ -87,22 +93,22 @@ class OrderLink:
 
     @property
     def alone(self) -> bool:
-        """Whether the parent has been silent for too long, since it was first asked."""
+        """Whether the parent has been silent for too long, counted from the first call."""
         if self._heard is None:
             self._heard = self._clock()
         return self._clock() - self._heard > ALONE
 
     @property
     def counters(self) -> LinkCounters:
-        """Orders."""
+        """Number of received orders."""
         return LinkCounters(self._received, 0, 0)
 
     def fileno(self) -> int:
-        """Readable: there are orders."""
+        """Return the file descriptor, readable when there are orders."""
         return self._end.fileno()
 
     def receive(self) -> list[bytes]:
-        """Orders."""
+        """Return the orders received since the last call."""
         found = []
         while (data := _taken(self._end)) is not None:
             self._heard = self._clock()
@@ -114,17 +120,17 @@ class OrderLink:
         return found
 
     def send(self, data: bytes) -> None:
-        """Of what is told to the ground, the answers to what was ordered here: as news of ``kind`` ack."""
+        """Forward answers to the parent's orders as messages of ``kind`` ack; drop everything else."""
         for message in self._codec.feed(data, whole=True):
             if isinstance(message, CommandAck) and message.target_component == OPERATOR:
                 self.tell(kind="ack", command=message.command, result=message.result)
 
     def tell(self, **news: object) -> None:
-        """Say something to the parent."""
+        """Send a message to the parent."""
         _given(self._end, json.dumps(news).encode())
 
     def close(self) -> None:
-        """It stays open until the process ends: the last news comes after the loop."""
+        """Do nothing: the end stays open until the process ends, as the last messages follow the loop."""
 
     def release(self) -> None:
         """Close this end in the process that does not fly."""

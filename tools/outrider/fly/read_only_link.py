@@ -1,4 +1,4 @@
-"""A link over which nothing passes that changes what anybody does: the last door of a dry run."""
+"""Read-only link: the final filter of a dry run, which passes nothing that changes a vehicle's behaviour."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ _TELL: Final = frozenset((0, 20, 111, 251, 253))
 
 
 class HarmlessLink:
-    """``link``, outwards for what only tells, and for requests for messages, parameters and the time.
-    ``kept``: datagrams kept back."""
+    """Wrapper of ``link`` that sends only status messages and requests for messages, parameters and time.
+
+    ``kept``: number of datagrams kept back.
+    """
 
     def __init__(self, link: Link) -> None:
         self._link = link
@@ -25,19 +27,19 @@ class HarmlessLink:
 
     @property
     def counters(self) -> LinkCounters:
-        """The link's."""
+        """Counters of the wrapped link."""
         return self._link.counters
 
     def fileno(self) -> int | None:
-        """The link's."""
+        """Return the file descriptor of the wrapped link."""
         return self._link.fileno()
 
     def receive(self) -> list[bytes]:
-        """The link's."""
+        """Return the datagrams received on the wrapped link."""
         return self._link.receive()
 
     def send(self, data: bytes) -> None:
-        """If all of it is harmless."""
+        """Send ``data`` if all its frames are harmless; otherwise keep it back."""
         frames, end = leading_frames(data)
         if end == len(data) and all(map(harmless, frames)):
             self._link.send(data)
@@ -45,12 +47,12 @@ class HarmlessLink:
             self.kept += 1
 
     def close(self) -> None:
-        """The link."""
+        """Close the wrapped link."""
         self._link.close()
 
 
 def harmless(frame: Frame) -> bool:
-    """Whether it changes nothing of what a vehicle does."""
+    """Return whether ``frame`` leaves a vehicle's behaviour unchanged."""
     if frame.message_id == _COMMAND_LONG:
         (command,) = _COMMAND.unpack_from(frame.payload.ljust(_COMMAND.size, b"\0"))
         return command in REQUESTS

@@ -1,4 +1,4 @@
-"""What ``outrider fly`` is asked for: by which endpoints, with which file, and how. All of it checked."""
+"""Checked request of ``outrider fly``: endpoints, configuration file and options."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from outrider.yaml_files.yaml_file import load
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line says, as it says it."""
+    """Options of the command line, unchecked."""
 
     autopilot: str
     config: str
@@ -40,8 +40,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Request:
-    """``endpoints`` by the companion's name for a link: several may be one and the same. ``log`` instead of
-    an autopilot is only for a dry run."""
+    """Checked request.
+
+    ``endpoints`` maps the companion's names of links to endpoints; several may be the same. ``log`` replaces
+    the autopilot and is for dry runs only.
+    """
 
     config: FlyConfig
     name: str
@@ -57,12 +60,12 @@ class Request:
 
     @property
     def system(self) -> int:
-        """The vehicle's and its companion's system id."""
+        """System id of the vehicle and its companion."""
         return self.config.system
 
 
 def checked(options: Options) -> Request:
-    """The options as a request. InputError with what is wrong and what is allowed."""
+    """Return the options as a request. Raises InputError, which names the fault and what is allowed."""
     config = load(find("companions", options.config), FlyConfig)
     if options.system is not None:
         if options.system == config.target:
@@ -72,7 +75,7 @@ def checked(options: Options) -> Request:
         raise InputError("--go: does not go with --dry-run, in which nothing takes off")
     autopilot = _endpoint("autopilot", options.autopilot)
     if isinstance(autopilot, Replay):
-        # Nobody is flown: who is in the log is said there.
+        # Nothing flies; the shadow run reports which vehicles the log contains.
         config = config if config.system else config.model_copy(update={"system": 1})
         return _of_log(options, config, Path(autopilot.path))
     if not config.system:

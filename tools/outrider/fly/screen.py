@@ -1,5 +1,4 @@
-"""How the flight is, as a picture that is always there, what happened last, and what is being typed; on a
-terminal."""
+"""Live display of the flight on a terminal: state, latest events, and the line being typed."""
 
 from __future__ import annotations
 
@@ -20,13 +19,16 @@ from outrider.fly.status import State
 from outrider.fly.terminal import Terminal
 
 _REFRESH: Final = 0.2
-"""s between two pictures."""
+"""Time between two pictures (s)."""
 _EVENTS: Final = 8
 
 
 class Screen:
-    """On ``terminal``. ``look`` as often as one likes: where it takes nothing, nothing is drawn. ``tell`` is
-    for the diary's lines."""
+    """Display on ``terminal``.
+
+    ``look`` may be called at any rate: nothing is drawn while the terminal takes no output. ``tell`` receives
+    the lines of the event log.
+    """
 
     def __init__(self, terminal: Terminal) -> None:
         self._terminal = terminal
@@ -34,15 +36,15 @@ class Screen:
         self.pending = ""
         self._events: deque[str] = deque(maxlen=_EVENTS)
         self._drawn = 0.0
-        # Without a thread of its own: this process forks the one that flies.
+        # No refresh thread: this process forks the one that flies.
         self.live = Live(console=Console(file=cast(IO[str], terminal)), auto_refresh=False)
 
     def tell(self, line: str) -> None:
-        """One more event."""
+        """Add an event line."""
         self._events.append(line)
 
     def look(self) -> None:
-        """What there is to see now."""
+        """Draw the current state, at most every 0.2 s."""
         now = time.monotonic()
         if now - self._drawn >= _REFRESH and self.flight is not None and self._terminal.takes:
             self._drawn = now
@@ -68,7 +70,7 @@ class Screen:
 
 
 def rows(state: State, waiting: str) -> dict[str, str]:
-    """What people watch, in words."""
+    """Return the rows of the display, as text by name."""
     found = {"phase": f"{state.phase}, waits for {waiting}" if waiting else state.phase}
     motors = "armed" if state.armed else "disarmed"
     found["mode"] = f"{state.mode or 'not heard'}, {motors}{', ours' if state.guided else ''}"
@@ -90,7 +92,7 @@ def rows(state: State, waiting: str) -> dict[str, str]:
 
 
 def _age(age: int | None) -> str:
-    """ms, in words."""
+    """Return an age in ms as text."""
     if age is None:
         return "never"
     return f"{max(age, 0)} ms ago" if age < 10_000 else f"{age / 1000.0:.0f} s ago"

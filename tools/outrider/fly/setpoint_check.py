@@ -1,5 +1,7 @@
-"""What a row of set-points is like, while it goes by: the figures of ``replaying.setpoints``, in little
-memory, and how they stand against the limits."""
+"""Check of a sequence of set-points against the limits, one at a time and in little memory.
+
+The figures are those of ``outrider.shadow.setpoints``.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +13,17 @@ from companion.flight.setpoint import FRAME_LOCAL_NED, is_finite
 from mavlink_bridge.messages import SetpointLocal, Vector
 
 TOGETHER = 100_000
-"""µs. What is further apart is no step but a gap."""
+"""Longest interval that counts as a step (µs); a longer one is a gap."""
 _IN_A_ROW = 35_000
-"""µs. After any pause the yaw begins anew where the vehicle's nose points."""
+"""Longest interval over which yaw is compared (µs). After any pause yaw restarts at the vehicle's heading."""
 
 
 class SetpointGauge:
-    """Told each set-point with its time (µs). None may be faster than ``fastest`` (m/s), accelerate harder
-    than ``hardest`` (m/s²) or turn faster than ``turning`` (rad/s), nor jump by more than that explains."""
+    """Running statistics of set-points, fed with each set-point and its time (µs).
+
+    No set-point may be faster than ``fastest`` (m/s), accelerate harder than ``hardest`` (m/s²), turn faster
+    than ``turning`` (rad/s), or jump further than these limits explain.
+    """
 
     def __init__(self, fastest: float, hardest: float, turning: float = inf) -> None:
         self.count = self.gaps = 0
@@ -30,7 +35,7 @@ class SetpointGauge:
         self._last: tuple[int, Vector, float] | None = None
 
     def take(self, now: int, message: SetpointLocal) -> None:
-        """One that leaves, or would, at ``now``."""
+        """Add a set-point that is sent, or would be sent, at ``now`` (µs)."""
         self.count += 1
         self.masks[message.type_mask] += 1
         self.frames[message.frame] += 1
@@ -55,7 +60,7 @@ class SetpointGauge:
 
     @property
     def facts(self) -> dict[str, object]:
-        """For the summary."""
+        """Statistics for the summary."""
         largest = {
             "max_step_m": self.step,
             "max_speed_m_s": self.speed,
@@ -71,7 +76,7 @@ class SetpointGauge:
         }
 
     def faults(self, mask: int) -> list[str]:
-        """What is wrong with them for an autopilot that takes ``mask``."""
+        """Return what is wrong with the set-points for an autopilot that expects type mask ``mask``."""
         wrong = {
             "not all are finite": not self.finite,
             f"type masks other than 0x{mask:03X}": bool(set(self.masks) - {mask}),
@@ -88,9 +93,11 @@ class SetpointGauge:
 def gauge_for(
     limits: LimitsConfig, heading: HeadingConfig | None = None, compensation: float = 0.0
 ) -> SetpointGauge:
-    """For a companion with these limits, and up to so much ``compensation`` (m/s²) beside its plan's
-    acceleration; without ``heading`` its yaw is left to itself, as it jumps where a
-    flight goes on that a pilot has turned."""
+    """Return a check for a companion with these limits.
+
+    ``compensation`` (m/s²) may be added to the plan's acceleration. Without ``heading`` the yaw is not
+    checked, as it jumps where a flight continues after a pilot has turned the vehicle.
+    """
     return SetpointGauge(
         hypot(*limits.v_max), limits.a_total + compensation, inf if heading is None else heading.rate_max
     )
@@ -98,6 +105,6 @@ def gauge_for(
 
 _ROUNDED = 1e-3
 _TURNED = 0.02
-"""rad: the own clock may run a hundredth beside the log's."""
+"""Tolerance of yaw steps (rad): the own clock may run one hundredth faster or slower than the log's."""
 _CORRECTED = 0.15
-"""m by which the estimate of the own position may be corrected from one set-point to the next."""
+"""Tolerance of position steps (m): correction of the own position estimate between two set-points."""

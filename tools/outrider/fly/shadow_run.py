@@ -1,4 +1,4 @@
-"""A dry run that is fed by a log: what the companion would have sent, and what is wrong with it."""
+"""Shadow run fed by a log: what the companion would have sent, and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -27,13 +27,15 @@ from outrider.terminal.lines import say
 from outrider.terminal.share_progress import share_progress
 
 _FAR: Final = 20_000.0
-"""m from the fleet origin: no flight of this fleet's."""
+"""Distance from the fleet origin (m) beyond which a flight is not one of this fleet."""
 _HEARTBEAT: Final = 0
 
 
 def rehearsed(asked: Request, log: Path) -> int:
-    """Go through the log as fast as that goes; the exit status: 0 all is well, 1 something is wrong with what
-    would have been sent. InputError for a log without the vehicle, or from elsewhere."""
+    """Replay the log at full speed and return the exit status: 0 for no fault, 1 for faulty set-points.
+
+    Raises InputError for a log without the vehicle, or from another place.
+    """
     config = asked.config
     try:
         profile = _profile(asked, log, _autopilots(log))
@@ -86,7 +88,7 @@ def rehearsed(asked: Request, log: Path) -> int:
 
 
 def _faults(asked: Request, found: Rehearsed, mask: int) -> list[str]:
-    """What is wrong with what would have been sent, to an autopilot that takes ``mask``."""
+    """Return what is wrong with the set-points of the run, for an autopilot that expects ``mask``."""
     if not found.would:
         return ["no set-point at all"]
     settings = asked.config.settings
@@ -97,7 +99,7 @@ def _faults(asked: Request, found: Rehearsed, mask: int) -> list[str]:
 
 
 def _autopilots(log: Path) -> dict[int, int]:
-    """MAV_AUTOPILOT of each vehicle of the log, by system id."""
+    """Return MAV_AUTOPILOT of each vehicle of the log, by system id."""
     codec = Codec(lambda identifier, _system, component: (identifier, component) == (_HEARTBEAT, AUTOPILOT))
     found: dict[int, int] = {}
     for record in read_tlog(log):
@@ -110,7 +112,10 @@ def _autopilots(log: Path) -> dict[int, int]:
 
 
 def _profile(asked: Request, log: Path, autopilots: dict[int, int]) -> Profile:
-    """Of the own vehicle. InputError that says who is there and may be flown."""
+    """Return the profile of the own vehicle.
+
+    Raises InputError, which lists the vehicles that are there and those that may be flown.
+    """
     system = asked.system
     profile = KNOWN.get(autopilots.get(system, AUTOPILOT_INVALID))
     if profile is not None:

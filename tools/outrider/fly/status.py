@@ -1,5 +1,4 @@
-"""What the process that flies tells of itself: each change when it happens, and how it is, some times a
-second."""
+"""Status of the flying process: each change when it happens, and the state five times a second."""
 
 from __future__ import annotations
 
@@ -22,22 +21,25 @@ from outrider.logs.flight_modes import mode_name
 from outrider.supervision.supervised_node import OURS, TWIN, Cockpit
 
 SHOWN = 200_000
-"""µs of the wall between two states."""
+"""Wall time between two states (µs)."""
 _RARELY = 5
-"""States between two looks at what takes longer to work out."""
+"""Number of states between two updates of figures that take longer to compute."""
 _AGAIN = 10.0
-"""s after which an autopilot's words are told again that it keeps repeating."""
+"""Time (s) after which a text that the autopilot keeps repeating is reported again."""
 _REPEATED = ("autopilot", "refused")
 _WAITING = (Phase.CONNECT, Phase.PREPARE)
 _PLAIN = 0.005
-"""A clock that is off by more is no quartz."""
+"""Rate error above which a clock is not a quartz clock."""
 
 
 class State(NamedTuple):
-    """How it is. ``at``: s of its clock since it began; ages in ms; ``plan_ms``: median and 99th percentile;
-    ``beat``: the autopilot's last heartbeat: type, autopilot, base and custom mode, system status; ``stamp``
-    of the newest signature; ``would``: in a dry run, the last set-point that it would have sent;
-    ``simulated``: whether the autopilot's clock is a simulation's, None before that is known."""
+    """State of the flight.
+
+    ``at`` is the companion's time since its start (s); ages are in ms. ``plan_ms`` holds median and 99th
+    percentile. ``beat`` is the autopilot's last heartbeat: type, autopilot, base and custom mode, system
+    status. ``stamp`` is that of the newest signature. ``would``: in a dry run, the last set-point that would
+    have been sent. ``simulated``: whether the autopilot's clock is a simulation's, None before that is known.
+    """
 
     at: float = 0.0
     phase: str = Phase.CONNECT.value
@@ -65,12 +67,12 @@ class State(NamedTuple):
 
     @property
     def ours(self) -> bool:
-        """Whether the companion has the vehicle."""
+        """Whether the companion is in control of the vehicle."""
         return Phase(self.phase) in OURS
 
 
 class News:
-    """Told after every step, tells by ``tell``."""
+    """Status reporter, called after every step; it reports through ``tell``."""
 
     def __init__(
         self,
@@ -84,7 +86,7 @@ class News:
         self._followed, self._signing = followed, signing
         self._tell = tell
         self.plan_times = Histogram()
-        """µs of CPU time."""
+        """CPU time per plan (µs)."""
         self._began: int | None = None
         self._shown: int | None = None
         self._phase: Phase | None = None
@@ -98,11 +100,15 @@ class News:
         self._lately: dict[tuple[str, str], float] = {}
 
     def look(self, now: int, wall: int) -> None:
-        """After the step at ``now`` (µs of its clock)."""
+        """Report changes, and the state when it is due, after the step at ``now`` (µs, own clock).
+
+        ``wall`` is the wall time (µs).
+        """
         self._began = now if self._began is None else self._began
         at = round((now - self._began) * 1e-6, 2)
         phase = self._companion.pilot.phase
-        # Whoever hears of another phase has to know the rest: it may have the last word a moment later.
+        # A change of phase needs the rest of the state at once: the parent may send the hold request a moment
+        # later.
         at_once = phase is not self._phase
         self._changes(at)
         if self._shown is None or at_once or wall - self._shown >= SHOWN:
@@ -110,7 +116,7 @@ class News:
             self._tell(kind="state", **self.state(now)._asdict())
 
     def state(self, now: int) -> State:
-        """How it is at ``now``."""
+        """Return the state at ``now`` (µs)."""
         node, pilot = self._companion, self._companion.pilot
         vehicle, view = pilot.vehicle, node.world.at(now)
         if self._states % _RARELY == 0:
@@ -155,7 +161,7 @@ class News:
         if pilot.landing is not self._landing:
             self._landing = pilot.landing
             if self._landing is not None:
-                # Before the phase: whoever hears that it is over has to know where.
+                # Before the phase: the receiver needs the landing when it receives the final phase.
                 self._tell(kind="landing", **self._landing._asdict())
         sentences = {
             "phase": pilot.phase.value,
@@ -210,7 +216,7 @@ class News:
         return pilot.waiting_for if pilot.phase in _WAITING else ""
 
     def _would(self) -> str:
-        """In words, what a dry run would have sent last."""
+        """Return the last set-point of a dry run as text; empty otherwise."""
         newest = self._departures.newest
         return _words(newest) if isinstance(self._companion, DryRun) and newest is not None else ""
 
@@ -223,7 +229,7 @@ class News:
 
 
 def judgement(rate: float, *, simulated: bool) -> str:
-    """What the autopilot's clock was found to be, in words."""
+    """Return as text what the autopilot's clock was found to be."""
     if simulated:
         return f"a simulation's, {rate:.3f} times as fast as the wall's: it is followed"
     if abs(rate - 1.0) < _PLAIN:
@@ -242,7 +248,7 @@ def _words(message: SetpointLocal) -> str:
 
 
 def mode_of(vehicle: Vehicle) -> str:
-    """The name of the autopilot's mode, empty before it is heard."""
+    """Return the name of the autopilot's mode, empty before the first heartbeat."""
     if vehicle.heartbeat is None or vehicle.profile is None:
         return ""
     return mode_name(vehicle.profile.name.lower(), vehicle.heartbeat.custom_mode)

@@ -1,4 +1,4 @@
-"""A terminal that may stand still, by Ctrl-S or on a line that has frozen: what it does not take is lost."""
+"""Terminal that may block, by Ctrl-S or a frozen connection: output that it does not take is dropped."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from contextlib import suppress
 
 
 class Terminal(io.TextIOBase):
-    """The terminal behind ``fileno``, opened once more: what makes writing to it never wait is a property of
-    the open file, and the other one is shared with the shell. Without a way to open it, ``fileno`` itself is
-    used, and written to where there is room for something."""
+    """Terminal behind ``fileno``, opened a second time for non-blocking output.
+
+    O_NONBLOCK is a property of the open file, and the original one is shared with the shell. If the terminal
+    cannot be opened again, ``fileno`` itself is used and written to while it has room.
+    """
 
     def __init__(self, fileno: int) -> None:
         self._gone = False
@@ -26,22 +28,28 @@ class Terminal(io.TextIOBase):
         return "utf-8"
 
     def isatty(self) -> bool:
+        """Return True: this is a terminal."""
         return True
 
     def writable(self) -> bool:
+        """Return True."""
         return True
 
     def fileno(self) -> int:
+        """Return the file descriptor."""
         return self._fileno
 
     @property
     def takes(self) -> bool:
-        """Whether there is room for something; never again in one that is gone."""
+        """Whether the terminal has room for output; always false once it is gone."""
         return not self._gone and bool(select.select([], [self._fileno], [], 0)[1])
 
     def write(self, text: str) -> int:
-        """All of it, or what it takes; it never waits. What a terminal that is gone refuses counts as
-        written: whoever draws would keep it, to try again."""
+        """Write as much of ``text`` as the terminal takes, without blocking; return the length of ``text``.
+
+        Output that a closed terminal refuses counts as written: the caller would otherwise keep it and try
+        again.
+        """
         data = text.encode("utf-8", "replace")
         try:
             while data and self.takes:
@@ -53,6 +61,7 @@ class Terminal(io.TextIOBase):
         return len(text)
 
     def close(self) -> None:
+        """Close the terminal."""
         if not self.closed:
             super().close()
             with suppress(OSError):

@@ -1,5 +1,7 @@
-"""How the set-points of a rehearsal stand to the flight that was recorded: as they begin where the vehicle
-is, they are near it, in its own frame, and lead where it goes."""
+"""Comparison of a shadow run's set-points with the recorded flight.
+
+Set-points begin at the vehicle's position. So they must be near it, in its own frame, and lead where it goes.
+"""
 
 from __future__ import annotations
 
@@ -11,26 +13,31 @@ from outrider.shadow.setpoints import TOGETHER, Array, Course, course
 from outrider.shadow.shadow_run import Rehearsed
 
 _FRESH: Final = 500_000
-"""µs. An older place says nothing."""
+"""Maximum age of a position (µs); an older one is not compared."""
 _AHEAD: Final = 0.05
-"""s by which a set-point may be ahead of the newest place: look-ahead, delay, and the step."""
+"""Time by which a set-point may lead the newest position (s): look-ahead, delay and the step."""
 _WINDOW: Final = 1_000_000
 BESIDE, ASTRAY = 0.5, 1.0
-"""m that nearly all (99 %, 95 %) of them keep: estimates are wrong by decimetres, and late. What a recorded
-PX4 said of itself went 0.5 m astray in a second."""
+"""Limits (m) that 99 % and 95 % of the set-points keep: estimates are wrong by decimetres, and late.
+
+A recorded PX4's own estimates diverged by 0.5 m in a second.
+"""
 
 
 class Likeness(NamedTuple):
-    """``beside``: how far (m) set-points are from where the vehicle was, its own motion since taken off, 99 %
-    of them; ``astray``: how far (m) the velocities of a second lead from where its positions do, 95 % of the
-    seconds. None where there is nothing to measure."""
+    """Result of the comparison; None where there is nothing to measure.
+
+    ``beside``: distance (m) of set-points from the vehicle's position, less its own motion since then, 99th
+    percentile. ``astray``: distance (m) between where the velocities of one second lead and where the
+    positions do, 95th percentile over the seconds.
+    """
 
     beside: float | None
     astray: float | None
 
     @property
     def faults(self) -> list[str]:
-        """What is wrong, in words."""
+        """Faults found, as text."""
         found = []
         if self.beside is not None and self.beside > BESIDE:
             found.append(f"{self.beside:.2f} m beside the vehicle; another frame, or another time")
@@ -40,7 +47,7 @@ class Likeness(NamedTuple):
 
 
 def likeness(found: Rehearsed) -> Likeness:
-    """Of what would have been sent, and the places of the vehicle itself."""
+    """Compare the set-points that would have been sent with the vehicle's own positions."""
     of = course(found.would)
     return Likeness(_quantile(_beside(of, found), 99), _quantile(_astray(of), 95))
 
@@ -60,7 +67,7 @@ def _beside(of: Course, found: Rehearsed) -> Array:
 
 
 def _astray(of: Course) -> Array:
-    """Over each second without a gap."""
+    """Return the deviation (m) over each second without a gap."""
     if len(of.times) < 2:
         return np.zeros(0)
     spans = np.diff(of.times)

@@ -1,4 +1,4 @@
-"""What leaves a companion, seen at the last moment: a tap that counts frames, commands and set-points."""
+"""Transmit statistics: a tap that counts a companion's outgoing frames, commands and set-points."""
 
 from __future__ import annotations
 
@@ -19,10 +19,14 @@ _COMMAND: Final = Struct("<28xH")
 
 
 class Departures:
-    """``messages`` by link, ``commands`` to the autopilot by their number, and ``setpoints``."""
+    """Counters of a companion's outgoing frames, and the check of its set-points.
+
+    ``messages`` counts frames by link, ``commands`` those to the autopilot by number; ``setpoints`` is the
+    check, ``newest`` the last set-point.
+    """
 
     def __init__(self, limits: LimitsConfig, compensation: float = 0.0) -> None:
-        """``compensation``: what may be added to a plan's acceleration, m/s²."""
+        """Start the counters; ``compensation``: what may be added to a plan's acceleration (m/s²)."""
         self.messages: Counter[str] = Counter()
         self.commands: Counter[int] = Counter()
         self.setpoints = gauge_for(limits, compensation=compensation)
@@ -30,9 +34,10 @@ class Departures:
         self._codec = Codec(lambda identifier, _system, _component: identifier == _SETPOINT)
 
     def begin(self, now: int, node: str, /) -> None:
-        """Nothing to do."""
+        """Do nothing; a tap needs this method."""
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
+        """Count the frames of an outgoing datagram, and check its set-points."""
         if direction != "out":
             return
         for frame in leading_frames(datagram.data)[0]:
@@ -46,6 +51,6 @@ class Departures:
                         self.take(now, message)
 
     def take(self, now: int, message: SetpointLocal) -> None:
-        """A set-point that leaves at ``now`` (µs), or would."""
+        """Add a set-point that is sent, or would be sent, at ``now`` (µs)."""
         self.setpoints.take(now, message)
         self.newest = message

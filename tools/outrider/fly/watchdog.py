@@ -1,30 +1,32 @@
-"""Whether another process is alive, by when it was heard last."""
+"""Watchdog of another process, by the time of its last message."""
 
 from __future__ import annotations
 
 from typing import Final
 
 FIRST: Final = 10.0
-"""s that a process may take until it is heard first: on a busy machine it only begins then."""
+"""Time limit for the first message of a process (s): on a busy machine it only begins then."""
 HUNG: Final = 2.0
-"""s without news after which a process that was heard is taken for hung."""
+"""Time without a message after which a process that was received before counts as hung (s)."""
 _LATE: Final = 0.5
 
 
 class Pulse:
-    """Of a process that was started at ``now`` (s). Whoever looks late himself has to look again: what held
-    him up has held up the other as well."""
+    """Watchdog of a process that was started at ``now`` (s).
+
+    A late poll restarts the time-out: what delayed the caller may have delayed the other process as well.
+    """
 
     def __init__(self, now: float) -> None:
         self._since = self._looked = now
         self._limit = FIRST
 
     def heard(self, now: float) -> None:
-        """Something came."""
+        """Restart the time-out: a message arrived."""
         self._since, self._limit = now, HUNG
 
     def stopped(self, now: float) -> bool:
-        """Whether it has been silent for too long; asked many times a second."""
+        """Return whether the process has been silent for too long; polled many times a second."""
         if now - self._looked > _LATE:
             self._since = now
         self._looked = now

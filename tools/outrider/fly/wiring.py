@@ -1,4 +1,4 @@
-"""The links of a companion, opened: each physical link once, however many of the companion's lead over it."""
+"""Links of a companion, opened: each physical link once, however many of the companion's links use it."""
 
 from __future__ import annotations
 
@@ -20,45 +20,53 @@ from outrider.errors import InputError
 from outrider.supervision.duplicate_ids import Twin
 
 LAST_VEHICLE = 250
-"""System ids above are ground stations'."""
+"""Highest system id of a vehicle; those above are ground stations'."""
 _COMMANDS = (75, 76)
 _SWARMS = frozenset((33, 111, 385))
-"""What companions tell each other: GLOBAL_POSITION_INT, TIMESYNC, TUNNEL. Other news may be anybody's."""
+"""Messages between companions: GLOBAL_POSITION_INT, TIMESYNC, TUNNEL.
+
+Other messages may come from any sender.
+"""
 
 
 class Wiring(NamedTuple):
-    """``ends`` by the companion's name for a link; ``dealers`` are the physical links, ``twin`` listens on
-    all of them."""
+    """Open links of a companion.
+
+    ``ends`` maps the companion's names of links to links. ``dealers`` are the physical links; ``twin``
+    observes all of them.
+    """
 
     ends: dict[str, DealtLink]
     dealers: list[Dealer]
     twin: Twin
 
     def physical(self, name: str) -> Link:
-        """The link below the end of that ``name``."""
+        """Return the physical link below the end of that ``name``."""
         return next(dealer.link for dealer in self.dealers if name in dealer.ends)
 
     def drain(self) -> None:
-        """Forget what has arrived: what was said before nobody listened counts no more."""
+        """Discard what has arrived: messages from before the start do not count."""
         for dealer in self.dealers:
             dealer.forget()
 
     def lend(self) -> None:
-        """A process that was forked has them now."""
+        """Release serial ports in this process: a forked process uses the links now."""
         for dealer in self.dealers:
             if isinstance(dealer.link, SerialPort):
                 dealer.link.let_go()
 
     def close(self) -> None:
-        """All of them."""
+        """Close all links."""
         for end in self.ends.values():
             end.close()
 
 
 def wants(name: str, system: int, target: int, config: CompanionConfig) -> Wants:
-    """Which frames of a physical link belong to the companion's link of that ``name``: all that it listens to
-    there (``reception``), and what its log shall have. What it said itself, and comes back, belongs to
-    none."""
+    """Return a predicate for the frames of a physical link that belong to the companion's link ``name``.
+
+    These are all frames that the companion receives there (``reception``), and those that its log records.
+    Its own frames that come back belong to no link.
+    """
     accepted = accepts(name, system, target, config)
 
     def autopilot(header: Header) -> bool:
@@ -95,7 +103,7 @@ def wants(name: str, system: int, target: int, config: CompanionConfig) -> Wants
 def wire(
     endpoints: dict[str, Endpoint], system: int, target: int, config: CompanionConfig, clock: Clock
 ) -> Wiring:
-    """Open them. InputError if one cannot be; then none stays open."""
+    """Open the links. Raises InputError if one cannot be opened; then none stays open."""
     with ExitStack() as opened:
         dealers = []
         twin = Twin(system, clock)

@@ -1,4 +1,4 @@
-"""The process that flies: the companion under its clock over its links, until it is told to end."""
+"""Flying process: the companion under its clock and over its links, until the parent asks it to end."""
 
 from __future__ import annotations
 
@@ -39,12 +39,19 @@ _IGNORED: Final = (
     signal.SIGTTIN,
     signal.SIGTTOU,
 )
-"""The parent alone is told by signals when to end; a terminal that is closed or stopped ends no flight."""
+"""Signals that the child ignores.
+
+The parent alone handles them, and a terminal that is closed or stopped ends no flight.
+"""
 
 
 class Worker:
-    """``links`` by the companion's names, on which ``twin`` listens; ``directory`` gets the log.
-    ``simulated``: what a process before this one has found the autopilot's clock to be; None: it has not."""
+    """Body of the flying process.
+
+    ``links`` maps the companion's names to links, which ``twin`` observes; the log is written to
+    ``directory``. ``simulated``: whether an earlier process found the autopilot's clock to be a simulation's;
+    None if that is unknown.
+    """
 
     def __init__(
         self,
@@ -72,20 +79,22 @@ class Worker:
         )
 
     def resume(self, newest: int) -> None:
-        """Go on after another process, whose signatures went up to that stamp: a simulation's time may run
-        ahead of the wall's."""
+        """Continue after another process, whose newest signature had the stamp ``newest``.
+
+        A simulation's time may run ahead of the wall's.
+        """
         if self._signing is not None:
             self._signing.resume(newest)
 
     def followed(self, wall: Clock) -> FollowedClock | None:
-        """The clock that it lives by; None for ``wall``."""
+        """Return the clock that the companion runs on; None for ``wall`` itself."""
         asked = self._asked.config.clock
         if asked == "wall":
             return None
         return FollowedClock(wall, wall.now(), simulated=True if asked == "autopilot" else self._simulated)
 
     def main(self) -> None:
-        """The process, from fork to exit."""
+        """Run the process, from fork to exit."""
         for which in _IGNORED:
             signal.signal(which, signal.SIG_IGN)
         if self._asked.realtime:
@@ -94,7 +103,7 @@ class Worker:
             sharpen_timers()
         with Log(self._directory, self._asked.system, self._lament) as log:
             status = self._flown(log)
-            # The parent has the last word from here on; files take their time.
+            # From here on the parent sends the hold request; writing files takes time.
             self._orders.tell(kind="left")
         sys.exit(status)
 
@@ -151,7 +160,7 @@ class Worker:
                 self._leave(loop, news, departures, 1.0 if followed is None else followed.rate)
 
     def _leave(self, loop: RealTime, news: News, departures: Departures, rate: float) -> None:
-        """What the summary needs."""
+        """Report the figures that the summary needs."""
         node, statistics = self.companion, loop.statistics
         for reading in node.shed():
             news.plan_times.add(reading // 1000)

@@ -1,7 +1,7 @@
-"""Logs that drive a companion again.
+"""Replay: takes logs, drives companions or links with them, and gives a comparison or set-points.
 
-run directory → runs → reenactment   a flight of ours: the same bytes out?
-any tlog → casting → rehearsal       a flight of others: what would ours have sent?
-any tlog → chase                     a vehicle of ours escorts what was recorded
-any tlog → telemetry                 what vehicles said of themselves, onto a live link
+- Run directory: ``run_replay``, ``companion_replay``. Does each companion send the same bytes again?
+- Any tlog, ``--own``: ``outrider.shadow``. What would an own companion have sent?
+- Any tlog, ``--target``: ``target_replay``. An own vehicle escorts the recorded target.
+- Any tlog, ``--to``: ``telemetry``. Recorded telemetry is sent to a live link.
 """

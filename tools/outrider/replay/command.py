@@ -1,4 +1,4 @@
-"""``outrider replay RUN_DIR``: whether each companion, given what it received, sends again what it sent."""
+"""Command ``outrider replay RUN_DIR``: re-runs each companion and compares what it sends."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from outrider.terminal.share_progress import share_progress
 
 
 def replay(directory: Path, as_json: bool = False) -> int:
-    """Go through the run in ``directory`` again and say how it went; the exit status: 0 all the same, 1 not.
+    """Re-run the flight in ``directory`` and report; return 0 if all bytes are the same, otherwise 1.
 
-    InputError for a directory without a run.
+    Raises InputError for a directory without a run.
     """
     with share_progress() as watch:
         found = again(directory, watch)
@@ -55,7 +55,7 @@ def _show(name: str, found: tuple[Reenacted, ...]) -> None:
         row = (one.system, one.steps, one.frames, one.setpoints, one.different, one.stray)
         table.add_row(*map(str, row))
     console = Console()
-    # Above the table, where a long name breaks no words.
+    # Printed above the table, so that a long name is not broken.
     heading = Text(f"{name} · {'the same to the last bit' if same else 'not the same'}")
     console.print(heading, soft_wrap=True)
     console.print(table)
@@ -65,7 +65,7 @@ def _show(name: str, found: tuple[Reenacted, ...]) -> None:
 
 
 def words(difference: Difference) -> str:
-    """Where two flights part, and by which fields of which messages."""
+    """Return time, message and fields in which two flights first differ, as text."""
     before, after = _read(difference.logged), _read(difference.again)
     where = f"at {difference.time} µs"
     if before is None or after is None or type(before) is not type(after):

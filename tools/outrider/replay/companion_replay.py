@@ -1,5 +1,8 @@
-"""A companion goes through its flight again: told the same times, given what its log says that it received,
-it must send what its log says that it sent, byte by byte."""
+"""Replay of one companion from its log.
+
+The companion is stepped at the recorded times with the recorded input. It must send what its log contains,
+byte by byte.
+"""
 
 from __future__ import annotations
 
@@ -15,18 +18,18 @@ from outrider.runs import names
 
 _LINKS = {number: link for link, number in names.LINK_NUMBERS.items()}
 SETPOINT = 84
-"""SET_POSITION_TARGET_LOCAL_NED."""
+"""Id of SET_POSITION_TARGET_LOCAL_NED."""
 
 
 class Sent(NamedTuple):
-    """A frame, and the link that it left by."""
+    """Frame, and the link it was sent on."""
 
     link: str
     frame: bytes
 
 
 class Difference(NamedTuple):
-    """The first frame that is another: at ``time`` (µs); None where one side has no more at that time."""
+    """First frame that differs, at ``time`` (µs); None where one side has no more frames at that time."""
 
     time: int
     logged: Sent | None
@@ -34,8 +37,11 @@ class Difference(NamedTuple):
 
 
 class Reenacted(NamedTuple):
-    """How it went for one vehicle. ``frames`` sent that are the same, ``setpoints`` among them; ``different``
-    counts those that are not; ``stray``: records at times at which the companion was not stepped."""
+    """Result for one vehicle.
+
+    ``frames`` counts sent frames that are the same, ``setpoints`` the set-points among them, ``different``
+    those that differ. ``stray``: records at times at which the companion was not stepped.
+    """
 
     system: int
     steps: int
@@ -58,8 +64,10 @@ def reenact(
     records: Iterable[Record],
     watch: Callable[[int], None] = lambda _time: None,
 ) -> Reenacted:
-    """Step ``companion``, whose system and component id are ``own``, at ``steps`` (µs) with what ``records``
-    has at these times; ``watch`` is told each."""
+    """Step ``companion`` at ``steps`` (µs) with what ``records`` contain at these times, and compare.
+
+    ``own`` is its system and component id; ``watch`` receives the time of each step.
+    """
     together = _Together(records)
     count = frames = setpoints = different = 0
     first: Difference | None = None
@@ -85,7 +93,7 @@ def reenact(
 
 
 class _Together:
-    """Records by their time: those of one time are asked for once, in order of time."""
+    """Records grouped by time; each time is requested once, in increasing order."""
 
     def __init__(self, records: Iterable[Record]) -> None:
         self._records: Iterator[Record] = iter(records)
@@ -93,7 +101,7 @@ class _Together:
         self._stray = 0
 
     def at(self, now: int) -> list[Sent]:
-        """All at ``now`` (µs); what was earlier and nobody asked for is stray."""
+        """Return all records at ``now`` (µs); earlier ones that were not requested count as stray."""
         found = []
         while self._next is not None and self._next.time <= now:
             if self._next.time == now:
@@ -104,7 +112,7 @@ class _Together:
         return found
 
     def stray(self) -> int:
-        """How many nobody asked for, now that nobody asks any more."""
+        """Return the number of records that were not requested; call it last."""
         left = 0 if self._next is None else 1
         self._next = None
         return self._stray + left + sum(1 for _ in self._records)

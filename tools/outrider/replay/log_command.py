@@ -1,4 +1,4 @@
-"""``outrider replay LOG --own ID``: what a companion would have sent, beside what was sent."""
+"""Command ``outrider replay LOG``: compares what a companion would have sent with what was sent."""
 
 from __future__ import annotations
 
@@ -28,14 +28,15 @@ from outrider.terminal.share_progress import share_progress
 from outrider.yaml_files.yaml_file import load
 
 Pacing = Callable[[Iterable[Record]], Iterable[Record]]
-"""Lets records through, when it is their time."""
+"""Filter that passes records on when they are due."""
 
 
 def rehearsal(log: Path, cast: Cast, like: str, out: Path | None, as_json: bool, pacing: Pacing) -> int:
-    """Let a companion with the settings of the scenario ``like`` listen to ``log``, and say what it would
-    have sent; leave ``setpoints.csv``, ``replay.json`` and ``replay.png`` in ``out``. The exit status: 0.
+    """Run a companion over ``log`` with the settings of scenario ``like``, report, and return 0.
 
-    InputError for a log that cannot be read, and for ids that are not in it.
+    The report says what it would have sent. ``setpoints.csv``, ``replay.json`` and ``replay.png`` are written
+    to ``out``. Raises InputError for a log that cannot be read, for ids that are not in it, and for certified
+    avoidance.
     """
     config = load(find("scenarios", like), Scenario).companion
     if config.avoidance == "certified":
@@ -57,8 +58,10 @@ def rehearsal(log: Path, cast: Cast, like: str, out: Path | None, as_json: bool,
 
 
 def chasing(log: Path, target: int, like: str, out: Path | None, as_json: bool) -> int:
-    """Fly a vehicle of ours around ``target``, and say what it was sent; the run, and the same files, are
-    left in ``out``. The exit status: 0. InputError as for ``rehearsal``."""
+    """Fly an own vehicle around ``target``, report what it was sent, and return 0.
+
+    The run and the same files are written to ``out``. Raises InputError as ``rehearsal`` does.
+    """
     try:
         seen = survey(read_tlog(log), target, str(log))
         flight = prepared(log, seen, target, like)
@@ -82,7 +85,7 @@ def _tell(title: str, found: Rehearsed, directory: Path, as_json: bool) -> None:
 
 
 def _directory(out: Path | None, stem: str) -> Path:
-    """A new, empty directory: ``out``, or the first free ``runs/replay-STEM``."""
+    """Create a new, empty directory: ``out``, or the first free ``runs/replay-STEM``."""
     return new_directory(out, f"replay-{stem}")
 
 
@@ -112,7 +115,7 @@ def _show(title: str, document: dict[str, object], directory: Path) -> None:
     if said and isinstance(apart_m, dict):
         table.add_row("apart, m: p50, p95", f"{_text(apart_m['p50'])}, {_text(apart_m['p95'])}", "")
     console = Console()
-    # Above the table, where a long name is not broken.
+    # Printed above the table, so that a long name is not broken.
     console.print(Text(title), soft_wrap=True)
     console.print(table)
     if isinstance(reasons, dict):

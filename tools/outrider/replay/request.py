@@ -1,4 +1,4 @@
-"""What ``outrider replay`` was asked for: whose part in which log, how fast, and where to."""
+"""Request of ``outrider replay``: log, ids, speed and destination."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _ASKED = "allowed: --list, --own ID, --target ID, --to ENDPOINT, or the director
 
 
 class Request(NamedTuple):
-    """The options of the command, as they were given."""
+    """Options of the command, as they were given."""
 
     log: Path
     own: int | None = None
@@ -37,7 +37,10 @@ class Request(NamedTuple):
     as_json: bool = False
 
     def run(self) -> int:
-        """Do it; the exit status. InputError for what does not go together."""
+        """Run the replay and return the exit status.
+
+        Raises InputError for options that exclude each other.
+        """
         if self.speed is not None and not self.speed > 0.0:
             raise InputError(f"--speed {self.speed}: must be more than 0")
         if self.log.is_dir():
@@ -58,7 +61,7 @@ class Request(NamedTuple):
             return rehearsal(self.log, cast, self.like, self.out, self.as_json, pacing)
 
     def _send(self) -> int:
-        """The log's telemetry to the endpoint."""
+        """Send the log's telemetry to the endpoint."""
         try:
             records = read_tlog(self.log)
             with self._paced() as pacing, share_progress() as watch:
@@ -72,8 +75,11 @@ class Request(NamedTuple):
 
     @contextmanager
     def _paced(self) -> Iterator[Pacing]:
-        """What lets records through at the speed asked for, and sends them where that was asked for: then at
-        the log's own speed, unless another is given."""
+        """Yield a filter that passes records on at the requested speed.
+
+        With an endpoint it also sends their telemetry there; the speed is then the log's own unless another
+        one is given.
+        """
         clock = WallClock()
         if self.to is None:
             yield lambda records: paced(records, clock, self.speed)
@@ -104,7 +110,7 @@ class Request(NamedTuple):
 
 
 def _systems(words: str | None) -> frozenset[int] | None:
-    """System ids out of ``11,12``."""
+    """Return the system ids in a text such as ``11,12``."""
     if words is None:
         return None
     found = set()

@@ -1,4 +1,4 @@
-"""All flights of a run directory gone through again."""
+"""Replay of all companions of a run directory."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from sitl.vehicle.config import VehicleConfig
 
 _ALLOWED = "allowed: what outrider swarm SCENARIO --out leaves"
 _OFTEN = 256
-"""Steps from one look at the progress to the next."""
+"""Number of steps between two progress reports."""
 
 Watch = Callable[[str, float], None]
 
 
 def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[Reenacted, ...]:
-    """The companions of the run in ``directory``, made anew from its configuration and driven by its logs;
-    ``watch`` hears whose log it is, and the share that is done.
+    """Re-run the companions of the run in ``directory``, made from its configuration, from its logs.
 
-    Raises InputError where there is no run, or a vehicle's log or steps are missing.
+    ``watch`` receives the name of the log and the share that is done. Raises InputError where there is no
+    run, or a vehicle's log or steps are missing.
     """
     flown = resolved(directory, _ALLOWED, "{} with --own ID, or --list")
     vehicle = load(find("vehicles", flown.scenario.vehicle), VehicleConfig)
@@ -42,21 +42,21 @@ def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[
         steps = read_steps(directory / names.steps(system)).tolist()
         shares = _Shares(watch, names.log(system), (k, len(fleet.systems)), len(steps))
         records = read_tlog(directory / names.log(system))
-        # What planning cost is of no interest here.
+        # Planning time is irrelevant here.
         companion = fleet.companion(k, lambda: 0)
         found.append(reenact(companion, (system, COMPONENT), steps, records, shares.step))
     return tuple(found)
 
 
 class _Shares:
-    """Tells ``watch`` now and then how far the ``steps`` of one of several logs have gone."""
+    """Progress reports to ``watch`` for the ``steps`` of one of several logs."""
 
     def __init__(self, watch: Watch, name: str, which: tuple[int, int], steps: int) -> None:
         self._watch, self._name, self._which, self._steps = watch, name, which, steps
         self._done = 0
 
     def step(self, _now: int) -> None:
-        """One more."""
+        """Count one more step."""
         self._done += 1
         if self._done % _OFTEN == 0 or self._done == self._steps:
             before, logs = self._which

@@ -1,4 +1,4 @@
-"""``outrider replay LOG --target ID``: a simulated vehicle of ours escorts what the log recorded."""
+"""Command ``outrider replay LOG --target ID``: a simulated own vehicle escorts the recorded target."""
 
 from __future__ import annotations
 
@@ -21,14 +21,17 @@ from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 _ROOM = 20.0
-"""m around all places of the target that are flown in."""
+"""Margin around all positions of the target that is flown in (m)."""
 _LONGEST_S = 3600.0
 
 
 def prepared(log: Path, seen: Survey, target: int, like: str) -> Prepared:
-    """One vehicle with the companion's settings of the scenario ``like`` around ``target``, of which ``seen``
-    is the survey, from the first record of the log to the last, an hour at most. InputError for settings that
-    are of no use."""
+    """Return a flight of one vehicle around the recorded ``target``.
+
+    It has the companion's settings of the scenario ``like`` and lasts from the first record of the log to the
+    last, an hour at most. ``seen`` is the survey of the target. Raises InputError for settings that cannot be
+    flown.
+    """
     base = load(find("scenarios", like), Scenario)
     limits, fleet = base.companion.limits, seen.fleet
     far = seen.reach + _ROOM
@@ -63,7 +66,7 @@ def prepared(log: Path, seen: Survey, target: int, like: str) -> Prepared:
 
 
 def setpoints(log: Path) -> list[tuple[int, SetpointLocal]]:
-    """All SET_POSITION_TARGET_LOCAL_NED of a log, with their times (µs)."""
+    """Return all SET_POSITION_TARGET_LOCAL_NED of a log, with their times (µs)."""
     codec = Codec(lambda identifier, _system, _component: identifier == SETPOINT)
     return [
         (record.time, message)

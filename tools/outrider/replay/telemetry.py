@@ -1,8 +1,8 @@
-"""A log's telemetry onto a live link: what vehicles said of themselves, and never what was asked of them.
+"""Telemetry of a log, sent to a live link: reports of vehicles, never requests or commands.
 
 A log also holds the commands, set-points, parameters and missions of ground stations; sent again they would
-fly a real vehicle. So messages are chosen by a list of those that ask nothing, and only from senders that are
-no ground station: the system ids of the log that give a vehicle's heartbeat.
+fly a real vehicle. So messages are selected by a list of those that request nothing. They are sent only for
+senders that are no ground station: the system ids of the log that send a vehicle's heartbeat.
 """
 
 from __future__ import annotations
@@ -53,28 +53,28 @@ _NAMES = [
     "TERRAIN_REPORT",
     "NAMED_VALUE_FLOAT",
 ]
-# Not among them is what an autopilot takes in as a sensor's word: ODOMETRY, DISTANCE_SENSOR, ADSB_VEHICLE,
-# SYSTEM_TIME and their like. A vehicle that follows another by its GLOBAL_POSITION_INT would follow a log.
+# Messages that an autopilot takes as sensor input are left out: ODOMETRY, DISTANCE_SENSOR, ADSB_VEHICLE,
+# SYSTEM_TIME and similar. A vehicle that follows another by its GLOBAL_POSITION_INT would follow a log.
 TELEMETRY: Final = frozenset(getattr(dialect, f"MAVLINK_MSG_ID_{name}") for name in _NAMES)
-"""Ids of messages that tell and ask nothing."""
+"""Ids of messages that report and request nothing."""
 _HEARTBEAT, _GROUND_STATION = 0, 6
 _TYPE_AT = 4
-"""Where the MAV_TYPE is in a HEARTBEAT's payload."""
+"""Offset of MAV_TYPE in a HEARTBEAT's payload."""
 _PAYLOAD = {0xFE: 6, 0xFD: 10}
 
 
 class Forwarder:
-    """Sends the telemetry among the records that pass to ``link``."""
+    """Sender of the telemetry among records to ``link``."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
         self._vehicles: set[tuple[int, int]] = set()
         self.sent = self.kept = 0
-        """Frames that were sent, and that were not."""
+        """Numbers of frames that were sent, and that were not."""
 
     def take(self, frame: bytes) -> None:
         """Send ``frame`` if it is a vehicle's telemetry."""
-        # A listener learns from what it receives whom to send to; what that says is nobody's business here.
+        # A listening link learns its destinations from what it receives; the content is ignored.
         self._link.receive()
         system, component, message_id = header(frame)
         if message_id == _HEARTBEAT:
@@ -93,8 +93,10 @@ class Forwarder:
 def paced(
     records: Iterable[Record], clock: Clock, speed: float | None, forwarder: Forwarder | None = None
 ) -> Iterator[Record]:
-    """The records on one time line (see ``timeline``), each no earlier than its time says at ``speed`` times
-    the log's (None: at once); long silence is cut short."""
+    """Yield the records on one time line (see ``timeline``), each no earlier than its time.
+
+    ``speed`` is a multiple of the log's (None: without waiting). Long silence is shortened.
+    """
     before: int | None = None
     due = clock.now()
     for record in on_one_line(records):

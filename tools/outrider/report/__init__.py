@@ -1,7 +1,9 @@
-"""A run directory as one HTML page that needs nothing but itself:
+"""Report of a run directory as one self-contained HTML page.
+
+::
 
     directory → reading → run (motions, plans, logs) → charts, events, loss, scene → page
 
-What is missing or damaged is named on the page; the rest of it stands. The page's own program and looks lie
-in ``static/``: they draw, and work out nothing that could be worked out here.
+The page lists missing or damaged files and shows the rest. The page's scripts and styles are in ``static/``:
+they only draw; everything that can be computed here is computed here.
 """

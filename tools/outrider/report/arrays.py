@@ -1,4 +1,4 @@
-"""The ``.npz`` files of a run, checked: what is damaged is said, and never guessed."""
+"""Reader of a run's ``.npz`` files with checks: damage is reported, missing values are not guessed."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from outrider.errors import InputError
 from outrider.report.run import Array, Motions, Plans, PlanTimes
 
 MOST_BYTES = 1 << 30
-"""All arrays of a file together: an hour of a hundred vehicles at 50 Hz has half of it."""
+"""Largest total size of a file's arrays: an hour of a hundred vehicles at 50 Hz has half of it."""
 _LONGEST = 1e5
-"""s"""
+"""Largest time (s) from the goal event."""
 _FAR = 1e9
-"""m, m/s, rad: more is damage."""
+"""Largest magnitude (m, m/s, rad): more is damage."""
 
 _MOTIONS = {
     "system": ("K",),
@@ -43,18 +43,18 @@ _DAMAGE = (
     EOFError,
     MemoryError,
     OverflowError,
-    RuntimeError,  # of zipfile: encrypted, or by a method that it does not know
+    RuntimeError,  # from zipfile: encrypted, or compressed with an unknown method
     struct.error,
     zipfile.BadZipFile,
     zlib.error,
 )
-"""What reading a damaged archive of arrays may raise."""
+"""Exceptions that reading a damaged archive of arrays may raise."""
 
 Shapes = Mapping[str, Sequence[int | str]]
 
 
 def motions(path: Path) -> Motions:
-    """``flight.npz``. Raises InputError, which says what is wrong with it."""
+    """Read ``flight.npz``. Raises InputError, which names the fault."""
     arrays = _read(path, _MOTIONS)
     time = arrays["time_s"]
     if not len(time):
@@ -64,7 +64,7 @@ def motions(path: Path) -> Motions:
     if not (np.diff(time) > 0.0).all():
         raise InputError(f"{path.name}: time_s does not rise")
     system = tuple(arrays["system"].astype(int).tolist())
-    # Where there is nothing separation is infinite; anything else is not known.
+    # An infinite separation means that there is no pair; other values out of range are unknown.
     rest = [
         arrays[name] if name == "separation" else np.where(np.abs(arrays[name]) < _FAR, arrays[name], np.nan)
         for name in _MOTIONS
@@ -74,7 +74,7 @@ def motions(path: Path) -> Motions:
 
 
 def plans(path: Path) -> Plans:
-    """``plans.npz``. Raises InputError."""
+    """Read ``plans.npz``. Raises InputError."""
     arrays = _read(path, _PLANS)
     gradient = arrays["gradient"]
     size = np.linalg.norm(np.where(np.abs(gradient) < _FAR, gradient, np.nan), axis=1)
@@ -82,13 +82,13 @@ def plans(path: Path) -> Plans:
 
 
 def plan_times(path: Path) -> PlanTimes:
-    """``plan_times.npz``. Raises InputError."""
+    """Read ``plan_times.npz``. Raises InputError."""
     arrays = _read(path, _PLAN_TIMES)
     return PlanTimes(arrays["system"].astype(np.int64), arrays["plan_ms"])
 
 
 def _read(path: Path, shapes: Shapes) -> dict[str, Array]:
-    """Arrays by name, as float64, in shapes that fit each other. Raises InputError."""
+    """Read arrays by name, as float64, with consistent shapes. Raises InputError."""
     found: dict[str, Array] = {}
     try:
         with zipfile.ZipFile(path) as archive:

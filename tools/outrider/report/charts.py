@@ -1,4 +1,4 @@
-"""What is drawn over time, and how often plans took how long: figures only."""
+"""Data of the charts over time and of the histogram of planning times: numbers only."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ BINS = 80
 
 
 class Level(NamedTuple):
-    """A horizontal line: ``value`` in the chart's unit."""
+    """Horizontal line at ``value``, in the chart's unit."""
 
     name: str
     value: float
 
 
 class Line(NamedTuple):
-    """``values`` (n,) over the shown times; of a vehicle if it has a ``system``."""
+    """Curve with ``values`` (n,) at the shown times; ``system`` is its vehicle, or None."""
 
     name: str
     system: int | None
@@ -34,7 +34,10 @@ class Line(NamedTuple):
 
 
 class Chart(NamedTuple):
-    """One of them. ``bent``: the scale is linear below so much, and logarithmic above; 0 for linear."""
+    """Chart.
+
+    The scale is linear below ``bent`` and logarithmic above it; if ``bent`` is 0, all of it is linear.
+    """
 
     key: str
     title: str
@@ -46,8 +49,11 @@ class Chart(NamedTuple):
 
 
 class Histogram(NamedTuple):
-    """CPU times of plans: ``counts`` (BINS,) in even bins from 0 to ``most`` ms, what is longer in the last;
-    how many there are, and their percentiles, ms."""
+    """Histogram of the CPU times of plans.
+
+    ``counts`` (BINS,) are in even bins from 0 to ``most`` ms; the last bin includes longer times. ``plans``
+    is the number of plans; percentiles and the longest time are in ms.
+    """
 
     counts: tuple[int, ...]
     most: float
@@ -60,8 +66,10 @@ class Histogram(NamedTuple):
 def charts(
     run: Run, motions: Motions, shown: np.ndarray, losses: Losses, late: Mapping[int, float]
 ) -> list[Chart]:
-    """All for which there is something, over the samples ``shown`` (n,). ``late``: by how many s a vehicle's
-    clock is ahead (``clocks.errors``), for plans are dated by it."""
+    """Return all charts that have data, over the samples ``shown`` (n,).
+
+    ``late`` is by how many s a vehicle's clock is ahead (``clocks.errors``): plans are dated by that clock.
+    """
     found = [_separation(run, motions, shown)]
     where = _where(run, motions)
     if where is not None:
@@ -84,7 +92,7 @@ def charts(
 
 
 def histogram(times: PlanTimes | None) -> Histogram | None:
-    """Of all plans; None if there is none."""
+    """Return the histogram of all plans; None if there is none."""
     spent = np.empty(0) if times is None else times.spent[np.isfinite(times.spent)]
     if not len(spent):
         return None
@@ -95,7 +103,7 @@ def histogram(times: PlanTimes | None) -> Histogram | None:
 
 
 def _lines(motions: Motions, values: Array) -> tuple[Line, ...]:
-    """Of each vehicle; ``values`` (n, k), those that fly the task first."""
+    """Return one line for each vehicle; ``values`` (n, k), with the vehicles that fly the task first."""
     return tuple(
         Line(str(system), system, values[:, k]) for k, system in enumerate(motions.system[: values.shape[1]])
     )
@@ -121,7 +129,7 @@ def _separation(run: Run, motions: Motions, shown: np.ndarray) -> Chart:
 
 
 def _where(run: Run, motions: Motions) -> tuple[str, str, Array] | None:
-    """How far each vehicle that flies the task is from where it should be (T, k), m."""
+    """Return title, note and distances (T, k), m, of the vehicles that fly the task from goal or surface."""
     scenario = run.scenario
     if scenario is None or len(motions.system) != scenario.size:
         return None

@@ -1,8 +1,8 @@
-"""When the records of a log were on the flight's clock: each companion lives by a clock of its own, and a
-run in real time begins at any hour.
+"""Time offsets between the clocks of the logs and the flight's clock.
 
-Log and flight begin together, within a second or so. From there on the velocity that the autopilot told is
-laid over the true one, and where it fits best is how far apart the clocks are.
+Each companion has a clock of its own, and a real-time run starts at an arbitrary time. A log and the flight
+start within a second or so of each other. From there the velocity reported by the autopilot is shifted in
+time against the true velocity; the best fit gives the offset of the clocks.
 """
 
 from __future__ import annotations
@@ -14,17 +14,20 @@ import numpy as np
 from outrider.report.run import Array, Log, Motions, Times
 
 REACH = 5.0
-"""s by which log and flight may begin apart."""
+"""Largest difference (s) between the starts of log and flight."""
 _COARSE, _FINE = 0.1, 0.005
 _STILL = 0.05
-"""m/s: who never moved faster cannot be laid over anything."""
+"""Speed (m/s) that a vehicle must have reached for a fit."""
 _MOST = 3000
-"""So many velocities of a log settle it."""
+"""Approximate number of velocities used; so many suffice."""
 
 
 def offset(log: Log, motions: Motions) -> float:
-    """Seconds to add to a time of ``log`` (s since its first record) to have seconds after the goal event.
-    Good to the delay between vehicle and companion, some 20 ms."""
+    """Return the seconds to add to a time of ``log`` to get seconds after the goal event.
+
+    Times of the log count from its first record. The offset is accurate to the delay between vehicle and
+    companion, about 20 ms.
+    """
     guess = float(motions.time[0])
     if log.owner not in motions.system or len(log.moments) < 2:
         return guess
@@ -43,20 +46,25 @@ def offset(log: Log, motions: Motions) -> float:
 
 
 def errors(logs: Sequence[Log], offsets: dict[int, float]) -> dict[int, float]:
-    """By how many seconds each companion's clock is ahead of the fleet's, by the middle one of them; by
-    owner. ``offsets``: see ``offset``."""
+    """Return by how many seconds each companion's clock is ahead of the fleet's median clock, by owner.
+
+    ``offsets``: see ``offset``.
+    """
     begun = {log.owner: log.begin * 1e-6 - offsets[log.owner] for log in logs if log.owner in offsets}
     middle = float(np.median(list(begun.values()))) if begun else 0.0
     return {owner: own - middle for owner, own in begun.items()}
 
 
 def _misfit(when: Array, told: Array, time: Array, true: Array) -> float:
-    """Mean square (m²/s²) of told less true velocity where both are known; outside the flight is at rest."""
+    """Return the mean square difference (m²/s²) of reported and true velocity.
+
+    Outside the flight the true velocity is zero.
+    """
     between = np.array([np.interp(when, time, true[:, axis], 0.0, 0.0) for axis in range(3)]).T
     return float(np.mean((told - between) ** 2))
 
 
 def seconds(log: Log, times: Times | Sequence[int], ahead: float) -> Array:
-    """``times`` (n,) µs of ``log`` as s after the goal event; ``ahead`` is its ``offset``."""
+    """Convert ``times`` (n,) µs of ``log`` to s after the goal event; ``ahead`` is the log's ``offset``."""
     since = np.asarray(times, dtype=np.int64) - log.begin
     return since.astype(np.float64) * 1e-6 + ahead

@@ -1,4 +1,4 @@
-"""``outrider report``: from a run directory to its page."""
+"""Command ``outrider report``: writes the report page of a run directory."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NAME = "report.html"
 
 
 class Made(NamedTuple):
-    """A page, and what is on it."""
+    """Report page, and the data on it."""
 
     text: str
     run: Run
@@ -37,9 +37,10 @@ class Made(NamedTuple):
 
 
 def report(directory: Path, out: Path | None = None, as_json: bool = False) -> int:
-    """Write the page of the run in ``directory`` there, or to ``out``, and say so; the exit status.
+    """Write the page of the run in ``directory``, print its path and return the exit status.
 
-    Raises InputError for what is no run, and for a file that is there and no report.
+    The page goes to ``out``, by default to ``report.html`` in the directory. Raises InputError if the
+    directory holds no run, or if the destination exists and is not a report.
     """
     from outrider.terminal.share_progress import share_progress
 
@@ -59,7 +60,7 @@ def report(directory: Path, out: Path | None = None, as_json: bool = False) -> i
 
 
 def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
-    """The page of a run, not yet written. Raises InputError for what is no run."""
+    """Return the page of a run without writing it. Raises InputError if the directory holds no run."""
     ledger, ahead = Ledger(), dict[int, float]()
 
     def sift(log: Log, motions: Motions | None) -> Log:
@@ -79,7 +80,7 @@ def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
 
 
 def _d_min(run: Run) -> float:
-    """m; 0, below which nothing is, where nobody says."""
+    """Return d_min (m); 0, below which no distance is, where it is not known."""
     said = run.summary.get("d_min_m") if run.scenario is None else run.scenario.d_min
     return float(said) if isinstance(said, int | float) else 0.0
 
@@ -100,7 +101,7 @@ def _title(run: Run) -> str:
 
 
 def _parts(run: Run, said: Headline, happened: Sequence[Event], lost: Losses) -> dict[str, str]:
-    """What the template has places for."""
+    """Return the HTML of the template's placeholders."""
     share = lost.share
     return {
         "facts": fact_list(said.facts),
@@ -114,7 +115,7 @@ def _parts(run: Run, said: Headline, happened: Sequence[Event], lost: Losses) ->
 
 
 def check(path: Path) -> None:
-    """InputError if there is something at ``path`` that is no report of ours."""
+    """Raise InputError if the folder of ``path`` is missing, or ``path`` exists and is not a report."""
     if not path.parent.is_dir():
         raise InputError(f"{path}: there is no folder {path.parent}")
     if path.is_symlink() or path.exists():
@@ -126,7 +127,7 @@ def check(path: Path) -> None:
 
 
 def write(path: Path, text: str) -> None:
-    """Put the page there at once, or not at all."""
+    """Write the page atomically. Raises InputError as ``check`` does."""
     check(path)
     whole_file.write(path, text)
 

@@ -1,4 +1,4 @@
-"""How far apart everything was: pairs of vehicles, the target, obstacles."""
+"""Distances between vehicles, to the target and to obstacles."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from outrider.report.run import Array, Motions
 from outrider.scenarios.scenario import Scenario
 
 _ALOFT = 0.2
-"""m: lower, a vehicle may stand on the ground beside what it would keep away from."""
+"""Height (m) below which a vehicle may stand on the ground beside the target or an obstacle."""
 _BESIDE = 0.1
-"""s: what lies so near to an encounter is part of it."""
+"""Time (s) around an encounter that counts as part of it."""
 
 
 class Encounter(NamedTuple):
-    """Two that were nearer than they may be, from ``begin`` to ``end`` (s after the goal event); ``least``
-    (m) at ``time``. ``who``: system ids, or what the second is called."""
+    """Violation of a distance limit from ``begin`` to ``end`` (s after the goal event).
+
+    ``least`` (m) is the smallest distance, at ``time``. ``who`` has the system ids, or the name of the second
+    party.
+    """
 
     begin: float
     end: float
@@ -31,13 +34,16 @@ class Encounter(NamedTuple):
 
 
 def to_target(motions: Motions) -> Array:
-    """Of each vehicle to the target (T, K), m."""
+    """Return the distance of each vehicle to the target (T, K), m."""
     result: Array = np.linalg.norm(motions.position - motions.target[:, None], axis=-1)
     return result
 
 
 def to_obstacles(motions: Motions, scenario: Scenario) -> Array:
-    """Of each vehicle's centre to the nearest surface of an obstacle (T, K), m; inf without obstacles."""
+    """Return the distance of each vehicle's centre to the nearest obstacle surface (T, K), m.
+
+    It is infinite without obstacles.
+    """
     found = np.full(motions.position.shape[:2], np.inf)
     fixed, moving = FixedObstacles(scenario.obstacles), MovingObstacles(scenario.moving_known)
     if len(fixed):
@@ -48,13 +54,15 @@ def to_obstacles(motions: Motions, scenario: Scenario) -> Array:
 
 
 def encounters(motions: Motions, d_min: float, scenario: Scenario | None) -> list[Encounter]:
-    """All below their limits, in the order of time: vehicles below ``d_min`` (m), and what else the scenario
-    limits. Only samples at which somebody flies count."""
+    """Return all violations in order of time: vehicles closer than ``d_min`` (m), and the scenario's limits.
+
+    For pairs of vehicles only samples count in which at least one vehicle is in the air.
+    """
     flies = np.isfinite(motions.separation)
     found = []
     for (j, one), (k, other) in combinations(enumerate(motions.system), 2):
         apart = np.linalg.norm(motions.position[:, j] - motions.position[:, k], axis=-1)
-        # Samples are 20 ms apart: what was nearer in between is in ``separation`` only.
+        # Samples are 20 ms apart: smaller distances in between are only in ``separation``.
         found += _below(motions.time, np.where(flies, apart, np.inf), d_min, (one, other))
     for index in np.flatnonzero(motions.separation < d_min).tolist():
         time = float(motions.time[index])
@@ -92,7 +100,7 @@ def _below(time: Array, distance: Array, limit: float, who: tuple[int, int | str
 
 
 def _nearest(motions: Motions, index: int) -> tuple[int, int]:
-    """The two vehicles that are nearest to each other at a sample."""
+    """Return the two vehicles that are closest to each other at a sample."""
     place = motions.position[index]
     pairs = list(combinations(range(len(place)), 2))
     apart = [float(np.linalg.norm(place[j] - place[k])) for j, k in pairs]

@@ -1,4 +1,4 @@
-"""What happened when: by the configuration, the summary, the true motions and the logs."""
+"""Events of a run, from the configuration, the summary, the true motions and the logs."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ from outrider.scenarios.places import FixedTarget
 from outrider.scenarios.scenario import Scenario
 
 TOGETHER = 0.5
-"""s within which several vehicles say the same."""
+"""Time (s) within which equal events of several vehicles are merged."""
 _BACK = 64
-"""So many events are looked back at."""
+"""Number of earlier events searched for an equal one."""
 
 
 class Event(NamedTuple):
-    """At ``time`` s after the goal event, until ``until`` if it lasts. ``who``: system ids, none for all;
-    ``bad``: somebody should look."""
+    """Event at ``time`` s after the goal event, until ``until`` if it lasts.
+
+    ``who`` has system ids, none for all vehicles; ``bad`` marks an event that needs attention.
+    """
 
     time: float
     kind: str
@@ -32,7 +34,10 @@ class Event(NamedTuple):
 
 
 def events(run: Run, near: Sequence[Encounter], offsets: dict[int, float], end: float) -> list[Event]:
-    """All of a run up to its ``end`` (s after the goal event), in the order of time."""
+    """Return all events of a run up to ``end`` (s after the goal event), in order of time.
+
+    ``offsets`` are the offsets of the logs' clocks by owner; logs without one are omitted.
+    """
     found = [*_goal(run), *_encounters(near)]
     if run.scenario is not None:
         found += [event for event in _scenario(run.scenario) if event.time <= end]
@@ -43,8 +48,7 @@ def events(run: Run, near: Sequence[Encounter], offsets: dict[int, float], end: 
 
 
 def together(found: Sequence[Event]) -> list[Event]:
-    """What several vehicles say alike within ``TOGETHER`` s is one event; ``found`` is in the order of
-    time."""
+    """Merge equal events of several vehicles within ``TOGETHER`` s; ``found`` is in order of time."""
     merged: list[Event] = []
     for event in found:
         place = len(merged) - 1
@@ -81,7 +85,7 @@ def _encounters(near: Sequence[Encounter]) -> Iterator[Event]:
 
 
 def _scenario(scenario: Scenario) -> Iterator[Event]:
-    """What its file lets happen."""
+    """Yield the events that the scenario's file defines."""
     for fault in scenario.faults:
         if not isinstance(fault, ClockFault):
             until = getattr(fault, "for_s", None)

@@ -1,4 +1,4 @@
-"""What the keys of a summary mean, for its table."""
+"""Meanings of the keys of a summary, for its table."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Term(NamedTuple):
-    """In words, its unit, and what it means."""
+    """Name in words, unit and meaning of a key."""
 
     words: str
     unit: str
@@ -65,4 +65,4 @@ TERMS = {
     "real_time_factor": Term("real-time factor", "", "simulated seconds per second of wall time"),
 }
 HIDDEN = frozenset({"run_dir"})
-"""Where the run lay when it was flown says nothing to who reads of it elsewhere."""
+"""Keys that are not shown: the original path of the run is useless to a reader elsewhere."""

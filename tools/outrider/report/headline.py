@@ -1,4 +1,4 @@
-"""How it ended, in words."""
+"""Headline of the report: the outcome in words, and key figures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from outrider.report.run import Run
 
 
 class Fact(NamedTuple):
-    """A figure that says much: what, how much, and against what."""
+    """Key figure: its name, its value, and a value to compare it with."""
 
     what: str
     value: str
@@ -17,7 +17,7 @@ class Fact(NamedTuple):
 
 
 class Headline(NamedTuple):
-    """``verdict`` is good, bad or open; ``outcome`` in a sentence."""
+    """Headline: ``verdict`` is good, bad or open, ``outcome`` is a sentence."""
 
     verdict: str
     outcome: str
@@ -25,13 +25,16 @@ class Headline(NamedTuple):
 
 
 def headline(run: Run, lost: float | None) -> Headline:
-    """From the summary, without which nobody knows, and the share of messages ``lost``."""
+    """Return the headline from the summary, without which the outcome is unknown, and the share ``lost``.
+
+    ``lost`` is the share of lost messages, or None.
+    """
     facts = tuple(_facts(run.summary, lost))
     return Headline(*_outcome(run), facts)
 
 
 def _outcome(run: Run) -> tuple[str, str]:
-    """The verdict, and the sentence."""
+    """Return the verdict and the sentence."""
     summary = run.summary
     if not summary:
         return "open", "How it ended is not known: there is no summary"
@@ -53,7 +56,7 @@ def _within(run: Run) -> str:
 
 
 def _facts(summary: dict[str, object], lost: float | None) -> Iterator[Fact]:
-    """What there is of them."""
+    """Yield the key figures that are available."""
     vehicles = _number(summary.get("vehicles"))
     if vehicles is not None:
         yield Fact("vehicles", f"{vehicles:g}", str(summary.get("sensors") or ""))

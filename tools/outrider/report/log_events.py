@@ -1,4 +1,4 @@
-"""What a vehicle's log says in words: arming and modes out of heartbeats, texts, and commands refused."""
+"""Events from a vehicle's log: arming and modes from heartbeats, texts, and refused commands."""
 
 from __future__ import annotations
 
@@ -31,15 +31,17 @@ _ARDUCOPTER = {
 _PX4_MAIN = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 4: "AUTO", 5: "ACRO", 6: "OFFBOARD", 7: "STABILIZED"}
 _PX4_AUTO = {1: "READY", 2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND"}
 _SEVERE = 4
-"""MAV_SEVERITY_WARNING; less is worse."""
+"""MAV_SEVERITY_WARNING; a lower number is more severe."""
 _SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 _PIECE = 50
-"""A STATUSTEXT of so many characters goes on in the next."""
+"""A STATUSTEXT of this length continues in the next one."""
 
 
 class Saying(NamedTuple):
-    """At ``time`` µs on the clock of the log; ``kind`` is armed, mode, text or refused; ``bad``: somebody
-    should look."""
+    """Event at ``time`` µs on the clock of the log.
+
+    ``kind`` is armed, mode, text or refused; ``bad`` marks an event that needs attention.
+    """
 
     time: int
     kind: str
@@ -48,7 +50,10 @@ class Saying(NamedTuple):
 
 
 def sayings(log: Log) -> Iterator[Saying]:
-    """In the order of the log; the first heartbeat says how it began. A long STATUSTEXT comes in pieces."""
+    """Yield the events in the order of the log.
+
+    The first heartbeat gives the initial state. A long STATUSTEXT that arrives in pieces is joined.
+    """
     before: Heartbeat | None = None
     text: Saying | None = None
     for time, said in log.utterances:
@@ -77,7 +82,7 @@ def sayings(log: Log) -> Iterator[Saying]:
 
 
 def mode(heartbeat: Heartbeat) -> str:
-    """What the autopilot calls its mode."""
+    """Return the autopilot's name of the mode."""
     number = heartbeat.custom_mode
     if heartbeat.autopilot != _PX4:
         return _ARDUCOPTER.get(number, f"mode {number}")
@@ -87,7 +92,7 @@ def mode(heartbeat: Heartbeat) -> str:
 
 
 def command(number: int) -> str:
-    """A command as MAVLink calls it."""
+    """Return MAVLink's name of a command, without the prefix."""
     entry = dialect.enums["MAV_CMD"].get(number)
     return str(entry.name).removeprefix("MAV_CMD_") if entry is not None else f"command {number}"
 

@@ -1,4 +1,4 @@
-"""One pass over a vehicle's tlog, for all that the report takes from it."""
+"""Reader of a vehicle's tlog: one pass collects everything that the report uses."""
 
 from __future__ import annotations
 
@@ -21,13 +21,16 @@ AUTOPILOT = 1
 _DECODED = {0, 32, 77, 253}
 """HEARTBEAT, LOCAL_POSITION_NED, COMMAND_ACK, STATUSTEXT."""
 _LATEST = 1 << 62
-"""µs. A damaged stamp may be later than integers of 64 bits hold."""
+"""Latest time (µs): a damaged time stamp may exceed a 64-bit integer."""
 _OFTEN = 4096
-"""Records from one look at the progress to the next."""
+"""Number of records between two progress reports."""
 
 
 def read_log(owner: int, path: Path, at: Callable[[int], None] = lambda _bytes: None) -> Log:
-    """The log of vehicle ``owner``; ``at`` hears how many bytes have been read. Raises LogError."""
+    """Read the log of vehicle ``owner``. Raises LogError.
+
+    ``at`` is called with the number of bytes read.
+    """
     pass_ = _Pass(owner)
     reader, size = read_tlog(path), 0
     for number, record in enumerate(reader):
@@ -39,14 +42,14 @@ def read_log(owner: int, path: Path, at: Callable[[int], None] = lambda _bytes: 
 
 
 def sequence_and_sender(frame: bytes) -> tuple[int, Sender]:
-    """From the header of a whole frame: its number 0…255, and who sent it."""
+    """Return the sequence number (0…255) and the sender from the header of a whole frame."""
     if frame[0] == 0xFD:
         return frame[4], Sender(frame[5], frame[6])
     return frame[2], Sender(frame[3], frame[4])
 
 
 class _Growing:
-    """A stream while it grows: 17 bytes a message, whatever its length."""
+    """Buffer of a stream: 17 bytes for each message of any length."""
 
     def __init__(self) -> None:
         self._time, self._sequence, self._mark = array("q"), array("B"), array("q")
@@ -78,7 +81,7 @@ class _Pass:
         self._utterances: list[Utterance] = []
 
     def see(self, record: Record) -> None:
-        """The next record."""
+        """Process the next record."""
         time = min(record.time, _LATEST)
         if self._first:
             self._begin = self._end = time
@@ -95,8 +98,11 @@ class _Pass:
             self._hear(time, message)
 
     def _hear(self, time: int, message: Message) -> None:
-        """Of the own vehicle. What its companion answers the operator comes from another component than the
-        autopilot, and counts too."""
+        """Store a message of the own vehicle outside the swarm link.
+
+        The companion's answers to the operator have another component id than the autopilot; they are stored
+        too.
+        """
         if isinstance(message, LocalPosition):
             if message.source.component == AUTOPILOT:
                 self._moments.append(time)
@@ -108,7 +114,7 @@ class _Pass:
             self._utterances.append(Utterance(time, message))
 
     def log(self, report: TlogReport) -> Log:
-        """All of it, with what the reader says of the file."""
+        """Return the log, with the reader's report on the file."""
         heard = {sender: growing.stream() for sender, growing in sorted(self._heard.items())}
         speeds = ned_to_enu(np.array(self._speeds, dtype=np.float64).reshape(-1, 3))
         moments = _whole(self._moments)

@@ -1,10 +1,10 @@
-"""Which messages of the swarm link did not arrive, from the logs alone.
+"""Lost messages of the swarm link, determined from the logs alone.
 
-On each of its links a companion has one codec, which numbers what it sends there modulo 256, whoever listens.
-So the swarm link's numbers of a sender run through the logs of all others, and its own log has every message
-that it told. Where both logs are there, messages are compared byte by byte: that is exact, and repeated ones
-do not count twice. Of a sender without a log (a moving obstacle; a log that is lost) the gaps in its numbers
-tell, from the first message that arrived to the last.
+On each of its links a companion has one codec, which numbers the sent messages modulo 256 for all receivers
+together. The swarm link's numbers of a sender therefore continue in the logs of all other vehicles, and the
+sender's own log has every message that it sent. If both logs are available, messages are compared byte by
+byte: that is exact, and duplicates are not counted twice. For a sender without a log (a moving obstacle, or a
+missing log) the gaps in its sequence numbers give the loss, from the first to the last message that arrived.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ from outrider.report.run import Array, Log, Stream, Times
 
 MODULO = 256
 _LONGEST = 86_400.0
-"""s before and after the goal event: a damaged stamp may say anything."""
+"""Limit of time (s) before and after the goal event: a damaged time stamp may have any value."""
 _PAUSE = 2.0
-"""s: within so long nobody tells 128 messages; after longer, whole rounds of numbers may be missing."""
+"""Time (s) in which no sender sends 128 messages; after more, whole cycles of numbers may be missing."""
 
 
 class Way(NamedTuple):
-    """From one sender to one receiver (system ids): of ``sent`` messages ``lost`` did not arrive.
+    """Loss from one sender to one receiver (system ids): of ``sent`` messages ``lost`` did not arrive.
 
-    ``exact``: by the sender's own log; otherwise by its sequence numbers. From the goal event on, if that is
-    known: ``silence``, s of the longest time without a message until the sender told its last; ``usual``, s
-    within which 95 % of the arrivals follow the one before; None where too little arrived.
+    ``exact`` tells that the sender's own log was used, otherwise its sequence numbers. The other values count
+    from the goal event on, if that is known: ``silence`` is the longest time (s) without a message until the
+    sender sent its last; ``usual`` is the time (s) within which 95 % of the arrivals follow the one before.
+    They are None if too few messages arrived.
     """
 
     sender: int
@@ -42,13 +43,16 @@ class Way(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Of messages that were lost, 0…1."""
+        """Share of the messages that were lost, 0…1."""
         return self.lost / self.sent if self.sent else 0.0
 
 
 class Losses(NamedTuple):
-    """All ways, by sender and receiver; in the n seconds after ``since`` (s on the flight's clock) the share
-    ``by_second`` (n,) of messages lost, over all exact ways; NaN where nobody spoke."""
+    """Losses of all pairs, sorted by sender and receiver.
+
+    ``by_second`` (n,) is the share of messages lost in each second after ``since`` (s on the flight's clock),
+    over all exact pairs; NaN in seconds without a sent message.
+    """
 
     ways: tuple[Way, ...]
     since: int
@@ -56,15 +60,17 @@ class Losses(NamedTuple):
 
     @property
     def share(self) -> float | None:
-        """Of all messages that were lost; None if nobody spoke."""
+        """Share of all messages that were lost; None if no message was sent."""
         sent = sum(way.sent for way in self.ways)
         return sum(way.lost for way in self.ways) / sent if sent else None
 
 
 class Ledger:
-    """Each sender's own log is laid beside every receiver's as soon as both are there. What was heard of a
-    sender is kept until then, and to the end of one without a log: two hundred vehicles hear eighty million
-    messages in less than two minutes."""
+    """Comparison of each sender's log with every receiver's log, as soon as both are available.
+
+    The messages received from a sender are kept until then, or to the end for a sender without a log: in less
+    than two minutes two hundred vehicles receive eighty million messages.
+    """
 
     def __init__(self) -> None:
         self._logs: dict[int, _Party] = {}
@@ -73,7 +79,7 @@ class Ledger:
         self._seconds = _Seconds()
 
     def take(self, log: Log, ahead: float | None = None) -> None:
-        """One more, of an owner that none was of; ``ahead`` of its clock, s (``clocks.offset``), if known."""
+        """Add the log of another owner; ``ahead`` is the offset of its clock in s (``clocks.offset``) or None."""
         ahead = 0.0 if ahead is None else ahead
         new = _Party(log._replace(heard={}), ahead, log.begin - 1e6 * min(0.0, ahead))
         waiting: dict[int, list[Stream]] = {}
@@ -86,7 +92,7 @@ class Ledger:
         self._logs[log.owner] = new
 
     def close(self) -> Losses:
-        """Of every sender that somebody heard or that has a log, to every log."""
+        """Return the losses from every sender that has a log or was received, to every log."""
         for owner, waiting in self._waiting.items():
             for system, streams in waiting.items():
                 self._keep(_by_numbers(system, owner, streams, self._logs[owner].goal))
@@ -104,7 +110,7 @@ class Ledger:
 
 
 class _Party(NamedTuple):
-    """``log`` without what was heard; ``ahead`` of its clock, s, and the goal event's µs on it."""
+    """``log`` without received messages, the offset ``ahead`` of its clock (s), and its goal event (µs)."""
 
     log: Log
     ahead: float
@@ -112,14 +118,14 @@ class _Party(NamedTuple):
 
 
 class _Seconds:
-    """Messages sent and lost in each second, way by way."""
+    """Messages sent and lost in each second, added pair by pair."""
 
     def __init__(self) -> None:
         self._sent: Counter[int] = Counter()
         self._lost: Counter[int] = Counter()
 
     def add(self, told: Array, lost: NDArray[np.bool_]) -> None:
-        """When (n,) messages were told, s on the flight's clock, and whether (n,) they were lost."""
+        """Add messages sent at ``told`` (n,), s on the flight's clock; ``lost`` (n,) marks the lost ones."""
         sane = np.abs(told) < _LONGEST
         for counter, times in ((self._sent, told[sane]), (self._lost, told[sane & lost])):
             seconds, counts = np.unique(np.floor(times).astype(np.int64), return_counts=True)
@@ -127,7 +133,7 @@ class _Seconds:
                 counter[second] += count
 
     def shares(self) -> tuple[int, Array]:
-        """The first second, and the share lost in each from there on."""
+        """Return the first second, and the share lost in each second from there on."""
         if not self._sent:
             return 0, np.empty(0)
         first, last = min(self._sent), max(self._sent)
@@ -141,19 +147,23 @@ class _Seconds:
 def _exact(
     sender: Log, receiver: Log, streams: list[Stream], goal: float
 ) -> tuple[Way, Array, NDArray[np.bool_]]:
-    """By both logs; ``goal`` is µs on the receiver's clock. With when (n,) each message was told, µs since
-    the sender's log began, and whether (n,) it was lost."""
+    """Compare both logs; ``goal`` is µs on the receiver's clock.
+
+    The second and the third value are the times (n,) of sending, µs since the start of the sender's log, and
+    whether (n,) each message was lost.
+    """
     told, heard = sender.told, _joined(streams)
     marks, first, copies = np.unique(heard.mark, return_index=True, return_counts=True)
     arrived = np.isin(told.mark, marks)
     there = told.time.astype(np.float64)
     counted = np.ones(len(there), dtype=bool)
     if arrived.any():
-        # Clocks differ, so what both have tells by how much. Who was not there yet has lost nothing.
+        # The clocks differ; messages in both logs give the difference. Messages outside the receiver's log
+        # are not counted.
         place = np.searchsorted(marks, told.mark[arrived])
         there += np.median(heard.time[first[place]] - told.time[arrived])
         counted = (there >= receiver.begin) & (there <= receiver.end)
-    # Equal bytes told twice (a heartbeat some rounds of numbers later) must arrive twice.
+    # Equal bytes sent twice (a heartbeat some cycles of numbers later) must arrive twice.
     kinds, times_told = np.unique(told.mark[counted], return_counts=True)
     received = dict(zip(marks.tolist(), copies.tolist(), strict=True))
     came = np.array([received.get(kind, 0) for kind in kinds.tolist()], dtype=np.int64)
@@ -165,7 +175,7 @@ def _exact(
 
 
 def _by_numbers(system: int, receiver: int, streams: list[Stream], goal: float) -> Way:
-    """By the gaps in the numbers of each of its components."""
+    """Return the loss by the gaps in the sequence numbers of each component of ``system``."""
     sent = lost = 0
     for stream in streams:
         places = np.unique(unwrapped(stream))
@@ -178,9 +188,11 @@ def _by_numbers(system: int, receiver: int, streams: list[Stream], goal: float) 
 
 
 def unwrapped(stream: Stream) -> Times:
-    """Numbers (n,) of messages as if they were not modulo 256. A step is taken as short as it can be, back
-    included, for messages overtake each other; after a long silence as many rounds are added as the sender's
-    usual rate says."""
+    """Return the numbers (n,) of messages without the modulus of 256.
+
+    Each step is taken as short as possible, also backwards, because messages overtake each other. After a
+    long pause, as many cycles are added as the sender's usual rate implies.
+    """
     if not len(stream.time):
         return np.empty(0, dtype=np.int64)
     numbers: Times = stream.sequence.astype(np.int64)
@@ -206,8 +218,11 @@ def _joined(streams: list[Stream]) -> Stream:
 def _silences(
     arrivals: Array | Times, told: Array | Times, since: float
 ) -> tuple[float | None, float | None]:
-    """From ``since`` on: the longest time (s) without an arrival until the last that was ``told``, and what
-    95 % of the arrivals keep. Times are µs on one clock."""
+    """Return the longest time (s) without an arrival, and the 95th percentile of the times between arrivals.
+
+    Both count from ``since`` to the last message in ``told``. Times are µs on one clock. Values are None if
+    too few messages arrived.
+    """
     told = told[told >= since]
     if not len(told):
         return None, None

@@ -1,4 +1,4 @@
-"""Arrays as text in a page: whole multiples of a quantum, as small integers in base64."""
+"""Encoding of arrays as text in a page: multiples of a quantum as small integers in base64."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from outrider.report.run import Array
 
 
 class Packed(NamedTuple):
-    """``shape``; ``kind`` of its integers, i2 or i4, little endian; ``quantum``: what one of them is worth;
-    ``data``, base64. The least integer of its kind stands for NaN."""
+    """Encoded array.
+
+    ``shape``; ``kind`` of the integers, i2 or i4, little-endian; ``quantum``: value of one unit; ``data``:
+    base64. The smallest integer of the kind represents NaN.
+    """
 
     shape: tuple[int, ...]
     kind: str
@@ -21,8 +24,10 @@ class Packed(NamedTuple):
 
 
 def pack(values: Array, quantum: float) -> Packed:
-    """``values`` to the nearest whole multiple of ``quantum``; what is not finite, or does not fit 32 bits,
-    becomes NaN."""
+    """Round ``values`` to multiples of ``quantum`` and encode them.
+
+    Values that are not finite, or do not fit into 32 bits, become NaN.
+    """
     with np.errstate(invalid="ignore"):
         whole = np.round(np.asarray(values, dtype=np.float64) / quantum)
         whole = np.where(np.abs(whole) < np.iinfo(np.int32).max, whole, np.nan)
@@ -35,7 +40,7 @@ def pack(values: Array, quantum: float) -> Packed:
 
 
 def unpack(packed: Packed) -> Array:
-    """What the page's own program makes of it."""
+    """Decode an array, as the page's own script does."""
     integers = np.frombuffer(base64.b64decode(packed.data), dtype=f"<{packed.kind}").reshape(packed.shape)
     values = integers * packed.quantum
     result: Array = np.where(integers == np.iinfo(integers.dtype).min, np.nan, values)

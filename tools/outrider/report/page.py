@@ -1,7 +1,7 @@
-"""The page: a template, its looks and its program from ``static/``, and the parts made of a run.
+"""HTML page: a template, styles and scripts from ``static/``, and the parts made from a run.
 
-Nothing on it comes from elsewhere. Its content security policy says so to the browser, and lets no program
-run but the one whose hash it names: what a log brings in stays text.
+The page loads nothing from elsewhere. Its content security policy enforces that in the browser, and permits
+only the script whose hash it names: text from a log stays text.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from importlib.resources import files
 from outrider.report.headline import Headline
 
 MARK = '<meta name="generator" content="outrider report">'
-"""By which a page is known as one of ours."""
+"""Marks a page as one of these reports."""
 STYLES = ("page.css", "charts.css", "print.css")
 SCRIPTS = (
     "data.js",
@@ -34,13 +34,16 @@ SCRIPTS = (
 
 
 def static(name: str) -> str:
-    """A file of the page."""
+    """Return a file of the page."""
     return (files("outrider.report") / "static" / name).read_text(encoding="utf-8")
 
 
 def page(title: str, headline: Headline, parts: Mapping[str, str], document: str | None) -> str:
-    """The whole page. ``parts`` are HTML, by their names in the template; ``document`` is the replay's JSON,
-    or None if there is nothing to replay."""
+    """Return the whole page.
+
+    ``parts`` are HTML by their names in the template; ``document`` is the replay's JSON, or None if there is
+    nothing to replay.
+    """
     style = "\n".join(static(name) for name in STYLES)
     script = '"use strict";\n(() => {\n' + "\n".join(static(name) for name in SCRIPTS) + "\n})();"
     values = {
@@ -55,12 +58,12 @@ def page(title: str, headline: Headline, parts: Mapping[str, str], document: str
         "hidden": "" if document is not None else "hidden",
         **parts,
     }
-    # In one pass: what is put in is not looked through again.
+    # In one pass: inserted text is not searched again.
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], static("page.html"))
 
 
 def policy(style: str, script: str) -> str:
-    """The content security policy: no request of any kind, this style, this program."""
+    """Return the content security policy: no requests, only this style and this script."""
     return (
         f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'; "
         "base-uri 'none'; form-action 'none'"

@@ -1,4 +1,4 @@
-"""A run directory to a ``Run``. Whatever cannot be read is a gap, unless that is all there is."""
+"""Reader of a run directory. A part that cannot be read is a gap, unless no part can be read."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from outrider.yaml_files.yaml_file import load
 SUMMARY, FLIGHT, PLANS, PLAN_TIMES = "summary.json", "flight.npz", "plans.npz", "plan_times.npz"
 _ALLOWED = "allowed: what outrider swarm leaves"
 _MOST_BYTES = 1 << 20
-"""Of a summary or a configuration."""
+"""Largest size of a summary or a configuration."""
 _DIGITS = 18
-"""More has no count, and no floating point number holds them."""
+"""Most digits of an integer: no count has more, and no float represents more."""
 
 Watch = Callable[[str, float], None]
 Sift = Callable[[Log, Motions | None], Log]
@@ -35,10 +35,11 @@ def read(
     watch: Watch = lambda _what, _share: None,
     sift: Sift = lambda log, _motions: log,
 ) -> Run:
-    """All that is left in ``directory``; ``watch`` hears what is read, and the share that is done. ``sift``
-    gets each log, and the true motions if they are there, and gives back what is to be kept of it.
+    """Read all data in ``directory``.
 
-    Raises InputError if it is no directory, or holds nothing of a run that can be read.
+    ``watch`` is called with the name of the file being read and the share that is done. ``sift`` receives
+    each log, and the true motions if they are available, and returns the part of the log to be kept. Raises
+    InputError if ``directory`` is not a directory, or holds no readable part of a run.
     """
     if not directory.is_dir():
         wrong = "not a directory" if directory.exists() else "no such directory"
@@ -90,7 +91,7 @@ def read(
 
 
 def _without_place(said: str, path: Path) -> str:
-    """Where the run lies now says nothing of the run."""
+    """Remove the path of the run from a message: the present location of the run is irrelevant."""
     for prefix in (f"{path}:", f"{path.name}:"):
         said = said.removeprefix(prefix)
     return said.replace(str(path), path.name).strip()
@@ -136,7 +137,7 @@ def _logs(
     watch: Watch,
     sift: Callable[[Log], Log],
 ) -> tuple[Log, ...]:
-    """Those of the fleet, and whichever others are there."""
+    """Read the logs of the fleet, and any other vehicle's log in the directory."""
     there = {}
     for path in directory.iterdir():
         fits = re.fullmatch(r"vehicle-(\d{1,3})\.tlog", path.name)

@@ -1,4 +1,4 @@
-"""All that the page's own program draws, as one JSON document."""
+"""Data that the page's script draws, as one JSON document."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from outrider.report.scene import scene
 from outrider.simulation.conductor import HOLD
 
 MILLIMETRE, TENTH = 1e-3, 1e-4
-"""Quanta: of lengths and speeds; of angles, a tenth of a milliradian, and times, of a millisecond."""
+"""Quanta: of lengths and speeds, 1 mm and 1 mm/s; of angles and times, 0.1 mrad and 0.1 ms."""
 _AFTER = 5.0
-"""s for which a run goes on after convergence."""
+"""Time (s) for which a run is shown after convergence."""
 
 
 def document(
@@ -29,7 +29,10 @@ def document(
     spent: Histogram | None,
     events: Sequence[Event],
 ) -> str:
-    """Over the samples ``shown`` (n,). JSON that may stand in a script element: no ``<`` is left in it."""
+    """Return the JSON document for the samples ``shown`` (n,).
+
+    It may stand in a script element: it contains no ``<``.
+    """
     begin, end = clock(run, motions)
     found = {
         "systems": motions.system,
@@ -56,7 +59,7 @@ _MARKED = ("goal", "converged", "fault", "target", "bystander", "too near")
 
 
 def clock(run: Run, motions: Motions) -> tuple[float, float]:
-    """From when to when (s) the flight counts: the page begins with this part of it."""
+    """Return the start and the end (s) of the relevant part of the flight, which the page shows first."""
     first, last = float(motions.time[0]), float(motions.time[-1])
     seconds = run.summary.get("convergence_time_s")
     end = last
@@ -68,14 +71,14 @@ def clock(run: Run, motions: Motions) -> tuple[float, float]:
 
 
 def packed(values: Array, quantum: float) -> dict[str, Any]:
-    """As the page reads it."""
+    """Return encoded values as the page reads them."""
     return pack(values, quantum)._asdict()
 
 
 def _chart(chart: Chart) -> dict[str, Any]:
     values = np.stack([line.values for line in chart.lines], axis=1)
     most = float(np.abs(values[np.isfinite(values)]).max(initial=1e-6))
-    # A chart is a few hundred pixels high; so many steps are not seen, and fit 16 bits.
+    # A chart is a few hundred pixels high; steps this small are invisible, and the values fit 16 bits.
     quantum = most / 32_000.0
     return {
         **chart._replace(lines=(), levels=())._asdict(),

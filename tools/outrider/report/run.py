@@ -1,4 +1,4 @@
-"""What a run left, as far as it could be read: values only."""
+"""Data of a run as far as it could be read: values only."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ Said = Heartbeat | CommandAck | StatusText
 
 
 class Gap(NamedTuple):
-    """A part of the run that is missing or damaged: which, and why."""
+    """Part of the run that is missing or damaged, and the reason."""
 
     what: str
     why: str
 
 
 class Motions(NamedTuple):
-    """``flight.npz``: T samples of K vehicles and M moving obstacles; fleet-local ENU, SI, radians; NaN where
-    there is nothing.
+    """Content of ``flight.npz``: T samples of K vehicles and M moving obstacles.
 
-    ``system`` (K,); ``time`` (T,) s after the goal event, rising; ``position``, ``velocity``, ``reference``
-    (T, K, 3); ``yaw``, ``tilt`` (T, K); ``target`` (T, 3); ``separation`` (T,): least since the sample
-    before; ``moving`` (T, M, 3).
+    Coordinates are fleet-local ENU, units SI and radians; missing values are NaN. ``system`` (K,); ``time``
+    (T,) s after the goal event, rising; ``position``, ``velocity``, ``reference`` (T, K, 3); ``yaw``,
+    ``tilt`` (T, K); ``target`` (T, 3); ``separation`` (T,): least since the sample before; ``moving`` (T, M,
+    3).
     """
 
     system: tuple[int, ...]
@@ -47,8 +47,10 @@ class Motions(NamedTuple):
 
 
 class Plans(NamedTuple):
-    """``plans.npz``: of n plans ``system`` (n,), ``time`` (n,) s after the goal event and ``size`` (n,) of ∇J
-    divided by Ω_t, m."""
+    """Content of ``plans.npz``: n plans.
+
+    ``system`` (n,); ``time`` (n,) s after the goal event; ``size`` (n,): norm of ∇J divided by Ω_t, m.
+    """
 
     system: NDArray[np.int64]
     time: Array
@@ -56,21 +58,21 @@ class Plans(NamedTuple):
 
 
 class PlanTimes(NamedTuple):
-    """``plan_times.npz``: of n plans ``system`` (n,) and the CPU time ``spent`` (n,), ms."""
+    """Content of ``plan_times.npz``: of n plans ``system`` (n,) and the CPU time ``spent`` (n,), ms."""
 
     system: NDArray[np.int64]
     spent: Array
 
 
 class Sender(NamedTuple):
-    """Who counts messages: a system and its component."""
+    """Source of numbered messages: a system and its component."""
 
     system: int
     component: int
 
 
 class Stream(NamedTuple):
-    """Messages of one sender on the swarm link, in the order in which a log has them.
+    """Messages of one sender on the swarm link, in the order of a log.
 
     ``time`` (n,) µs on the clock of the log; ``sequence`` (n,) 0…255; ``mark`` (n,): equal for equal bytes.
     """
@@ -81,18 +83,18 @@ class Stream(NamedTuple):
 
 
 class Utterance(NamedTuple):
-    """A message worth a line, at ``time`` µs on the clock of the log."""
+    """Message that may become an event, at ``time`` µs on the clock of the log."""
 
     time: int
     said: Said
 
 
 class Log(NamedTuple):
-    """One vehicle's tlog. ``begin``, ``end``: its first and last record, µs on its own clock.
+    """Data of one vehicle's tlog.
 
-    ``told``: what the vehicle itself said on the swarm link; ``heard``: what arrived there, empty where that
-    has been compared already. ``speeds``: at
-    ``moments`` (n,) µs the velocity (n, 3) that its autopilot told, ENU, m/s.
+    ``begin``, ``end``: first and last record, µs on the vehicle's own clock. ``told``: messages that the
+    vehicle sent on the swarm link; ``heard``: messages that it received there, empty if they have already
+    been compared. ``speeds`` (n, 3): velocity reported by the autopilot at ``moments`` (n,) µs, ENU, m/s.
     """
 
     owner: int
@@ -107,8 +109,11 @@ class Log(NamedTuple):
 
 
 class Run(NamedTuple):
-    """All of it. ``summary`` is empty, and parts are None, where they are among the ``gaps``.
-    ``configuration`` is the file's text."""
+    """All data of a run.
+
+    Where a part is among the ``gaps``, ``summary`` is empty and other parts are None. ``configuration`` is
+    the text of the file.
+    """
 
     directory: Path
     summary: dict[str, object]
@@ -123,7 +128,7 @@ class Run(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What was flown."""
+        """Name of the scenario, or of the directory if the scenario is not known."""
         if self.scenario is not None:
             return self.scenario.name
         return str(self.summary.get("scenario") or self.directory.resolve().name)

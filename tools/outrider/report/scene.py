@@ -1,4 +1,4 @@
-"""What stands and moves around the vehicles in the replay, as plain values for the page."""
+"""Scene of the replay: obstacles, goals and surfaces around the vehicles, as plain values for the page."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import starts
 
 SPAN = 0.63
-"""m from tip to tip where nothing says otherwise: the firefly's."""
+"""Default span (m) from tip to tip: the firefly's."""
 _LARGEST = 100.0
 
 
 def scene(run: Run, motions: Motions) -> dict[str, Any]:
-    """Lengths in m, fleet-local ENU. ``posts`` and ``spheres``, ``movers`` in the order of the moving
-    obstacles, ``goals``, and ``surfaces``: closed lines as offsets from the target."""
+    """Return the scene; lengths in m, fleet-local ENU.
+
+    It has fixed obstacles (``fixed``: posts and spheres), ``movers`` in the order of the moving obstacles,
+    ``goals``, and ``surfaces``: closed lines as offsets from the target.
+    """
     scenario, span = run.scenario, run.summary.get("span_m")
     d_min = run.summary.get("d_min_m") if scenario is None else scenario.d_min
     return {
@@ -56,7 +59,10 @@ def _goals(run: Run, motions: Motions) -> list[list[float]]:
 
 
 def _surfaces(scenario: Scenario) -> list[dict[str, Any]]:
-    """The fleet's, and those of vehicles that have their own. A companion that flies to a goal has none."""
+    """Return the fleet's surface, and those of vehicles with a surface of their own.
+
+    A companion that flies to a goal has none.
+    """
     companion = scenario.companion
     if companion.task != "escort":
         return []

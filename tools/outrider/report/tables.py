@@ -1,4 +1,4 @@
-"""The parts of the page that are tables. Whatever comes from outside is escaped here, and nowhere else."""
+"""Tables of the page. All external text is escaped here, and nowhere else."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from outrider.report.run import Gap
 
 MOST_EVENTS = 2000
 _LEVELS = (0.0, 0.01, 0.05, 0.1, 0.2, 0.4, 0.7)
-"""Shares of loss from which on a cell is shaded more."""
+"""Shares of loss at which the shading of a cell increases."""
 _SILENT = (0.0, 0.3, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""The same for s of silence."""
+"""Times without a message (s) at which the shading of a cell increases."""
 
 
 def summary_table(summary: Mapping[str, object]) -> str:
-    """Rows for all keys that are there, known ones first, in the order of the glossary."""
+    """Return the table of all keys of the summary, known keys first in the order of the glossary."""
     keys = [key for key in TERMS if key in summary]
     keys += [key for key in summary if key not in TERMS and key not in HIDDEN]
     rows = []
@@ -36,7 +36,7 @@ def summary_table(summary: Mapping[str, object]) -> str:
 
 
 def fact_list(facts: Sequence[Fact]) -> str:
-    """What the page begins with."""
+    """Return the list of key figures at the top of the page."""
     items = "".join(
         f"<div><dt>{escape(fact.what)}</dt><dd>{escape(fact.value)}<small>{escape(fact.against)}</small></dd></div>"
         for fact in facts
@@ -45,7 +45,7 @@ def fact_list(facts: Sequence[Fact]) -> str:
 
 
 def gap_list(gaps: Sequence[Gap]) -> str:
-    """What is missing; nothing if nothing is."""
+    """Return the list of missing or damaged parts; empty if there are none."""
     if not gaps:
         return ""
     items = "".join(f"<li><code>{escape(gap.what)}</code> {escape(gap.why)}</li>" for gap in gaps)
@@ -53,7 +53,7 @@ def gap_list(gaps: Sequence[Gap]) -> str:
 
 
 def event_table(events: Sequence[Event]) -> str:
-    """A row each, with a button that moves the replay there."""
+    """Return the table of events; each row has a button that moves the replay to its time."""
     if not events:
         return "<p>None is known.</p>"
     rows = []
@@ -72,7 +72,7 @@ def event_table(events: Sequence[Event]) -> str:
 
 
 def loss_tables(losses: Losses) -> str:
-    """Senders down, receivers across: what was lost, and how long nothing was heard."""
+    """Return tables of losses and of longest silences, senders in rows, receivers in columns."""
     ways = {(way.sender, way.receiver): way for way in losses.ways}
     if not ways:
         return "<p>No log tells of messages on the swarm link.</p>"

@@ -1,4 +1,4 @@
-"""The npz files of a run directory as typed values."""
+"""Reader of the npz files of a run directory."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _Arrays = dict[str, NDArray[np.generic]]
 
 
 class Motion(NamedTuple):
-    """The true motion: T samples of K vehicles and M moving obstacles, fleet-local ENU, SI, radians; NaN
-    where there is nothing.
+    """True motion: T samples of K vehicles and M moving obstacles, fleet-local ENU, SI, radians.
 
-    ``start_us``: Unix µs of the goal event; ``time`` (T,) Unix µs, ``time_s`` (T,) s after the goal event;
-    ``system`` (K,); ``position``, ``velocity``, ``reference`` (T, K, 3); ``yaw``, ``tilt`` (T, K); ``target``
-    (T, 3); ``separation`` (T,); ``moving`` (T, M, 3): see ``flight_file.write_flight``.
+    Missing values are NaN. ``start_us``: Unix µs of the goal event; ``time`` (T,) Unix µs, ``time_s`` (T,) s
+    after the goal event; ``system`` (K,); ``position``, ``velocity``, ``reference`` (T, K, 3); ``yaw``,
+    ``tilt`` (T, K); ``target`` (T, 3); ``separation`` (T,); ``moving`` (T, M, 3): see
+    ``flight_file.write_flight``.
     """
 
     start_us: int
@@ -43,9 +43,12 @@ class Motion(NamedTuple):
 
 
 class Plans(NamedTuple):
-    """A row for each plan: ``time`` (n,) Unix µs and ``time_s`` (n,) s after the goal event, on the
-    companion's clock; whose, ``system`` (n,); and what, ``value``: ∇J (n, 3), fleet-local ENU, m, or the CPU
-    time (n,) in ms that it took."""
+    """One value for each of n plans.
+
+    ``time`` (n,) Unix µs and ``time_s`` (n,) s after the goal event, on the companion's clock; ``system``
+    (n,), the vehicle of each plan; ``value``: ∇J (n, 3), fleet-local ENU, m, or the CPU time (n,) of the plan
+    in ms.
+    """
 
     time: Whole
     time_s: Array
@@ -54,8 +57,10 @@ class Plans(NamedTuple):
 
 
 def read_motion(path: Path, vehicles: int, moving: int) -> Motion | None:
-    """``flight.npz`` of so many vehicles and moving obstacles; None if there is no such file. Raises
-    InputError for one that is not what ``write_flight`` makes."""
+    """Read ``flight.npz`` with the given number of vehicles and moving obstacles.
+
+    Returns None if there is no such file. Raises InputError for a file that does not match ``write_flight``.
+    """
     arrays = _arrays(path)
     if arrays is None:
         return None
@@ -81,8 +86,10 @@ def read_motion(path: Path, vehicles: int, moving: int) -> Motion | None:
 
 
 def read_plans(path: Path, value: str, width: int | None, start_us: int) -> Plans | None:
-    """The array ``value`` (n, width), or (n,), of ``plans.npz`` or ``plan_times.npz``; else as
-    ``read_motion``."""
+    """Read the array ``value`` (n, width), or (n,), of ``plans.npz`` or ``plan_times.npz``.
+
+    Returns None if there is no such file. Raises InputError for a file that does not match its writer.
+    """
     arrays = _arrays(path)
     if arrays is None:
         return None
@@ -114,7 +121,7 @@ def _rows(arrays: _Arrays, name: str) -> int:
 
 
 def _check(path: Path, arrays: _Arrays, shapes: dict[str, tuple[int, ...]]) -> None:
-    """Raises InputError for an array that is missing, or not of its shape, or no numbers."""
+    """Raise InputError for an array that is missing, has another shape, or holds no numbers."""
     for name, shape in shapes.items():
         found = arrays.get(name)
         if found is None:
@@ -126,7 +133,7 @@ def _check(path: Path, arrays: _Arrays, shapes: dict[str, tuple[int, ...]]) -> N
 
 
 def _unix(path: Path, start_us: int, seconds: Array) -> Whole:
-    """Times (n,) in s after ``start_us`` as Unix µs. Raises InputError for what is no time."""
+    """Return times (n,) in s after ``start_us`` as Unix µs; raise InputError for an invalid time."""
     with np.errstate(invalid="ignore", over="ignore"):
         later = seconds * 1e6 + start_us
     if not ((later >= 0.0) & (later <= LATEST)).all():

@@ -15,7 +15,7 @@ CONFIGURATION = "configuration.yaml"
 
 
 class Resolved(BaseModel):
-    """The configuration that a run leaves beside its logs."""
+    """Configuration that a run leaves beside its logs."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -24,8 +24,11 @@ class Resolved(BaseModel):
 
 
 def resolved(directory: Path, allowed: str, of_log: str | None = None) -> Resolved:
-    """What was flown in ``directory``. InputError, which says what is ``allowed``, if it is none of a run;
-    ``of_log`` as for ``configured``."""
+    """Return the configuration of the run in ``directory``.
+
+    Raises InputError, which states what is ``allowed``, if it is no run directory; ``of_log`` as for
+    ``configured``.
+    """
     if not directory.is_dir():
         wrong = "not a directory" if directory.exists() else "no such directory"
         raise InputError(Fault(str(directory), f"{wrong}; {allowed}"))
@@ -33,9 +36,11 @@ def resolved(directory: Path, allowed: str, of_log: str | None = None) -> Resolv
 
 
 def configured(directory: Path, allowed: str, of_log: str | None) -> Resolved:
-    """The same where ``directory`` is known to be there. What ``outrider fly`` left knows of no scenario:
-    then InputError says what may be done with its log instead, ``of_log`` with the log in place of ``{}``;
-    None: nothing."""
+    """Return the configuration of the run in ``directory``, which must exist.
+
+    The output of ``outrider fly`` has no scenario. Its InputError states how its log can be used instead:
+    ``of_log``, with the log in place of ``{}``; None: not at all.
+    """
     path = directory / CONFIGURATION
     try:
         return load(path, Resolved)

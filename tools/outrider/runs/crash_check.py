@@ -1,4 +1,4 @@
-"""Whether somebody fell or came down: what no flight that counts as finished may have."""
+"""Check whether a vehicle crashed; a flight with a crash does not count as finished."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import numpy as np
 from outrider.runs.outcome import Outcome
 
 _LOW = 0.2
-"""m above the ground; lower than this nobody who flew comes between the goal event and the order to land."""
+"""m above the ground; a flying vehicle is always higher between the goal event and the order to land."""
 _OVER = np.pi / 2.0
 """rad of tilt; beyond it a vehicle falls."""
 
 
 def first_fall(flight: Outcome) -> str | None:
-    """The first vehicle that turned over or came down between the goal event and the end of the clock, in a
-    sentence; None if all kept flying."""
+    """Return a sentence about the first vehicle that turned over or came down, or None.
+
+    The check covers the time from the goal event to the end of the clock.
+    """
     if flight.clock_start is None:
         return None
     samples = flight.truth.samples(flight.clock_start, flight.clock_end)

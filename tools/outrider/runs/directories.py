@@ -1,4 +1,4 @@
-"""Where a run leaves its files: directories that are new, so that nothing is overwritten."""
+"""Output directories of runs: they are new, so that nothing is overwritten."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from outrider.errors import InputError
 
 
 def new_directory(out: Path | None, stem: str) -> Path:
-    """A new, empty directory: ``out``, or the first free ``runs/STEM[-k]``. Nothing is overwritten."""
+    """Return a new, empty directory: ``out``, or the first free ``runs/STEM[-k]``.
+
+    Raises InputError if ``out`` exists and is not an empty directory, or if it cannot be made.
+    """
     if out is not None:
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             raise InputError(f"--out {out}: exists and is not an empty directory")
@@ -21,7 +24,7 @@ def new_directory(out: Path | None, stem: str) -> Path:
 
 
 def _is_new(path: Path) -> bool:
-    """Make it and say True, or False if it is there: two runs that start at once never share one."""
+    """Make ``path`` and return True, or False if it exists: two runs that start at once never share one."""
     try:
         path.mkdir()
     except FileExistsError:

@@ -1,4 +1,4 @@
-"""The picture of a run: paths from above, separation, stand-off and yaw errors, plan time."""
+"""Figure of a run: paths from above, separation, stand-off and yaw errors, plan time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _TARGET = "0.25"
 _LIMIT = "#b00020"
 _NAMED = 24
-"""Vehicles; the names of more would cover the picture."""
+"""Number of vehicles; the names of more would cover the figure."""
 
 
 def draw(flight: Outcome, summary: dict[str, Value], path: Path) -> None:
@@ -56,8 +56,10 @@ def _headline(flight: Outcome, summary: dict[str, Value]) -> str:
 
 
 def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
-    """From above, with obstacles, the ways of those that move, and the surface around the target's last
-    place."""
+    """Draw the paths from above, with obstacles and the surface around the target's last position.
+
+    The paths of moving obstacles are drawn, too.
+    """
     from matplotlib.patches import Circle
 
     few = len(flight.systems) <= _NAMED
@@ -102,8 +104,10 @@ def _separation(axes: Axes, flight: Outcome, samples: Samples, time: np.ndarray)
 
 
 def _errors(standoff: Axes, yaw: Axes, flight: Outcome, samples: Samples, time: np.ndarray) -> None:
-    """How far from where it should be, and how far off the bow the target is, per vehicle, from the clock's
-    start on."""
+    """Draw the position error and the yaw error of each vehicle, from the clock's start on.
+
+    The yaw error is the angle between a vehicle's heading and the direction to the target.
+    """
     on_clock = (time >= 0.0) & (samples.time <= (flight.clock_end or samples.time[-1]))
     if flight.scenario.task == "escort":
         values = standoff_errors(flight, samples.position, samples.target)
@@ -124,7 +128,7 @@ def _errors(standoff: Axes, yaw: Axes, flight: Outcome, samples: Samples, time: 
 
 
 def _gradients(axes: Axes, flight: Outcome) -> None:
-    """‖∇J‖ of every plan: near 0 where a vehicle is done (the paper, Sec. IV)."""
+    """Draw ‖∇J‖ of every plan: near 0 for a vehicle that has arrived (the paper, Sec. IV)."""
     for log in flight.plan_logs:
         time = (log.times - (flight.clock_start or 0)) * 1e-6
         axes.plot(time, np.linalg.norm(log.gradients, axis=1), lw=0.8)
@@ -134,7 +138,7 @@ def _gradients(axes: Axes, flight: Outcome) -> None:
 
 
 def _plan_time(axes: Axes, flight: Outcome) -> None:
-    """CPU time of every plan on the clock."""
+    """Draw the histogram of the CPU time of all plans while the clock ran."""
     tallies = flight.tallies
     values = np.array([n for before, after in tallies for n in after.plan_ns[len(before.plan_ns) :]]) * 1e-6
     if len(values):

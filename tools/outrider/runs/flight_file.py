@@ -1,4 +1,4 @@
-"""``flight.npz`` and ``plan_times.npz`` of a run directory: the true motions, and what each plan cost."""
+"""Writer of ``flight.npz`` and ``plan_times.npz`` of a run directory: true motions, and costs of plans."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from outrider.runs.outcome import Outcome
 
 
 def write_flight(flight: Outcome, path: Path) -> None:
-    """Arrays over T samples (50 Hz) of K vehicles and M moving obstacles, fleet-local ENU, SI, radians; NaN
-    where there is nothing.
+    """Write T samples (50 Hz) of K vehicles and M moving obstacles, fleet-local ENU, SI, radians.
 
-    ``system`` (K,); ``time_s`` (T,) after the goal event, which was at ``start_us`` on the clock of the run
-    (Unix µs, as in the logs) or, if there was none, is the first sample; ``position``, ``velocity``,
-    ``reference`` (what the autopilot flies to) (T, K, 3); ``yaw``, ``tilt`` (T, K); ``target`` (T, 3);
-    ``separation`` (T,): least since the sample before; ``moving`` (T, M, 3). Lock-step writes the same bytes
-    each time."""
+    Missing values are NaN. ``system`` (K,); ``time_s`` (T,) after the goal event, which was at ``start_us``
+    on the clock of the run (Unix µs, as in the logs) or, if there was none, is the first sample;
+    ``position``, ``velocity``, ``reference`` (the position that the autopilot tracks) (T, K, 3); ``yaw``,
+    ``tilt`` (T, K); ``target`` (T, 3); ``separation`` (T,): least since the previous sample; ``moving`` (T,
+    M, 3). Lock-step writes the same bytes each time.
+    """
     samples = flight.truth.samples()
     start = flight.clock_start or (int(samples.time[0]) if len(samples.time) else 0)
     values = {name: getattr(samples, name).astype(np.float32) for name in _KEPT}
@@ -31,8 +31,11 @@ def write_flight(flight: Outcome, path: Path) -> None:
 
 
 def write_plan_times(flight: Outcome, path: Path) -> None:
-    """CPU time ``plan_ms`` (n,) of each plan while the clock ran, when it was due, ``time_s`` (n,) after the
-    goal event on the companion's clock, and whose it was, ``system`` (n,)."""
+    """Write the CPU time ``plan_ms`` (n,) of each plan while the clock ran.
+
+    ``time_s`` (n,): when the plan was due, after the goal event on the companion's clock; ``system`` (n,):
+    its vehicle.
+    """
     spent = [after.plan_ns[len(before.plan_ns) :] for before, after in flight.tallies]
     due = [after.plan_at[len(before.plan_at) :] for before, after in flight.tallies]
     start = flight.clock_start or 0

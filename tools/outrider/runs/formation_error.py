@@ -1,4 +1,7 @@
-"""How far vehicles are from where they should be: what convergence and stand-off error mean."""
+"""Formation error: distance of vehicles from their surfaces around the target.
+
+Convergence and stand-off error are defined by it.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,10 @@ Array = NDArray[np.float64]
 
 
 def standoff(scenario: Scenario, positions: Array, target: Array) -> Array:
-    """Distance (…, K) in m of the vehicles that fly the task, ``positions`` (…, K, 3), each from its own
-    surface around the ``target`` (…, 3)."""
+    """Return the distance (…, K) in m of each vehicle with the task from its own surface.
+
+    ``positions`` (…, K, 3); the surfaces are around ``target`` (…, 3).
+    """
     offset = positions - target[..., None, :]
     result = np.empty(offset.shape[:-1])
     companion = scenario.companion

@@ -1,5 +1,7 @@
-"""What really happened, from the simulated physics and never from estimates: separation at every physics
-step, and samples at 50 Hz of all that figures and the summary show."""
+"""Ground truth of a flight, from the simulated physics and never from estimates.
+
+It holds the separation at every physics step, and samples at 50 Hz of all that figures and the summary show.
+"""
 
 from __future__ import annotations
 
@@ -15,20 +17,22 @@ Array = NDArray[np.float64]
 SAMPLE = 20_000
 """µs between samples."""
 ROW = 17
-"""Columns of a vehicle's sample: position, velocity, acceleration, reference, error of the autopilot's
-estimate (each 3), yaw, tilt."""
+"""Columns of a vehicle's sample.
+
+Position, velocity, acceleration, reference, error of the autopilot's estimate (each 3), yaw, tilt.
+"""
 NOWHERE = np.full(3, np.nan)
 NOWHERE.flags.writeable = False
 _TOGETHER = 10_000
-"""Distances that are worked out at once, or few more."""
+"""Approximate number of distances that are computed at once."""
 
 
 class Samples(NamedTuple):
-    """T samples of K vehicles, fleet-local ENU, SI, radians; NaN where there is nothing.
+    """T samples of K vehicles, fleet-local ENU, SI, radians; missing values are NaN.
 
     ``time`` (T,) µs; ``position``, ``velocity``, ``acceleration``, ``reference``, ``estimate_error``
     (estimated less true position) (T, K, 3); ``yaw``, ``tilt`` (T, K); ``target`` (T, 3); ``separation``
-    (T,): least distance between vehicles since the sample before; ``moving`` (T, M, 3): moving obstacles.
+    (T,): least distance between vehicles since the previous sample; ``moving`` (T, M, 3): moving obstacles.
     """
 
     time: NDArray[np.int64]
@@ -45,8 +49,10 @@ class Samples(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """Distances (m) below which something is too near: of centres, and of a centre from an obstacle's
-    surface; None where it does not count."""
+    """Least allowed distances (m): between centres, and from a centre to an obstacle's surface.
+
+    None: that distance is not checked.
+    """
 
     vehicles: float
     target: float | None = None
@@ -54,7 +60,7 @@ class Limits(NamedTuple):
 
 
 class Encounters:
-    """Counts how often pairs come below a distance; one stay below it is one encounter."""
+    """Counter of how often pairs come below a distance; one stay below it is one encounter."""
 
     def __init__(self, pairs: int, least: float) -> None:
         self._least = least
@@ -63,12 +69,12 @@ class Encounters:
         self.minimum = float("inf")
 
     def see(self, distances: Array) -> None:
-        """Distances (n, pairs) at consecutive times; NaN where a pair is not in the air."""
+        """Process distances (n, pairs) at consecutive times; NaN where a pair is not in the air."""
         least = float(np.fmin.reduce(distances, axis=None, initial=np.inf))
         self.minimum = min(self.minimum, least)
         if least < self._least or self._below.any():
             below = np.vstack([self._below, distances < self._least])
-            # A pair of which nothing is known for a moment is where it was.
+            # A pair with unknown distance for a moment keeps its last state.
             unknown = np.isnan(distances)
             for step in np.flatnonzero(unknown.any(axis=1)):
                 below[step + 1] |= below[step] & unknown[step]
@@ -77,8 +83,10 @@ class Encounters:
 
 
 class Truth:
-    """Collects the flight of ``vehicles``: every physics step and a sample now and then. Distances are worked
-    out for many samples at once, when there are enough of them or when they are asked for."""
+    """Collector of the ground truth of ``vehicles``: every physics step, and a sample now and then.
+
+    Distances are computed for many samples at once, when there are enough of them or when they are requested.
+    """
 
     def __init__(
         self,
@@ -97,8 +105,8 @@ class Truth:
         stands = 0 if self._fixed is None else len(self._fixed)
         self._obstacles = Encounters(vehicles * (stands + self._moves), limits.obstacles)
         self._target_counts = limits.target is not None
-        # What no distance has been worked out of yet: the tracks before each sample, those of the target and
-        # of moving obstacles.
+        # Data without computed distances yet: the tracks before each sample, those of the target and of
+        # moving obstacles.
         self._tracks: list[Array] = []
         self._places: list[Array] = []
         self._moved: list[Array] = []
@@ -107,26 +115,28 @@ class Truth:
 
     @property
     def vehicles(self) -> Encounters:
-        """Of vehicles with each other."""
+        """Encounters of vehicles with each other."""
         self._work_out()
         return self._vehicles
 
     @property
     def target(self) -> Encounters:
-        """Of vehicles with the target, where that is an obstacle."""
+        """Encounters of vehicles with the target, where the target is an obstacle."""
         self._work_out()
         return self._target
 
     @property
     def obstacles(self) -> Encounters:
-        """Of vehicles' centres with the surfaces of obstacles, fixed and moving."""
+        """Encounters of vehicles' centres with the surfaces of obstacles, fixed and moving."""
         self._work_out()
         return self._obstacles
 
     def take(self, now: int, track: Array, rows: Array, target: Array, moving: Array) -> None:
-        """A sample at ``now`` (µs) with the ``rows`` (K, ROW), and at all physics steps since the one before
-        the positions ``track`` (n, K, 3), ENU, NaN on the ground, those of the ``target`` (n, 3), NaN where
-        it is not there, and of ``moving`` obstacles (n, M, 3)."""
+        """Add a sample at ``now`` (µs), and the positions at all physics steps since the previous one.
+
+        ``rows`` (K, ROW) is the sample. Positions are ENU: ``track`` (n, K, 3), NaN on the ground; ``target``
+        (n, 3), NaN where it is absent; ``moving`` obstacles (n, M, 3).
+        """
         self._rows.append((now, rows, target[-1], moving[-1]))
         self._tracks.append(track)
         self._places.append(target)
@@ -157,12 +167,12 @@ class Truth:
         self._moved.clear()
 
     def latest(self) -> tuple[Array, Array, Array | None]:
-        """Positions (K, 3), velocities (K, 3) of the last sample, and the target's place."""
+        """Return positions (K, 3) and velocities (K, 3) of the last sample, and the target's position or None."""
         _, rows, place, _ = self._rows[-1]
         return rows[:, 0:3], rows[:, 3:6], None if np.isnan(place).any() else place
 
     def samples(self, since: int = 0, until: int | None = None) -> Samples:
-        """All samples with ``since`` ≤ time < ``until``."""
+        """Return all samples with ``since`` ≤ time < ``until``."""
         self._work_out()
         chosen = [
             (*row, least)

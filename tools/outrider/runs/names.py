@@ -1,4 +1,4 @@
-"""What the nodes of a run are called, and the number that each link has in a log."""
+"""Names of the nodes and files of a run, and the number of each link in a log."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ LINK_NUMBERS = {"autopilot": 0, "swarm": 1, "target": 2, "ground": 3}
 
 
 def companion(system: int) -> str:
-    """The companion of the vehicle with this system id."""
+    """Return the name of the companion of the vehicle with this system id."""
     return f"companion-{system}"
 
 
 def helm(system: int) -> str:
-    """What carries its plan on when the companion is silent."""
+    """Return the name of the backup node, which continues the plan when the companion is silent."""
     return f"helm-{system}"
 
 
 def autopilot(system: int) -> str:
-    """Its autopilot."""
+    """Return the name of the autopilot of this vehicle."""
     return f"sitl-{system}"
 
 
 def moving(system: int) -> str:
-    """The moving obstacle with this system id."""
+    """Return the name of the moving obstacle with this system id."""
     return f"moving-{system}"
 
 
 def log(system: int) -> str:
-    """The file of its tlog."""
+    """Return the file name of the vehicle's tlog."""
     return f"vehicle-{system}.tlog"
 
 
 def steps(system: int) -> str:
-    """The file that says when its companion was stepped."""
+    """Return the name of the file with the step times of the vehicle's companion."""
     return f"vehicle-{system}.steps.npz"

@@ -1,4 +1,4 @@
-"""What is left of a finished flight: all that its summary and its picture are made from."""
+"""Results of a finished flight: all data of its summary and its figure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from outrider.scenarios.starts import Starts
 
 
 class Messages(NamedTuple):
-    """Datagrams between nodes, counted per receiver, and frames that made no sense."""
+    """Datagrams between nodes, counted per receiver, and invalid frames."""
 
     sent: int
     dropped: int
@@ -22,8 +22,11 @@ class Messages(NamedTuple):
 
 
 class Punctuality(NamedTuple):
-    """How well the companions of a real-time run kept their deadlines: ``misses`` of ``deadlines`` had no
-    step that began within 1 ms; lateness (ms) of the steps. From boot to landing, but for imposed freezes."""
+    """Punctuality of the companions of a real-time run.
+
+    ``misses`` of ``deadlines`` had no step that began within 1 ms; lateness (ms) of the steps. It covers the
+    time from boot to landing, without imposed freezes.
+    """
 
     misses: int
     deadlines: int
@@ -34,7 +37,7 @@ class Punctuality(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """A finished flight. Times in µs on the clock of the run; None where it did not come to that.
+    """A finished flight; times in µs on the clock of the run, None for events that did not occur.
 
     ``tallies``: per companion at the start of the clock and at its end. ``punctuality`` is that of a
     real-time run; lock-step has none. ``plan_logs``: per companion, on its own clock.

@@ -1,4 +1,4 @@
-"""``plans.npz`` of a run directory: ∇J of every plan, for who wants to plot it."""
+"""Writer of ``plans.npz`` of a run directory: ∇J of every plan, for plots."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from outrider.runs.outcome import Outcome
 
 
 def write_plans(flight: Outcome, path: Path) -> None:
-    """Arrays with a row for each plan: ``system``; ``time_s`` after the goal event, on the companion's clock;
-    ``gradient`` (n, 3), ∇J divided by Ω_t, fleet-local ENU, m. Lock-step writes the same bytes each time."""
+    """Write arrays with a row for each plan.
+
+    ``system``; ``time_s`` after the goal event, on the companion's clock; ``gradient`` (n, 3), ∇J divided by
+    Ω_t, fleet-local ENU, m. Lock-step writes the same bytes each time.
+    """
     logs = flight.plan_logs
     start = flight.clock_start or 0
     np.savez_compressed(

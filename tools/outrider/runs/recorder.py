@@ -1,4 +1,4 @@
-"""Writes the tlogs of a run, and when the companions were stepped."""
+"""Recorder of a run: the tlogs, and the step times of the companions."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from outrider.runs.steps_file import StepsFile
 
 
 class Recorder:
-    """A tap: one tlog in ``directory`` for each vehicle of ``systems``, with all that its companion received
-    and sent, at the times at which it handled it, and beside it these times. ``files`` closes them."""
+    """Tap that writes one tlog in ``directory`` for each vehicle of ``systems``.
+
+    The tlog holds all that the vehicle's companion received and sent, at the times at which it handled it. A
+    second file holds the times of its steps. ``files`` closes the files.
+    """
 
     def __init__(self, directory: Path, systems: Iterable[int], files: ExitStack) -> None:
         self._writers: dict[str, TlogWriter] = {}

@@ -1,4 +1,4 @@
-"""What is exported: a run directory, or a single log."""
+"""Source of an export: a run directory, or a single log."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ ALLOWED: Final = "allowed: a directory that outrider swarm left, or a tlog"
 
 
 class Run(NamedTuple):
-    """All of a flight that is there. ``motion`` is None for a run that was stopped; a bare log has no
-    ``scenario``, and one of ``logs``. ``unread``: a line for each log that could not be used."""
+    """All available data of a flight.
+
+    ``motion`` is None for a run that was stopped; a bare log has no ``scenario``, and one entry in ``logs``.
+    ``unread``: a line for each log that could not be used.
+    """
 
     source: Path
     scenario: Scenario | None
@@ -32,8 +35,10 @@ class Run(NamedTuple):
 
 
 def read(source: Path, of_log: str = "{}") -> Run:
-    """What ``source`` holds; ``of_log`` as for ``configured``. Raises InputError in one line if it is neither
-    a run directory nor a tlog, or if there is nothing in it to export."""
+    """Read ``source``, a run directory or a tlog; ``of_log`` as for ``configured``.
+
+    Raises InputError if it is neither, or if it holds nothing to export.
+    """
     if not source.exists():
         raise InputError(Fault(str(source), f"no such file or directory; {ALLOWED}"))
     return _run(source, of_log) if source.is_dir() else _bare(source)

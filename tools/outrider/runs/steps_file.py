@@ -1,7 +1,7 @@
-"""``vehicle-N.steps.npz`` of a run directory: when the companion was stepped.
+"""``vehicle-N.steps.npz`` of a run directory: the step times of the companion.
 
-With the tlog, which has what it received and sent at these times, its flight can be gone through again to the
-last bit.
+The tlog holds what the companion received and sent at these times. With both, its flight can be replayed bit
+for bit.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from outrider.errors import Fault, InputError
 
 
 class StepsFile:
-    """Collects the times (µs) of steps, and writes them to ``path`` when it is closed. Steps come at the same
-    gap as a rule: it keeps each gap once, with how often it came in succession, so that it takes next to
-    nothing of a day."""
+    """Collector of step times (µs), which writes them to ``path`` when it is closed.
+
+    Steps usually follow at the same gap. Each gap is stored once, with the number of its successive
+    repetitions, so that a day takes next to no memory.
+    """
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -28,7 +30,7 @@ class StepsFile:
         self._gaps, self._counts = array("q"), array("q")
 
     def add(self, now: int) -> None:
-        """A step at ``now`` (µs)."""
+        """Add a step at ``now`` (µs)."""
         if self._first is None:
             self._first = self._last = now
             return
@@ -40,14 +42,14 @@ class StepsFile:
             self._counts.append(1)
 
     def close(self) -> None:
-        """Write them: the first time, and the gaps, which compress to almost nothing."""
+        """Write the first time, and the gaps, which compress to almost nothing."""
         first = np.array([] if self._first is None else [self._first], dtype=np.int64)
         gaps = np.repeat(np.array(self._gaps, dtype=np.int64), np.array(self._counts, dtype=np.int64))
         np.savez_compressed(self._path, first=first, gaps=gaps)
 
 
 def read_steps(path: Path) -> NDArray[np.int64]:
-    """The times (n,), µs. InputError if it cannot be read."""
+    """Return the step times (n,), µs; raise InputError if the file cannot be read."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             first, gaps = found["first"], found["gaps"]

@@ -1,4 +1,4 @@
-"""The summary of a run: one JSON object whose keys scripts rely on, and a table for people."""
+"""Summary of a run: one JSON object, on whose keys scripts rely."""
 
 from __future__ import annotations
 
@@ -22,16 +22,18 @@ WALL_FIELDS = ("plan_ms", "wall_s", "cpu_s", "real_time_factor", "run_dir")
 
 
 class Cost(NamedTuple):
-    """What the run took, s."""
+    """Time that the run took, s."""
 
     wall: float
     cpu: float
 
 
 def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Value]:
-    """The summary of a finished flight; keys and words as in the design. Errors, speeds and counters are
-    those of the clock; separation, solver failures and relaxed QPs count from the start of the flight. What a
-    lock-step flight with the field has no figure for is null."""
+    """Return the summary of a finished flight.
+
+    Errors, speeds and counters cover the time of the clock; separation, solver failures and relaxed QPs count
+    from the start of the flight. Values that a lock-step flight with the field does not have are null.
+    """
     scenario, truth = flight.scenario, flight.truth
     config = scenario.companion
     start, count = flight.clock_start, scenario.vehicles
@@ -101,19 +103,21 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
 
 
 def exit_status(summary: dict[str, Value]) -> int:
-    """0 finished; 1 a violation of d_min, or a goal that was not reached, or a flight that did not come
-    about."""
+    """Return the exit status: 0 for a finished flight, otherwise 1.
+
+    1 means a violation of d_min, a goal that was not reached, or a flight that failed.
+    """
     failed = summary["d_min_violations"] or summary["converged"] is False or summary["failure"]
     return 1 if failed else 0
 
 
 def write(summary: dict[str, Value], path: Path) -> None:
-    """As JSON, one key a line."""
+    """Write ``summary`` as JSON, one key a line."""
     path.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
 
 
 def yaw_errors(position: Array, yaw: Array, target: Array) -> Array:
-    """|yaw − bearing of the true target| (T, K), deg; NaN where the target is not there."""
+    """Return |yaw − bearing of the true target| (T, K), deg; NaN where there is no target."""
     offset = target[:, None, :] - position
     error = yaw - np.arctan2(offset[..., 1], offset[..., 0])
     result: Array = np.degrees(np.abs((error + np.pi) % (2.0 * np.pi) - np.pi))
@@ -121,7 +125,7 @@ def yaw_errors(position: Array, yaw: Array, target: Array) -> Array:
 
 
 def standoff_errors(flight: Outcome, position: Array, target: Array) -> Array:
-    """Distance (T, K) from the surface around the true target, m; empty where the task is no escort."""
+    """Return the distance (T, K) from the surface around the true target, m; empty unless escorting."""
     count = flight.scenario.vehicles
     if flight.scenario.task != "escort":
         return np.empty((0, count))

@@ -1,4 +1,4 @@
-"""Files that are there as a whole, or not at all, or as they were."""
+"""Atomic writing of files."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from pathlib import Path
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Put ``content`` (text as UTF-8) at ``path`` at once, in place of what is there. OSError if it cannot be
-    written; then nothing has changed."""
+    """Write ``content`` (text as UTF-8) to ``path`` atomically, replacing what is there.
+
+    Raises OSError if that fails; then nothing has changed.
+    """
     new = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         new.write_bytes(content.encode() if isinstance(content, str) else content)

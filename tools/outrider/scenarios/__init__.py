@@ -1,0 +1,1 @@
+"""Scenario and companion files: takes YAML, gives typed, checked, frozen configurations."""

@@ -1,4 +1,4 @@
-"""What the companions of a scenario are told beside what its file says of them."""
+"""Settings that a scenario adds to the configuration of its companions."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from sitl.estimation.profiles import PROFILES
 
 
 def settings_of(scenario: Scenario) -> CompanionConfig:
-    """The companions' settings with the obstacles of the scenario in them, in the field how wrong the sensor
-    profile is, unless the settings say more, and whose plans are waited for."""
+    """Return the companions' settings, completed from the scenario.
+
+    They include the scenario's obstacles; in the field, the position error of the sensor profile, unless the
+    settings have a larger one; and, with certified avoidance, the fleet whose plans are waited for.
+    """
     companion, profile = scenario.companion, PROFILES[scenario.sensors]
     known = (*companion.obstacles, *scenario.obstacles)
     moving = (*companion.moving, *scenario.moving_known)

@@ -1,4 +1,4 @@
-"""What goes wrong in a scenario, and when: ``at_s`` counts from the goal event."""
+"""Faults of a scenario and their times: ``at_s`` counts from the goal event."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ class _Fault(_OfVehicle):
 
 
 class Freeze(_Fault):
-    """The companion computes nothing for a while; what arrives waits as in a socket's buffer."""
+    """The companion computes nothing for a while; incoming data waits as in a socket's buffer."""
 
     kind: Literal["freeze"]
     for_s: Duration
 
 
 class Vanish(_Fault):
-    """The companion is gone for good: no set-points, no messages. Its autopilot goes by its time-outs."""
+    """The companion stops for good: no set-points, no messages. The autopilot's time-outs apply."""
 
     kind: Literal["vanish"]
 
@@ -46,7 +46,7 @@ class GpsJump(_Fault):
 
 
 class MotorFailure(_Fault):
-    """A rotor gives only ``left`` of its thrust from then on."""
+    """A rotor delivers only ``left`` of its thrust from then on."""
 
     kind: Literal["motor"]
     rotor: int = Field(ge=0, le=15, description="index in the vehicle's file")
@@ -54,10 +54,9 @@ class MotorFailure(_Fault):
 
 
 class ClockFault(_OfVehicle):
-    """The companion's clock is ``late_ms`` late (negative: early) from the start, and runs ``drift_ppm``
-    fast.
+    """The companion's clock is ``late_ms`` late (negative: early) from the start, and ``drift_ppm`` fast.
 
-    It does not step in flight: a companion reads the time once and then goes by its monotonic clock.
+    It does not step in flight: a companion reads the time once and then uses its monotonic clock.
     """
 
     kind: Literal["clock"]
@@ -66,12 +65,12 @@ class ClockFault(_OfVehicle):
 
 
 Sudden = Freeze | Vanish | GpsLoss | GpsJump | MotorFailure
-"""What happens at a time."""
+"""Faults that occur at a certain time."""
 FaultPart = Annotated[Sudden | ClockFault, Field(discriminator="kind")]
 
 
 class Clocks(Part):
-    """How far the companions' clocks are apart from the start: drawn per seed, evenly in ± these bounds."""
+    """Errors of the companions' clocks from the start: drawn per seed, uniform in ± these bounds."""
 
     offset_ms: float = Field(1.0, ge=0.0, le=1_000.0)
     drift_ppm: float = Field(20.0, ge=0.0, le=1_000.0)

@@ -1,5 +1,4 @@
-"""What one companion on a vehicle is told by its file: whose it is, where its fleet's frame is, and how it
-flies."""
+"""Configuration file of one companion on a vehicle: its vehicle, its fleet's frame, and how it flies."""
 
 from __future__ import annotations
 
@@ -12,11 +11,11 @@ from companion.values.settings import Settings
 from mavlink_bridge.frames import FleetFrame
 
 System = Annotated[int, Field(ge=0, le=250)]
-"""0: not said yet. System ids above are ground stations'."""
+"""System id; 0: not given yet. Ids above 250 are those of ground stations."""
 
 
 class FleetOrigin(Settings):
-    """Where the fleet-local frame has its zero: the same for all companions, and told by nobody else."""
+    """Origin of the fleet-local frame: the same for all companions, and set only by this configuration."""
 
     latitude: float = Field(ge=-89.0, le=89.0, description="degrees")
     longitude: float = Field(ge=-180.0, le=180.0, description="degrees")
@@ -24,12 +23,12 @@ class FleetOrigin(Settings):
 
     @property
     def frame(self) -> FleetFrame:
-        """ENU there."""
+        """The ENU frame at this origin."""
         return FleetFrame(self.latitude, self.longitude, self.altitude)
 
 
 class Radio(Settings):
-    """What the swarm link has to carry: periods, and for how long a plan is used, µs."""
+    """Rates that fit a radio as swarm link: periods, and how long a plan is used, µs."""
 
     state_us: int
     plan_us: int
@@ -37,12 +36,14 @@ class Radio(Settings):
 
 
 RADIOS = {57600: Radio(state_us=400_000, plan_us=540_000, plan_stale_us=1_200_000)}
-"""By the baud that eight vehicles share with their target, signed or not (``airtime``). Who misses one plan
-still has the one before, of 1.6 s."""
+"""Rates by the baud that eight vehicles share with their target, signed or not (``link_budget``).
+
+A receiver that misses one plan still has the previous one, of 1.6 s.
+"""
 
 
 class FlyConfig(Settings):
-    """One companion. Its ``system`` id is its vehicle's."""
+    """Configuration of one companion; ``system`` is the id of its vehicle."""
 
     system: System = Field(
         0, description="system id of the own autopilot, no other vehicle's; 0: given by --system"
@@ -65,7 +66,7 @@ class FlyConfig(Settings):
 
     @property
     def settings(self) -> CompanionConfig:
-        """The companion's, with the rates of the radio."""
+        """The companion's settings, with the rates of the radio."""
         if self.radio is None:
             return self.companion
         radio, companion = RADIOS[self.radio], self.companion
@@ -78,7 +79,7 @@ class FlyConfig(Settings):
         if self.target == self.system:
             raise ValueError(f"target: {self.target} is the own system id; allowed: another's")
         if self.companion.avoidance == "certified":
-            # Committed plans need one time for all, within milliseconds, and a helm.
+            # Committed plans need one time for all vehicles, within milliseconds, and a backup node.
             raise ValueError("companion.avoidance 'certified' is not for real vehicles yet; allowed: 'field'")
         if self.period_us > self.companion.rates.setpoint_us:
             longest = self.companion.rates.setpoint_us

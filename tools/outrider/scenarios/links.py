@@ -1,4 +1,4 @@
-"""What the links of a scenario do to messages: per kind of link, per direction, and partitions."""
+"""Faults of a scenario's links: per kind of link, per direction, and partitions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _WITH_ID = ("companion", "autopilot", "moving")
 
 
 class Direction(Part):
-    """Faults of one direction in place of the link's own; what is null stays the link's.
+    """Faults of one direction in place of the link's own; null keeps the link's value.
 
     ``sender`` and ``receiver`` are a role (companion, autopilot, target, operator, moving: an obstacle), the
     system id of a companion or a moving obstacle, or null for all.
@@ -54,7 +54,7 @@ class Links(Part):
 
     @model_validator(mode="after")
     def _bursts(self) -> Self:
-        """Whoever speaks to whom: as long a burst as so much loss needs."""
+        """Check for every sender and receiver that the burst is long enough for the loss."""
         said = {end for one in self.directions for end in (one.sender, one.receiver)}
         ends: list[set[str | int]] = [{role} for role in ROLES]
         ends += [{role, end} for role in _WITH_ID for end in said if isinstance(end, int)]
@@ -69,11 +69,11 @@ class Links(Part):
 
     @property
     def faults(self) -> Faults:
-        """As the ether takes them."""
+        """The link's own faults as values of the simulated network."""
         return _faults({word: getattr(self, word) for word in _WORDS})
 
     def between(self, sender: Iterable[str | int], receiver: Iterable[str | int]) -> Faults:
-        """Faults from one node to another, each given by all the names that it goes by."""
+        """Return the faults from one node to another, each given by all its names."""
         result: dict[str, float] = {word: getattr(self, word) for word in _WORDS}
         senders, receivers = set(sender), set(receiver)
         for direction in self.directions:

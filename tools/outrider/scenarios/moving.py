@@ -1,4 +1,4 @@
-"""Obstacles that move, as a scenario has them."""
+"""Moving obstacles of a scenario."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from outrider.scenarios.part import FIRST_MOVING, FIRST_SYSTEM, Coordinate, Leng
 
 
 class _Moving(Part):
-    """Goes along a smooth closed path from the goal event on, and gives way to nobody."""
+    """Obstacle that follows a smooth closed path from the goal event on and does not give way."""
 
     radius: Length = Field(description="m")
     speed: float = Field(gt=0.0, le=20.0, description="m/s, once it has set out")
@@ -33,11 +33,11 @@ class MovingSpherePart(_Moving):
 
     @property
     def places(self) -> NDArray[np.float64]:
-        """Where its path leads (n, 3), m, ENU."""
+        """Points of its path (n, 3), m, ENU."""
         return np.array(self.through)
 
     def known_as(self, system: int) -> Moving:
-        """What companions are told of it."""
+        """Return the obstacle as companions are configured with it."""
         return MovingSphere(kind="sphere", system=system, radius=self.radius)
 
 
@@ -54,11 +54,11 @@ class MovingPostPart(_Moving):
 
     @property
     def places(self) -> NDArray[np.float64]:
-        """Where its path leads (n, 3) on the ground, m, ENU."""
+        """Points of its path (n, 3) on the ground, m, ENU."""
         return np.array([(*place, 0.0) for place in self.through])
 
     def known_as(self, system: int) -> Moving:
-        """What companions are told of it."""
+        """Return the obstacle as companions are configured with it."""
         return MovingPost(kind="post", system=system, radius=self.radius, height=self.height)
 
 
@@ -66,8 +66,11 @@ MovingPart = Annotated[MovingSpherePart | MovingPostPart, Field(discriminator="k
 
 
 def clashes(moving: Sequence[Moving], fleet: range, target: int, known: Sequence[Moving]) -> Iterator[str]:
-    """A sentence for each system id of an obstacle that is somebody else's too: of ``moving``, those that the
-    scenario flies, or of what else the companions ``known`` of."""
+    """Yield a sentence for each system id of an obstacle that is in use already.
+
+    ``moving`` are the obstacles that the scenario flies, ``known`` the other ones that the companions are
+    configured with.
+    """
     if moving and fleet[-1] >= FIRST_MOVING:
         most = FIRST_MOVING - FIRST_SYSTEM
         yield f"vehicles and bystanders are {len(fleet)}; with moving obstacles at most {most} are allowed"

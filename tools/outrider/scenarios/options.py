@@ -1,4 +1,4 @@
-"""What the options of ``outrider swarm`` make of a scenario."""
+"""Application of the options of ``outrider swarm`` to a scenario."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ AVOIDANCES = get_args(Avoidance)
 METHODS = get_args(MethodName)
 FLAVOURS = get_args(FlavourName)
 _SLOWEST_PLAN = 10_000_000
-"""µs."""
+"""µs"""
 _FASTEST_AIR = 50.0
-"""m/s."""
+"""m/s"""
 
 
 class Options(NamedTuple):
-    """What the command line changes in a scenario; None leaves the file's value."""
+    """Changes of a scenario by the command line; None keeps the file's value."""
 
     method: str | None = None
     avoidance: str | None = None
@@ -41,8 +41,10 @@ class Options(NamedTuple):
 
 
 def apply(scenario: Scenario, options: Options) -> Scenario:
-    """The scenario with the options' changes, checked as a whole again. InputError says which option is wrong
-    and what it may be."""
+    """Return the scenario with the options' changes, checked again as a whole.
+
+    Raises InputError with the wrong option and its allowed values.
+    """
     changes: dict[str, object] = {}
     companion: dict[str, object] = {}
     if options.method is not None:
@@ -85,13 +87,13 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
     try:
         return Scenario.model_validate({**scenario.model_dump(), **changes})
     except ValidationError as error:
-        # An option may stand for several links: its fault is one.
+        # An option may stand for several links, whose faults are then one.
         faults = dict.fromkeys(_fault(one, options) for one in error.errors())
         raise InputError(*faults) from None
 
 
 def _fault(error: ErrorDetails, options: Options) -> str:
-    """What is wrong with an option, in its own words; with several, where it is a rule that is broken."""
+    """Return the fault of an option in its own words; all options if a rule between several is broken."""
     if error["type"] == "value_error":
         given = [
             f"{_option(name)} {value}"
@@ -120,7 +122,7 @@ def _vehicles(count: int, scenario: Scenario) -> int:
 
 
 def _replan_us(rate: float, scenario: Scenario) -> int:
-    """The period (µs) of so many plans in a second."""
+    """Return the period (µs) of ``rate`` plans per second; raise InputError if it fits no tick."""
     tick, least = scenario.timing.base_tick_us, scenario.timing.companion_us
     if not 1e6 / _SLOWEST_PLAN <= rate <= 1000.0:
         raise InputError(f"--replan-hz {rate:g}: allowed: {1e6 / _SLOWEST_PLAN:g} to {1e6 / least:g}")
@@ -136,13 +138,16 @@ def _replan_us(rate: float, scenario: Scenario) -> int:
 
 
 def _shortest(period: int) -> str:
-    """A rate (Hz) that comes back as this period (µs), in as few digits as will do."""
+    """Return a rate (Hz) that rounds to this period (µs), with as few digits as possible."""
     texts = (f"{1e6 / period:.{decimals}f}" for decimals in range(18))
     return next(text for text in texts if float(text) and round(1e6 / float(text)) == period)
 
 
 def wind_of(text: str) -> list[float]:
-    """East, north, up, from ``V`` m/s towards east, or ``EAST,NORTH`` or ``EAST,NORTH,UP``. InputError."""
+    """Return [east, north, up] from ``V`` m/s towards east, ``EAST,NORTH`` or ``EAST,NORTH,UP``.
+
+    Raises InputError for anything else.
+    """
     try:
         parts = [float(word) for word in text.split(",")]
     except ValueError:

@@ -1,4 +1,4 @@
-"""What may not happen to one vehicle at the same time: the end of the one would end the other."""
+"""Check for faults and partitions that overlap in time: the end of one would end the other."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class _What(NamedTuple):
 
 
 class _Spell(NamedTuple):
-    """``name`` in the file; ``what`` happens, from ``begin`` until before ``end``, s."""
+    """``what`` happens from ``begin`` until before ``end`` (s); ``name`` is its name in the file."""
 
     name: str
     what: _What
@@ -25,9 +25,12 @@ class _Spell(NamedTuple):
 
 
 def overlaps(faults: Sequence[FaultPart], partitions: Sequence[PartitionPart]) -> Iterator[str]:
-    """A sentence for each two faults of one kind on one vehicle, and each two partitions of the same members,
-    that overlap in time. A clock's fault lasts the whole flight; what has no end cannot be ended by
-    another."""
+    """Yield a sentence for each pair of equal faults or partitions that overlap in time.
+
+    Faults are equal if they have one kind and one vehicle, partitions if they have the same members. A
+    clock's fault lasts the whole flight. Faults without an end are not checked, because another cannot end
+    them.
+    """
     spells = []
     for index, fault in enumerate(faults):
         name, what = f"faults[{index}]", _What(fault.kind, (fault.vehicle,))

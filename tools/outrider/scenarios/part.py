@@ -1,4 +1,4 @@
-"""What all parts of a scenario file share: their base, and the kinds of numbers in them."""
+"""Base class of all parts of a scenario file, and the types of numbers in them."""
 
 from __future__ import annotations
 
@@ -27,6 +27,6 @@ FIRST_MOVING = 190
 
 
 class Part(BaseModel):
-    """Base of all parts: an unknown key is an error, nothing changes after load."""
+    """Base class of all parts: an unknown key is an error, and nothing changes after loading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

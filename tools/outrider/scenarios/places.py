@@ -1,4 +1,4 @@
-"""Where a scenario takes place: its origin, where vehicles start and must go, and the target."""
+"""Places of a scenario: its origin, the starts and goals of the vehicles, and the target."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from outrider.scenarios.part import Coordinate, Duration, Length, Part, Position
 
 
 class Origin(Part):
-    """The fleet origin: where the fleet-local ENU frame has its zero."""
+    """Origin of the fleet-local ENU frame."""
 
     latitude: float = Field(47.397742, ge=-89.0, le=89.0, description="degrees")
     longitude: float = Field(8.545594, ge=-180.0, le=180.0, description="degrees")
@@ -19,8 +19,10 @@ class Origin(Part):
 
 
 class Ring(Part):
-    """Starts: evenly on a circle, hovering at ``height`` above the ground, jittered within a ball per
-    seed."""
+    """Starts evenly on a circle, hovering at ``height`` above the ground.
+
+    Each start is jittered within a ball, per seed.
+    """
 
     kind: Literal["ring"]
     centre: tuple[Coordinate, Coordinate] = (0.0, 0.0)
@@ -35,14 +37,17 @@ class Ring(Part):
     first_deg: float = Field(0.0, ge=-360.0, le=360.0, description="bearing of the first vehicle, ENU")
 
     def radius_of(self, count: int) -> float:
-        """m, with ``count`` vehicles on it. However they are jittered, neighbours are ``apart``."""
+        """Return the radius (m) with ``count`` vehicles.
+
+        With any jitter within the bounds, neighbours are at least ``apart`` from each other.
+        """
         if self.apart is None or count < 2:
             return self.radius
         return max(self.radius, 0.5 * (self.apart + 2.0 * self.jitter) / sin(pi / count))
 
 
 class Points(Part):
-    """Starts at given places, in the order of the vehicles, and where each must go in a task 'goto'."""
+    """Starts at given places, in the order of the vehicles, and the goals of a task 'goto'."""
 
     kind: Literal["points"]
     at: tuple[Position, ...] = Field(min_length=1, max_length=244, description="m, ENU; hovering there")
@@ -60,8 +65,10 @@ class Points(Part):
 
 
 class Bystander(Part):
-    """One more vehicle that shares no plan and heeds nobody: it hovers at its place, or with a ``goal`` flies
-    straight there, ``after_s`` seconds after the goal event."""
+    """An additional vehicle that shares no plan and does not give way.
+
+    It hovers at its place, or with a ``goal`` flies straight there, ``after_s`` seconds after the goal event.
+    """
 
     at: Position = Field(description="m, ENU; hovering there at first")
     goal: Position | None = Field(None, description="m, ENU; null: it stays")
@@ -77,15 +84,14 @@ class Bystander(Part):
 
 
 class Jump(Part):
-    """The target is suddenly elsewhere, ``after_s`` seconds after the goal event."""
+    """The target jumps to another place, ``after_s`` seconds after the goal event."""
 
     after_s: Seconds
     to: Position
 
 
 class FixedTarget(Part):
-    """A target that stays; with ``jump_to`` it is suddenly elsewhere at the goal event, with ``jumps``
-    later."""
+    """A target that stays; it jumps at the goal event with ``jump_to``, and later with ``jumps``."""
 
     kind: Literal["fixed"]
     at: Position
@@ -102,15 +108,17 @@ class FixedTarget(Part):
 
 
 class Pace(Part):
-    """From ``after_s`` seconds after the goal event on the target goes at this speed."""
+    """The target moves at this speed from ``after_s`` seconds after the goal event on."""
 
     after_s: Seconds
     speed: float = Field(ge=0.0, le=20.0, description="m/s")
 
 
 class PathTarget(Part):
-    """A target on a smooth closed path through some places, at a constant speed; it sets out at the goal
-    event. With ``paces`` it changes its speed later."""
+    """A target on a smooth closed path through some places, at a constant speed.
+
+    It starts at the goal event. With ``paces`` it changes its speed later.
+    """
 
     kind: Literal["path"]
     through: tuple[Position, ...] = Field(min_length=3, max_length=100, description="m, ENU; in this order")
@@ -128,7 +136,7 @@ class PathTarget(Part):
 
 
 class RecordedTarget(Part):
-    """A target that really flew: GLOBAL_POSITION_INT frames of a tlog, unchanged, at their recorded times."""
+    """A target from a real flight: GLOBAL_POSITION_INT frames of a tlog, unchanged, at recorded times."""
 
     kind: Literal["recorded"]
     log: str = Field(description="tlog, relative to config/logs")

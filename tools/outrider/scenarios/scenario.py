@@ -1,4 +1,4 @@
-"""A scenario file: who flies, from where to where, around what, over which links. Typed, checked, frozen."""
+"""Scenario file: vehicles, starts and goals, obstacles, links and faults; typed, checked, frozen."""
 
 from __future__ import annotations
 
@@ -57,8 +57,10 @@ class Timing(Part):
 
 
 class AutopilotPart(Part):
-    """How the autopilots fly set-points, and for how long one counts. After that ArduPilot brakes, and PX4
-    leaves offboard mode."""
+    """Response of the autopilots to set-points, and how long a set-point is valid.
+
+    After that ArduPilot brakes, and PX4 leaves offboard mode.
+    """
 
     response: ResponseName = Field(
         "exact",
@@ -113,29 +115,29 @@ class Scenario(Part):
 
     @property
     def has_goal(self) -> bool:
-        """Whether there is a goal event, and so a time of convergence."""
+        """Whether there is a goal event, and therefore a time of convergence."""
         return self.task in ("antipodal", "goto") or (
             isinstance(self.target, FixedTarget)
             and (self.target.jump_to is not None or bool(self.target.jumps))
         )
 
     def flavour_of(self, k: int) -> FlavourName:
-        """The firmware of vehicle ``k`` (0…)."""
+        """Return the firmware of vehicle ``k`` (0…)."""
         return self.flavour if isinstance(self.flavour, str) else self.flavour[k % len(self.flavour)]
 
     @property
     def duration_s(self) -> float:
-        """How long it is flown at most after the goal event (or after the start of a record)."""
+        """Longest time of flight after the goal event (or after the start of a record), s."""
         return self.target.duration_s if isinstance(self.target, RecordedTarget) else self.cap_s
 
     @property
     def systems(self) -> range:
-        """System ids of the fleet: those that fly the task, then the bystanders."""
+        """System ids of the fleet: the vehicles with the task, then the bystanders."""
         return range(FIRST_SYSTEM, FIRST_SYSTEM + self.size)
 
     @property
     def size(self) -> int:
-        """How many vehicles there are in all."""
+        """Number of all vehicles."""
         return self.vehicles + len(self.bystanders)
 
     @property
@@ -145,7 +147,7 @@ class Scenario(Part):
 
     @property
     def moving_known(self) -> tuple[Moving, ...]:
-        """The moving obstacles as companions know them."""
+        """The moving obstacles as companions are configured with them."""
         return tuple(
             one.known_as(system) for one, system in zip(self.moving, self.moving_systems, strict=True)
         )

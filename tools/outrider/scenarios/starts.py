@@ -1,4 +1,4 @@
-"""Where the vehicles of a scenario start and, where they have goals, where each must go."""
+"""Starts of a scenario's vehicles and, where they have goals, the goals."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ Array = NDArray[np.float64]
 
 
 class Starts(NamedTuple):
-    """Fleet-local ENU, m. ``positions`` (K, 3): where each hovers first, jittered, bystanders last; ``goals``
-    (vehicles, 3) of those that fly the task, or None."""
+    """Starts and goals, fleet-local ENU, m.
+
+    ``positions`` (K, 3): where each vehicle hovers first, jittered, bystanders last; ``goals`` (vehicles, 3)
+    of the vehicles with the task, or None.
+    """
 
     positions: Array
     goals: Array | None
 
 
 def starts(scenario: Scenario, seed: int, planar: bool) -> Starts:
-    """Each at its place, moved within a ball of ``jitter`` (a disc if ``planar``), which ``seed`` alone
-    decides.
+    """Return each place, moved within a ball of ``jitter`` (a disc if ``planar``) by ``seed`` alone.
 
     On a ring the places are even, and in an antipodal swap the goal is the opposite point of the ring, not of
     the jittered start.
@@ -46,7 +48,7 @@ def starts(scenario: Scenario, seed: int, planar: bool) -> Starts:
 
 
 def _slots(scenario: Scenario) -> tuple[Array, Array | None]:
-    """Where those start that fly the task, and their goals."""
+    """Return the places and the goals of the vehicles with the task."""
     config = scenario.starts
     if isinstance(config, Points):
         return np.array(config.at), None if config.goals is None else np.array(config.goals)

@@ -1,4 +1,4 @@
-"""The streams of random numbers of a seed: one table, so that no two things draw the same numbers.
+"""Streams of random numbers of a seed: one table, so that no two uses draw the same numbers.
 
 A stream is numpy's default generator of the words seed, tag, and more if there are several of a kind. numpy
 fills missing words with zeros, so a tag is never 0: that would be the stream of the bare seed, which the
@@ -13,7 +13,7 @@ import numpy as np
 
 
 class Stream(IntEnum):
-    """What is drawn."""
+    """Use of a stream."""
 
     STARTS = 0
     PHASES = 1
@@ -28,5 +28,5 @@ class Stream(IntEnum):
 
 
 def stream(seed: int, of: Stream, number: int = 0) -> np.random.Generator:
-    """The numbers of ``seed`` for one thing, the ``number``th of its kind."""
+    """Return the generator of ``seed`` for one use, the ``number``th of its kind."""
     return np.random.default_rng([seed, of, number])

@@ -1,4 +1,4 @@
-"""What says where it is: GLOBAL_POSITION_INT of one sender, at its rate, on one link."""
+"""Beacon that sends GLOBAL_POSITION_INT of one sender, at its rate, on one link."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from outrider.simulation.paths import Motion
 
 
 class Beacon:
-    """Speaks as ``system`` on ``link``, ``rate_hz`` times a second. Times are µs."""
+    """Sender of positions as ``system`` on ``link``, ``rate_hz`` times a second; times are µs."""
 
     def __init__(self, system: int, link: str, rate_hz: float, fleet: FleetFrame) -> None:
         self.source = Source(system, 1)
@@ -22,11 +22,11 @@ class Beacon:
         self._codec = Codec()
 
     def hasten(self, now: int) -> None:
-        """Speak at ``now`` already, and count the period from then."""
+        """Make the next message due at ``now``, and count the period from then."""
         self._next = now
 
     def due(self, now: int) -> bool:
-        """Whether to speak at ``now``; asked once, it is settled."""
+        """Return whether a message is due at ``now``, and if so, advance to the next one."""
         if self._boot is None:
             self._boot = now
         if self._next is None:
@@ -37,7 +37,7 @@ class Beacon:
         return True
 
     def say(self, now: int, motion: Motion, plan: Tunnel | None = None) -> list[Datagram]:
-        """Position and velocity at ``now``, and a plan if there is one."""
+        """Return a message with position and velocity at ``now``, and with ``plan`` if there is one."""
         since_boot = now - (now if self._boot is None else self._boot)
         said = position_message(self.source, since_boot, self._fleet, motion.position, motion.velocity, None)
         data = self._codec.encode(said)

@@ -1,4 +1,4 @@
-"""A vehicle that is not of the ring: it says where it is, shares no plan, and hears nothing of the others."""
+"""Bystander: a vehicle outside the ring that reports its position, shares no plan and ignores the others."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ DEAF_TO = "swarm"
 
 
 class Bystander(Companion):
-    """A companion that does not listen on the swarm link: who hovers, or comes through, and gives way to
-    nobody."""
+    """Companion that receives nothing on the swarm link; it hovers or flies through, and does not give way."""
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """As every companion, alone in the world."""
+        """Step as every companion, without the datagrams of the swarm link."""
         return super().step(now, [datagram for datagram in inbox if datagram.link != DEAF_TO])

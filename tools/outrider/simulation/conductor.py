@@ -1,5 +1,7 @@
-"""Leads a flight from take-off to landing by what is seen of it: take off, give the goal, wait for
-convergence or the cap, land."""
+"""Conductor of a flight from take-off to landing, by the observed state.
+
+Its stages: take off, give the goal, wait for convergence or the cap, land.
+"""
 
 from __future__ import annotations
 
@@ -17,23 +19,25 @@ from outrider.simulation.operator import Operator
 from sitl.estimation.profiles import PROFILES
 
 NEAR, SLOW, HOLD = 0.3, 0.3, 1_000_000
-"""Converged: nearer than this (m), slower than this against the target (m/s), for so long (µs)."""
+"""Limits of convergence: distance (m), speed relative to the target (m/s), duration (µs)."""
 _SIGMAS = 2.0
-"""Nobody can be asked to be nearer than so many σ of the sensors' error; with ``truth`` and ``rtk`` that is
-less than ``NEAR``."""
+"""The convergence distance is at least this many σ of the sensors' error.
+
+With ``truth`` and ``rtk`` that is less than ``NEAR``.
+"""
 HOVERING = 0.1
-"""m/s; the clock starts when every vehicle is slower. With noisy sensors a hover is not that still."""
+"""m/s; the clock starts when every vehicle is slower. With noisy sensors a hover is less steady."""
 _RESTLESS = {"truth": HOVERING, "rtk": 0.2, "gnss": 0.4, "sih": 0.4}
 _TOSSED = 0.8
-"""The same in turbulent air."""
+"""The same limit in turbulent air (m/s)."""
 PREPARE_CAP = 90_000_000
-"""µs within which all vehicles must hover, or nothing comes of the flight."""
+"""µs within which all vehicles must hover; otherwise the flight fails."""
 _SETTLE, _AFTER = 500_000, 5_000_000
 _LAND_CAPS = {"land": 60_000_000, "return": 120_000_000}
 
 
 class Stage(Enum):
-    """Where the run is."""
+    """Stage of the run."""
 
     PREPARE = "take-off"
     CLOCK = "flight"
@@ -42,9 +46,12 @@ class Stage(Enum):
 
 
 class Sight(NamedTuple):
-    """What is seen at ``now`` (µs): true positions, velocities (K, 3), the target's place or None, ENU;
-    whether all companions that can are under way (``ready``), what the others wait for, whether any motor may
-    turn."""
+    """Observed state at ``now`` (µs).
+
+    True positions and velocities (K, 3), the target's position or None, ENU; ``ready``: whether all
+    companions that can be are under way; ``waiting``: what the others wait for; ``armed``: whether any motor
+    may turn.
+    """
 
     now: int
     positions: Array
@@ -56,7 +63,7 @@ class Sight(NamedTuple):
 
 
 class _Intruder(NamedTuple):
-    """A bystander that sets out ``after`` µs for its goal (3,)."""
+    """A bystander that starts for its goal (3,) ``after`` µs after the goal event."""
 
     after: int
     system: int
@@ -64,7 +71,7 @@ class _Intruder(NamedTuple):
 
 
 def _intruders(scenario: Scenario) -> list[_Intruder]:
-    """In the order of time."""
+    """Return the bystanders with a goal, in the order of time."""
     found = [
         _Intruder(round(1e6 * other.after_s), system, np.array(other.goal))
         for system, other in zip(scenario.systems[scenario.vehicles :], scenario.bystanders, strict=True)
@@ -74,7 +81,7 @@ def _intruders(scenario: Scenario) -> list[_Intruder]:
 
 
 def _turning_speed(scenario: Scenario) -> float:
-    """How fast (m/s) the outermost vehicle of a ring that turns goes round."""
+    """Return the speed (m/s) of the outermost vehicle of a ring that turns; 0 if it does not turn."""
     companion = scenario.companion
     if not companion.turn_rate:
         return 0.0
@@ -84,10 +91,13 @@ def _turning_speed(scenario: Scenario) -> float:
 
 
 class Conductor:
-    """The stages of one flight. ``failure`` says why if it never got to its clock or did not land."""
+    """Sequence of the stages of one flight.
+
+    ``failure`` states the reason if the flight never reached its clock or did not land.
+    """
 
     def __init__(self, scenario: Scenario, starts: Starts, operator: Operator, epoch: int) -> None:
-        """Orders the take-off. ``epoch``: when the run begins, µs."""
+        """Order the take-off; ``epoch``: beginning of the run, µs."""
         self._scenario, self._starts, self._operator = scenario, starts, operator
         self._epoch = epoch
         self.stage = Stage.PREPARE
@@ -108,11 +118,11 @@ class Conductor:
 
     @property
     def near(self) -> float:
-        """m from where it should be, within which a vehicle has arrived."""
+        """Distance (m) from its place within which a vehicle has arrived."""
         return max(NEAR, _SIGMAS * PROFILES[self._scenario.sensors].deviation)
 
     def see(self, sight: Sight) -> bool:
-        """Go on to the next stage if it is time; True when the flight is over."""
+        """Advance to the next stage if it is time; return True when the flight is over."""
         if self.stage is Stage.PREPARE:
             self._prepare(sight)
         elif self.stage is Stage.CLOCK:
@@ -127,7 +137,7 @@ class Conductor:
         return self.stage is Stage.DONE
 
     def abort(self, now: int, why: str) -> None:
-        """Land now, whatever the stage."""
+        """Order the landing now, unless the flight is landing already, and record ``why`` as the failure."""
         if self.stage in (Stage.PREPARE, Stage.CLOCK):
             self.failure = why
             if self.clock_start is not None:
@@ -135,8 +145,10 @@ class Conductor:
             self._land(now)
 
     def errors(self, sight: Sight) -> Array:
-        """Distance (vehicles,) of each that flies the task from where it should be: its goal, or its surface
-        around the target."""
+        """Return the distance (vehicles,) in m of each vehicle with the task from its place.
+
+        The place is its goal, or its surface around the target. The distances are NaN without a target.
+        """
         positions = sight.positions[: self._scenario.vehicles]
         if self._starts.goals is not None:
             return np.asarray(np.linalg.norm(positions - self._starts.goals, axis=1))
@@ -148,7 +160,7 @@ class Conductor:
         now, still = sight.now, _RESTLESS[self._scenario.sensors]
         if self._scenario.weather.w20 > 0.0:
             still = _TOSSED
-        # A ring that turns never stands still.
+        # A ring that turns is never at rest.
         still += self._turning
         calm = sight.ready and float(np.linalg.norm(sight.velocities, axis=1).max()) < still
         if not calm:

@@ -1,4 +1,4 @@
-"""What people see: progress on standard error, tables on standard output."""
+"""Console output: progress on standard error, tables on standard output."""
 
 from __future__ import annotations
 
@@ -50,8 +50,11 @@ _WORDS = {
 
 @contextmanager
 def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
-    """A bar for one flight, or a line now and then when there is no terminal; the callable takes stage and
-    simulated seconds. Without a thread of its own: a flight in real time forks while the bar stands."""
+    """Show a bar for one flight, or a line now and then when there is no terminal.
+
+    The yielded function takes stage and simulated seconds. No thread is used, because a flight in real time
+    forks while the bar is shown.
+    """
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -81,7 +84,7 @@ def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
 
 
 def show(summary: Mapping[str, Value]) -> None:
-    """The summary as a table; keys without a value are left out."""
+    """Show the summary as a table; keys without a value are left out."""
     way = "certified" if summary["avoidance"] == "certified" else summary["method"]
     table = Table(title=f"{summary['scenario']} · {way} · seed {summary['seed']}", show_header=False)
     for key, words in _WORDS.items():
@@ -93,7 +96,7 @@ def show(summary: Mapping[str, Value]) -> None:
 
 
 def show_bench(figures: Mapping[str, object]) -> None:
-    """The benchmark as a table."""
+    """Show the benchmark as a table."""
     table = Table(title="outrider bench", show_header=False)
     for key, value in figures.items():
         table.add_row(key, _text(value))

@@ -1,4 +1,4 @@
-"""The faults and partitions of a scenario as events in time, relative to the goal event."""
+"""Faults and partitions of a scenario as events in time, relative to the goal event."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sitl.node import Autopilot
 
 
 class Event(NamedTuple):
-    """``what`` begins, or ends if ``over``, ``after`` µs after the goal event."""
+    """Beginning of ``what``, or its end if ``over``, ``after`` µs after the goal event."""
 
     after: int
     what: Sudden | PartitionPart
@@ -28,33 +28,33 @@ class Event(NamedTuple):
 
 
 class Computers(Protocol):
-    """Whoever runs the companions: what can happen to a computer and its radio."""
+    """Interface to the companions' computers and radios, for faults."""
 
     def freeze(self, system: int) -> None:
-        """It hangs."""
+        """Suspend the companion of ``system``."""
         ...
 
     def thaw(self, system: int) -> None:
-        """It goes on."""
+        """Resume the companion of ``system``."""
         ...
 
     def vanish(self, system: int) -> None:
-        """It is gone."""
+        """Remove the companion of ``system`` for good."""
         ...
 
     def cut(self, systems: tuple[int, ...]) -> None:
-        """Nothing passes between these and the others on the swarm link."""
+        """Block the swarm link between these systems and the others."""
         ...
 
     def heal(self, systems: tuple[int, ...]) -> None:
-        """It passes again."""
+        """End the block between these systems and the others."""
         ...
 
 
 def events(scenario: Scenario) -> list[Event]:
-    """All of a scenario, in the order of time; what ends at an instant goes before what begins then."""
+    """Return all events of a scenario in the order of time; an end goes before a beginning at one instant."""
     found = []
-    # A clock that is off is off from the start: it is no event.
+    # A clock fault holds from the start, so it is no event.
     sudden = [fault for fault in scenario.faults if not isinstance(fault, ClockFault)]
     for what in (*sudden, *scenario.partitions):
         begin = round(1e6 * what.at_s)
@@ -66,7 +66,7 @@ def events(scenario: Scenario) -> list[Event]:
 
 
 def strike_autopilot(event: Event, autopilot: Autopilot) -> None:
-    """Let an event happen to its vehicle's autopilot; one that concerns the companion does nothing here."""
+    """Apply an event to its vehicle's autopilot; an event of the companion has no effect here."""
     match event.what:
         case GpsLoss():
             if event.over:
@@ -76,14 +76,14 @@ def strike_autopilot(event: Event, autopilot: Autopilot) -> None:
         case GpsJump(offset=offset):
             autopilot.shift_gps((0.0, 0.0, 0.0) if event.over else offset)
         case MotorFailure(rotor=rotor, left=left):
-            # Thrust goes with the square of the speed, which is what fails.
+            # Thrust is proportional to the square of the speed, which is what fails.
             autopilot.fail_rotor(rotor, sqrt(left))
         case _:
             pass
 
 
 def strike_computer(event: Event, computers: Computers) -> None:
-    """Let an event happen to a companion's computer or radio; one of an autopilot does nothing here."""
+    """Apply an event to a companion's computer or radio; an event of an autopilot has no effect here."""
     match event.what:
         case Freeze(vehicle=system):
             if event.over:

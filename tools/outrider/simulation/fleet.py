@@ -1,5 +1,7 @@
-"""The nodes of a scenario for one seed, and how they are linked. The only place where companion and sitl
-stand side by side; they still meet only in MAVLink bytes."""
+"""Nodes of a scenario for one seed, and their links.
+
+This is the only module that composes companion and sitl; they still meet only in MAVLink bytes.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,7 @@ from sitl.vehicle.config import VehicleConfig
 
 
 class End(NamedTuple):
-    """A node on a link: its name, the link's name there, and the words that a scenario calls it by."""
+    """A node on a link: its name, the link's name there, and the words by which a scenario refers to it."""
 
     node: str
     link: str
@@ -41,9 +43,9 @@ class End(NamedTuple):
 
 
 class Fleet:
-    """Makes each node of ``scenario``; the same seed makes the same ones, in whatever process.
+    """Factory of the nodes of ``scenario``; the same seed gives the same nodes, in any process.
 
-    ``logs`` is where recorded targets lie.
+    ``logs`` is the folder of recorded targets.
     """
 
     def __init__(self, scenario: Scenario, vehicle: VehicleConfig, seed: int, logs: Path) -> None:
@@ -59,11 +61,14 @@ class Fleet:
 
     @property
     def companion_config(self) -> CompanionConfig:
-        """The companions' settings with what the scenario tells them."""
+        """The companions' settings, completed from the scenario."""
         return settings_of(self.scenario)
 
     def companion_config_of(self, k: int) -> CompanionConfig:
-        """Those of vehicle ``k``: a bystander flies to goals, shares no plan and knows of no obstacle."""
+        """Return the settings of vehicle ``k``.
+
+        A bystander flies to goals, shares no plan and is configured with no obstacles.
+        """
         config = self.companion_config
         if k < self.scenario.vehicles:
             return config
@@ -83,7 +88,7 @@ class Fleet:
         return config.model_copy(update=changes)
 
     def target(self) -> Target:
-        """The target's node."""
+        """Return the target's node."""
         config = self.scenario.target
         if isinstance(config, FixedTarget):
             return Standing(config, self.frame)
@@ -92,33 +97,33 @@ class Fleet:
         return Recorded(config, self._logs / config.log, self.frame)
 
     def moving(self) -> list[MovingObstacle]:
-        """The nodes of the moving obstacles."""
+        """Return the nodes of the moving obstacles."""
         scenario = self.scenario
         pairs = zip(scenario.moving, scenario.moving_systems, strict=True)
         return [MovingObstacle(config, system, self.frame) for config, system in pairs]
 
     def operator(self) -> Operator:
-        """The operator's node."""
+        """Return the operator's node."""
         return Operator(self.frame)
 
     def companion(self, k: int, stopwatch: Callable[[], int]) -> Companion:
-        """The companion of vehicle ``k``; ``stopwatch`` (ns) measures its planning."""
+        """Return the companion of vehicle ``k``; ``stopwatch`` (ns) measures its planning."""
         kind = Companion if k < self.scenario.vehicles else Bystander
         config = self.companion_config_of(k)
         return kind(config, self.systems[k], self.target_system, self.frame, stopwatch)
 
     @property
     def helmed(self) -> list[int]:
-        """The vehicles, by their index, that have a helm: those whose plans others count on."""
+        """Indices of the vehicles with a backup node: those on whose plans others rely."""
         certified = self.scenario.companion.avoidance == "certified"
         return list(range(self.scenario.vehicles)) if certified else []
 
     def helm(self, k: int) -> BackupNode:
-        """The helm of vehicle ``k``."""
+        """Return the backup node of vehicle ``k``."""
         return BackupNode(self.companion_config_of(k), self.systems[k], self.frame)
 
     def autopilot(self, k: int) -> Autopilot:
-        """The autopilot and vehicle ``k``: on the ground below its start, or hovering there."""
+        """Return the autopilot with vehicle ``k``, on the ground below its start or hovering there."""
         start = self.starts.positions[k]
         place = start * (1.0, 1.0, 0.0)
         latitude, longitude, altitude = self.frame.to_geodetic(place)
@@ -138,7 +143,7 @@ class Fleet:
         return Autopilot(config, self.vehicle, self.frame, self.seed, weather=self.scenario.weather)
 
     def clock(self, k: int, since: int) -> NodeClock:
-        """How the clock of companion ``k`` differs from true time from ``since`` (µs) on."""
+        """Return the clock of companion ``k`` relative to true time from ``since`` (µs) on."""
         for fault in self.scenario.faults:
             if isinstance(fault, ClockFault) and fault.vehicle == self.systems[k]:
                 return NodeClock(-round(1000.0 * fault.late_ms), fault.drift_ppm, since)
@@ -147,15 +152,17 @@ class Fleet:
         return NodeClock(round(1000.0 * bounds.offset_ms * offset), float(bounds.drift_ppm * drift), since)
 
     def phases(self) -> list[int]:
-        """When in its period (µs) each companion is due: seeded, so that they never replan all on one
-        tick."""
+        """Return the phase (µs) of each companion in its period.
+
+        The phases are drawn by seed, so that the companions never all replan on one tick.
+        """
         timing = self.scenario.timing
         random = stream(self.seed, Stream.PHASES)
         ticks = random.integers(timing.companion_us // timing.base_tick_us, size=len(self.systems))
         return [int(tick) * timing.base_tick_us for tick in ticks]
 
     def channels(self) -> list[Channel]:
-        """All links of the fleet with their faults, for the ether."""
+        """Return all links of the fleet with their faults, for the simulated network."""
         links = self.scenario.links
         companions = [(names.companion(system), ("companion", system)) for system in self.systems]
         channels = []
@@ -182,7 +189,7 @@ class Fleet:
 
 
 def _channel(name: str, ends: Sequence[End], links: Links) -> Channel:
-    """A channel between ``ends`` whose paths have the faults that ``links`` says for them."""
+    """Return a channel between ``ends`` whose paths have the faults that ``links`` defines for them."""
     overrides: dict[tuple[str | None, str | None], Faults] = {}
     if links.directions:
         for sender in ends:

@@ -1,5 +1,7 @@
-"""One lock-step flight of a scenario: its fleet under simulated time, led by the conductor, watched by the
-witness, struck by what the scenario lets go wrong."""
+"""Lock-step flight of a scenario: its fleet under simulated time.
+
+The conductor leads the flight, the witness observes it, and the scenario's faults are applied to it.
+"""
 
 from __future__ import annotations
 
@@ -36,14 +38,14 @@ _LONGEST = 10_000_000_000
 
 Progress = Callable[[Stage, float], None]
 Onlooker = Callable[["Flight", int], None]
-"""Hears of every sample (µs), after all nodes have stepped."""
+"""Function that is called at every sample (µs), after all nodes have stepped."""
 
 
 class Flight:
-    """Builds the nodes of a scenario for one seed, and runs them.
+    """Flight of a scenario's nodes for one seed.
 
-    ``progress`` hears the stage and simulated seconds; with a ``run_directory`` each vehicle leaves a tlog
-    there. ``stopwatch`` (ns) measures planning; the ``onlooker`` may change what is public.
+    ``progress`` is called with the stage and simulated seconds. With a ``run_directory`` each vehicle's tlog
+    is written there. ``stopwatch`` (ns) measures planning; the ``onlooker`` may change public attributes.
     """
 
     def __init__(
@@ -81,7 +83,7 @@ class Flight:
         self._tally_at_end: list[Tally] = []
 
     def run(self) -> None:
-        """Fly to the end; ``outcome`` then says how it was."""
+        """Fly to the end; ``outcome`` then holds the results."""
         with ExitStack() as files, seldom_collected():
             taps = []
             if self._directory is not None:
@@ -92,7 +94,7 @@ class Flight:
 
     @property
     def outcome(self) -> Outcome:
-        """What is left of the flight."""
+        """Results of the flight."""
         conductor, now = self.conductor, [c.tally for c in self.companions]
         counters = self.ether.counters
         return Outcome(
@@ -112,7 +114,7 @@ class Flight:
         )
 
     def _schedule(self) -> list[Scheduled]:
-        """Companions are due out of step, and by clocks of their own."""
+        """Return the schedule; companions are due out of step, and by clocks of their own."""
         timing = self.scenario.timing
         nodes = [Scheduled(a, timing.autopilot_us, EPOCH) for a in self.autopilots]
         for k, (companion, phase) in enumerate(zip(self.companions, self.fleet.phases(), strict=True)):
@@ -127,7 +129,7 @@ class Flight:
         return nodes[::-1] if self._reverse else nodes
 
     def _watch(self, now: int, computers: _Computers) -> bool:
-        """After every tick; True ends the run."""
+        """Process a tick; return True to end the run."""
         conductor = self.conductor
         if conductor.clock_start is not None:
             while self._events and self._events[0].after <= now - conductor.clock_start:
@@ -146,7 +148,7 @@ class Flight:
         return over
 
     def _begin(self, now: int) -> None:
-        """The goal event."""
+        """Start the clock: the goal event."""
         self._tally_at_start = [c.tally for c in self.companions]
         self.target.begin(now)
         for moving in self.moving:
@@ -198,7 +200,7 @@ class _Computers:
 
 
 def truth_of(scenario: Scenario) -> Truth:
-    """What collects the true motions of its flight, and knows what counts as too near."""
+    """Return the collector of the scenario's true motions, with its limits of distance."""
     return Truth(
         scenario.size,
         Limits(scenario.d_min, scenario.d_min_target, scenario.d_min_obstacle),

@@ -1,5 +1,8 @@
-"""An obstacle that moves, as a node: on the swarm link it says where it is and, if its way is known, where it
-will be; it hears nothing and gives way to nobody."""
+"""Moving obstacle as a node.
+
+On the swarm link it sends its position and, with ``shares_plan``, its trajectory. It receives nothing and
+does not give way.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +22,11 @@ from outrider.simulation.paths import Array, ClosedPath, Motion, Walk
 
 LINK = "swarm"
 STEP = 100_000
-"""µs between the knots of a plan: with all that the wire holds it reaches 1.6 s."""
+"""µs between the knots of a plan: with all knots of the wire it reaches 1.6 s."""
 
 
 class MovingObstacle:
-    """Goes along its closed path from the goal event on; until then it stands at its beginning."""
+    """Obstacle on a closed path from the goal event on; until then it stands at the path's beginning."""
 
     def __init__(self, config: MovingPart, system: int, fleet: FleetFrame) -> None:
         self.name = names.moving(system)
@@ -34,22 +37,24 @@ class MovingObstacle:
         self._beacon = Beacon(system, LINK, config.rate_hz, fleet)
 
     def begin(self, now: int) -> None:
-        """The goal event: set out."""
+        """Start at the goal event."""
         self.walk.begin(now)
 
     def motion(self, now: int) -> Motion:
-        """True position and velocity at ``now`` (µs)."""
+        """Return the true position and velocity at ``now`` (µs)."""
         return self.walk.motion(now)
 
     def horizon(self, now: int) -> Horizon:
-        """Where it will be from ``now`` (µs) on: with the velocities of its way at the knots, and within
-        millimetres of it."""
+        """Return the trajectory from ``now`` (µs) on.
+
+        It has the velocities of the path at the knots, and deviates from the path by millimetres.
+        """
         motions = [self.walk.motion(now + n * STEP) for n in range(KNOTS + 1)]
         accelerations = np.diff([motion.velocity for motion in motions], axis=0) / (1e-6 * STEP)
         return roll_out(now, STEP, motions[0].position, motions[0].velocity, accelerations)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Its position and velocity, and its plan if it shares one, at its rate."""
+        """Send position and velocity, and the plan if it is shared, at the configured rate."""
         if not self._beacon.due(now):
             return []
         plan = None
@@ -59,7 +64,7 @@ class MovingObstacle:
 
 
 def places(moving: Sequence[MovingObstacle], times: Iterable[int]) -> Array:
-    """Where they truly are (n, M, 3) at ``times`` (µs), ENU."""
+    """Return the true positions (n, M, 3) at ``times`` (µs), ENU."""
     when = np.fromiter(times, dtype=np.int64)
     if not moving:
         return np.empty((len(when), 0, 3))

@@ -1,4 +1,4 @@
-"""The operator's ground station as a node: it gives each companion its go, its goal and the order to land."""
+"""Operator's ground station as a node: it sends the orders to take off, to fly to a goal and to land."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _Key = tuple[int, int]
 
 
 class Operator:
-    """Repeats every order each half second until its companion acknowledges it."""
+    """Ground station that repeats every order each half second until its companion acknowledges it."""
 
     name = "operator"
 
@@ -36,24 +36,23 @@ class Operator:
         self._now = 0
 
     def take_off(self, system: int, height: float) -> None:
-        """Climb to ``height`` (m) above the start, and escort."""
+        """Order a climb to ``height`` (m) above the start, and then the escort."""
         params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, height)
         self._order(CommandLong(self._source, system, COMPONENT, NAV_TAKEOFF, 0, params))
 
     def land(self, system: int) -> None:
-        """Land where you are; an order to take off that is still open is taken back."""
+        """Order a landing on the spot; a pending order to take off is withdrawn."""
         self._open.pop((system, NAV_TAKEOFF), None)
         params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0)
         self._order(CommandLong(self._source, system, COMPONENT, NAV_LAND, 0, params))
 
     def come_back(self, system: int) -> None:
-        """Return to where you started and land there; an order to take off that is still open is taken
-        back."""
+        """Order a return to the start and a landing there; a pending order to take off is withdrawn."""
         self._open.pop((system, NAV_TAKEOFF), None)
         self._order(CommandLong(self._source, system, COMPONENT, NAV_RETURN, 0, (0.0,) * 7))
 
     def goal(self, system: int, position: NDArray[np.float64]) -> None:
-        """Go to ``position`` (3,), fleet-local ENU."""
+        """Order a flight to ``position`` (3,), fleet-local ENU."""
         latitude, longitude, altitude = self._fleet.to_geodetic(position)
         self._order(
             CommandInt(
@@ -75,7 +74,7 @@ class Operator:
         return sorted({system for system, _ in self._open})
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Cross off what was acknowledged, send what is new or overdue."""
+        """Remove acknowledged orders, and send those that are new or overdue."""
         self._now = now
         for datagram in inbox:
             for message in self._codec.feed(datagram.data):

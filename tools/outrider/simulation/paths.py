@@ -1,4 +1,4 @@
-"""Smooth closed paths through given places, and who goes along one at a constant speed."""
+"""Smooth closed paths through given places, and motion along one at given speeds."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 _FINE = 4096
-"""Pieces that the path is measured in."""
+"""Number of pieces in which the path is measured."""
 _STILL = 1e-9
-"""m; shorter than that is no path but a place."""
+"""m; anything shorter is a place, not a path."""
 
 
 class Motion(NamedTuple):
@@ -23,8 +23,10 @@ class Motion(NamedTuple):
 
 
 class ClosedPath:
-    """The trigonometric polynomial through ``places`` (n, 3) at even parameters: smooth everywhere, and
-    closed. ``length`` in m."""
+    """Trigonometric polynomial through ``places`` (n, 3) at even parameters: smooth everywhere, and closed.
+
+    ``length`` in m.
+    """
 
     def __init__(self, places: Array) -> None:
         count = len(places)
@@ -42,15 +44,15 @@ class ClosedPath:
         self.length = float(self._lengths[-1])
 
     def at(self, distance: float, speed: float) -> Motion:
-        """After ``distance`` m along it (round and round), at ``speed`` m/s."""
+        """Return the motion after ``distance`` m along the path (round and round), at ``speed`` m/s."""
         parameter = self._parameter(np.array([distance]))
         along = self._at(parameter, 1)[0]
-        # Where a path that is bent to a line turns back, for an instant there is no direction.
+        # Where a path that degenerates to a line turns back, it has no direction for an instant.
         length = max(float(np.linalg.norm(along)), _STILL)
         return Motion(self._at(parameter, 0)[0], speed * along / length)
 
     def places(self, distances: Array) -> Array:
-        """Positions (n, 3) m after ``distances`` (n,) m."""
+        """Return the positions (n, 3) m after ``distances`` (n,) m."""
         return self._at(self._parameter(distances), 0)
 
     def _parameter(self, distances: Array) -> Array:
@@ -59,22 +61,24 @@ class ClosedPath:
 
     @property
     def sharpest(self) -> float:
-        """The largest curvature, 1/m: at v m/s it takes v² times that in m/s²."""
+        """Largest curvature, 1/m: at v m/s it requires v² times that in m/s²."""
         first, second = self._at(self._parameters, 1), self._at(self._parameters, 2)
         bent = np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3
         return float(bent.max())
 
     def _at(self, parameters: Array, derivative: int) -> Array:
-        """The polynomial or a derivative of it, (n, 3)."""
+        """Return the polynomial or a derivative of it, (n, 3)."""
         turning = (1j * self._harmonics) ** derivative * np.exp(1j * np.outer(parameters, self._harmonics))
         result: Array = np.real(turning @ self._coefficients)
         return result
 
 
 class Walk:
-    """Motion along ``path``: at rest at its beginning, then with ``setting_out`` m/s² up to ``speed`` m/s,
-    round and round. ``paces`` (s after the start, m/s) are speeds that it changes to later, as gently. Times
-    are µs."""
+    """Motion along ``path``; times are µs.
+
+    It is at rest at the path's beginning, then accelerates with ``setting_out`` m/s² up to ``speed`` m/s,
+    round and round. ``paces`` (s after the start, m/s) are later speeds, reached with the same acceleration.
+    """
 
     def __init__(
         self, path: ClosedPath, speed: float, setting_out: float, paces: Sequence[tuple[float, float]] = ()
@@ -85,20 +89,20 @@ class Walk:
         self._start: int | None = None
 
     def begin(self, now: int) -> None:
-        """Set out."""
+        """Start at ``now``."""
         self._start = now
 
     def motion(self, now: int) -> Motion:
-        """Position and velocity at ``now``."""
+        """Return the position and velocity at ``now``."""
         (distance,), (speed,) = self._gone(np.array([now]))
         return self.path.at(distance, speed)
 
     def places(self, times: NDArray[np.int64]) -> Array:
-        """Positions (n, 3) at ``times`` (n,)."""
+        """Return the positions (n, 3) at ``times`` (n,)."""
         return self.path.places(self._gone(times)[0])
 
     def _gone(self, times: NDArray[np.int64]) -> tuple[Array, Array]:
-        """How far it has come (n,), m, and how fast it is (n,), m/s."""
+        """Return the distance covered (n,), m, and the speed (n,), m/s."""
         since = np.zeros(len(times)) if self._start is None else np.maximum(times - self._start, 0) * 1e-6
         if self._profile is not None:
             begins, gone, speeds, gains = self._profile
@@ -112,8 +116,12 @@ class Walk:
 
 
 def _profile(paces: Sequence[tuple[float, float]], gain: float) -> tuple[Array, Array, Array, Array]:
-    """Pieces of constant acceleration, each (n,): when it begins (s), the way gone (m), the speed (m/s) and
-    the acceleration (m/s²) from then on. A pace that ends before it is reached is left as it is then."""
+    """Return pieces of constant acceleration, each (n,).
+
+    For each piece: its beginning (s), and from then on the distance covered (m), the speed (m/s) and the
+    acceleration (m/s²). If a pace ends before its speed is reached, the next one starts from the speed
+    reached.
+    """
     pieces = [(0.0, 0.0, 0.0)]
     speed = 0.0
     for index, (begin, wanted) in enumerate(paces):

@@ -1,4 +1,4 @@
-"""A scenario ready to be flown, and flights of which only the summary counts."""
+"""Preparation of a scenario for flight, and flights that return only the summary."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ class Prepared(NamedTuple):
 
 
 def prepare(name: str, options: Options) -> Prepared:
-    """Load a scenario by name or path and apply ``options``. InputError in one line for whatever is wrong."""
+    """Load a scenario by name or path and apply ``options``; raise InputError for any fault."""
     path = find("scenarios", name)
     scenario = apply(load(path, Scenario), options)
     if isinstance(scenario.target, RecordedTarget):
-        # Before a run directory is made: a log that cannot be used leaves none behind.
+        # Before a run directory is made: an unusable log then leaves none behind.
         origin = scenario.origin
         frame = FleetFrame(origin.latitude, origin.longitude, origin.altitude)
         load_log(scenario.target, config_root() / "logs" / scenario.target.log, frame)
     if scenario.physics == "jsbsim":
-        # Nor does a package that is missing.
+        # The same holds for a missing package.
         import_module("jsbsim")
     vehicle = load(find("vehicles", scenario.vehicle), VehicleConfig)
     last = len(vehicle.rotors) - 1
@@ -51,12 +51,15 @@ def prepare(name: str, options: Options) -> Prepared:
 
 
 def measure(prepared: Prepared, seed: int) -> dict[str, Value]:
-    """Fly it for what its seed decides: no files, and of the summary all but ``WALL_FIELDS``."""
+    """Fly and return the part of the summary that the seed determines: all but ``WALL_FIELDS``.
+
+    No files are written.
+    """
     return measured(prepared, seed)[1]
 
 
 def measured(prepared: Prepared, seed: int) -> tuple[Outcome, dict[str, Value]]:
-    """As ``measure``, with all that is left of the flight."""
+    """Fly as ``measure`` does, and return also the outcome."""
     # Reading the CPU clock before and after every plan costs more than a hundredth of a flight.
     flight = Flight(*prepared, seed, config_root() / "logs", stopwatch=lambda: 0)
     flight.run()

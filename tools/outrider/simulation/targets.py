@@ -1,5 +1,4 @@
-"""The target as a node: it sends GLOBAL_POSITION_INT on its link, and the harness may ask where it truly
-is."""
+"""Target as a node: it sends GLOBAL_POSITION_INT on its link, and gives its true position to the harness."""
 
 from __future__ import annotations
 
@@ -26,23 +25,23 @@ from outrider.simulation.paths import ClosedPath, Motion, Walk
 Array = NDArray[np.float64]
 LINK = "target"
 SHORT = 1.0
-"""s; a log may end this much before the piece that is wanted of it does."""
+"""s; a log may end this much before the end of the requested piece."""
 
 
 class Placed(Protocol):
-    """What has a known truth."""
+    """Object with a known true position."""
 
     def begin(self, now: int) -> None:
-        """The goal event: jump, or start the record."""
+        """Start at the goal event: jump, or start the record."""
         ...
 
     def position(self, now: int) -> Array | None:
-        """True position (3,), fleet-local ENU, at ``now`` (µs); None when it is not there."""
+        """Return the true position (3,), fleet-local ENU, at ``now`` (µs); None when it is absent."""
         ...
 
 
 class Target(Placed, Protocol):
-    """A node with a known truth."""
+    """Node with a known true position."""
 
     @property
     def name(self) -> str:
@@ -55,16 +54,16 @@ class Target(Placed, Protocol):
         ...
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """As every node."""
+        """Step as every node."""
         ...
 
     def move(self, now: int, place: Array) -> None:
-        """It is suddenly at ``place`` (3,) at ``now``, and goes its way from there."""
+        """Move the target to ``place`` (3,) at ``now``; it continues from there."""
         ...
 
 
 class Standing:
-    """Stays at one place; jumps to others at the goal event and later if it has them."""
+    """Target at one place; it jumps to others at the goal event and later, if configured."""
 
     name = "target"
     system = TARGET_SYSTEM
@@ -76,19 +75,19 @@ class Standing:
         self._beacon = Beacon(TARGET_SYSTEM, LINK, config.rate_hz, fleet)
 
     def begin(self, now: int) -> None:
-        """Jump, and say so at once; what comes later counts from now."""
+        """Jump and send the new position at once; later jumps count from ``now``."""
         config = self._config
         self._jumps.extend((now + round(1e6 * jump.after_s), np.array(jump.to)) for jump in config.jumps)
         if config.jump_to is not None:
             self._jump(now, np.array(config.jump_to))
 
     def position(self, now: int) -> Array | None:
-        """Where it stands."""
+        """Return the present place."""
         self._move(now)
         return self._place
 
     def move(self, now: int, place: Array) -> None:
-        """Stand there from now on."""
+        """Stand at ``place`` from now on."""
         self._move(now)
         self._jump(now, np.array(place))
 
@@ -101,7 +100,7 @@ class Standing:
         self._beacon.hasten(when)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Its position, at its rate."""
+        """Send the position at the configured rate."""
         self._move(now)
         if not self._beacon.due(now):
             return []
@@ -109,7 +108,7 @@ class Standing:
 
 
 class Walking:
-    """Goes along a closed path from the goal event on; until then it stands at its beginning."""
+    """Target on a closed path from the goal event on; until then it stands at the path's beginning."""
 
     name = "target"
     system = TARGET_SYSTEM
@@ -122,35 +121,37 @@ class Walking:
         self._beacon = Beacon(TARGET_SYSTEM, LINK, config.rate_hz, fleet)
 
     def begin(self, now: int) -> None:
-        """Set out."""
+        """Start along the path."""
         self._walk.begin(now)
 
     def motion(self, now: int) -> Motion:
-        """True position and velocity at ``now`` (µs)."""
+        """Return the true position and velocity at ``now`` (µs)."""
         motion = self._walk.motion(now)
         if self._aside is None:
             return motion
         return motion._replace(position=motion.position + self._aside)
 
     def position(self, now: int) -> Array | None:
-        """Where it is."""
+        """Return the true position at ``now`` (µs)."""
         return self.motion(now).position
 
     def move(self, now: int, place: Array) -> None:
-        """The whole path moves along."""
+        """Shift the whole path so that the target is at ``place``."""
         self._aside = (0.0 if self._aside is None else self._aside) + place - self.motion(now).position
         self._beacon.hasten(now)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Its position and velocity, at its rate."""
+        """Send position and velocity at the configured rate."""
         if not self._beacon.due(now):
             return []
         return self._beacon.say(now, self.motion(now))
 
 
 class Recording(NamedTuple):
-    """Frames of one sender: ``times`` (n,) µs from the start of the piece, the bytes, and the truth (n, 3)
-    ENU."""
+    """Frames of one sender.
+
+    ``times`` (n,) µs from the start of the piece, the bytes, and the true positions (n, 3) ENU.
+    """
 
     times: NDArray[np.int64]
     frames: tuple[bytes, ...]
@@ -158,7 +159,7 @@ class Recording(NamedTuple):
 
 
 class Recorded:
-    """Plays a piece of a tlog. Its truth is the log, interpolated at the times of reception."""
+    """Target that replays a piece of a tlog; its truth is the log, interpolated at the reception times."""
 
     name = "target"
 
@@ -172,12 +173,14 @@ class Recorded:
         self._codec = Codec()
 
     def begin(self, now: int) -> None:
-        """The record starts now."""
+        """Start the record at ``now``."""
         self._start = now
 
     def position(self, now: int) -> Array | None:
-        """The log interpolated at ``now``; before the start its first place; None after its end: it is
-        gone."""
+        """Return the log's position interpolated at ``now``.
+
+        Before the start it is the first position of the log; after its end it is None.
+        """
         times, places = self.recording.times, self.recording.positions
         since = 0 if self._start is None else now - self._start
         if since > times[-1]:
@@ -186,13 +189,13 @@ class Recorded:
         return there if self._aside is None else there + self._aside
 
     def move(self, now: int, place: Array) -> None:
-        """The rest of the record moves along; it is no longer byte for byte what was recorded."""
+        """Shift the rest of the record to ``place``; its frames then differ from the recorded bytes."""
         here = self.position(now)
         if here is not None:
             self._aside = (0.0 if self._aside is None else self._aside) + place - here
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Every frame whose time has come, byte for byte."""
+        """Send every frame whose time has come, byte for byte unless the target was moved."""
         out: list[Datagram] = []
         if self._start is None:
             return out
@@ -203,7 +206,7 @@ class Recorded:
         return out
 
     def _told(self, frame: bytes) -> bytes:
-        """The frame, with the place in it that the target was moved to."""
+        """Return the frame, shifted to where the target was moved."""
         if self._aside is None:
             return frame
         out = b""
@@ -217,8 +220,11 @@ class Recorded:
 
 
 def load(config: RecordedTarget, path: Path, fleet: FleetFrame) -> Recording:
-    """The piece of the log that ``config`` names, in the order of time. InputError when there is no such log,
-    when it ends before the piece does, or when it holds no such messages there."""
+    """Return the piece of the log that ``config`` selects, in the order of time.
+
+    Raises InputError when there is no such log, when it ends before the piece does, or when it holds fewer
+    than two such messages there.
+    """
     codec = Codec(lambda identifier, system, _component: identifier == 33 and system == config.system)
     first: int | None = None
     last = 0

@@ -1,4 +1,4 @@
-"""Sees the true state of emulated autopilots and hands it to the truth."""
+"""Observer that passes the true state of emulated autopilots to the ground truth."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sitl.node import Autopilot
 
 
 class Witness:
-    """Watches the autopilots of a lock-step run; ``see`` is called after every tick."""
+    """Observer of the autopilots of a lock-step run; ``see`` is called after every tick."""
 
     def __init__(
         self,
@@ -34,7 +34,7 @@ class Witness:
         self._times: list[int] = []
 
     def see(self, now: int) -> bool:
-        """Take in the physics steps since the last call; whether a sample was taken at ``now``."""
+        """Process the physics steps since the last call; return whether a sample was taken at ``now``."""
         moved_to = self._autopilots[0].moved_to
         if moved_to == self._last:
             return False
@@ -59,13 +59,13 @@ class Witness:
 
 
 def places(target: Placed, times: Iterable[int]) -> Array:
-    """Where the target is (n, 3) at ``times`` (µs, not decreasing), ENU; NaN where it is not there."""
+    """Return the target's positions (n, 3) at ``times`` (µs, not decreasing), ENU; NaN where it is absent."""
     found = [target.position(time) for time in times]
     return np.array([NOWHERE if place is None else place for place in found])
 
 
 def rows(autopilots: Sequence[Autopilot]) -> Array:
-    """The samples (K, ROW) of vehicles, ENU: see ``truth.ROW``."""
+    """Return the samples (K, ROW) of vehicles, ENU: see ``ground_truth.ROW``."""
     ned = np.empty((len(autopilots), 5, 3))
     attitude = np.empty((len(autopilots), 4))
     for k, autopilot in enumerate(autopilots):

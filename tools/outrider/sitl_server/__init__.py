@@ -1,5 +1,6 @@
-"""``outrider sitl``: emulated vehicles under the wall clock, for other people's tools to connect to.
+"""Command ``outrider sitl``: takes options, runs emulated vehicles for external tools to connect to.
 
-command → request: options, checked → addresses: endpoints of the firmware's own SITL → wiring opens them →
-crew forks squads, each some vehicles as one node under one loop → board shows → screen.
+``request`` checks the options, ``addresses`` gives the endpoints of the firmware's own SITL, ``wiring`` opens
+them. ``processes`` forks one worker per group of vehicles; each group is one node under one loop.
+``shared_page`` passes the state to ``screen``. The vehicles run under the wall clock.
 """

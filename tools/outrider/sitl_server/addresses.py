@@ -1,8 +1,8 @@
-"""Where each vehicle can be reached: the ports of the firmware's own SITL, and what else is asked for.
+"""Endpoints of each vehicle: the ports of the firmware's own SITL, and additional ones.
 
-ArduPilot's instance i serves TCP at 5760 + 10 i (SERIAL0), 5762 + 10 i and 5763 + 10 i (SERIAL1 and 2).
-PX4's binds UDP 14580 + i and speaks to 14540 + i (offboard; from the tenth on all to 14549, as PX4 does), and
-binds 18570 + i and speaks to 14550, the ground station.
+ArduPilot's instance i serves TCP at 5760 + 10 i (SERIAL0), 5762 + 10 i and 5763 + 10 i (SERIAL1 and 2). PX4's
+binds UDP 14580 + i and sends to 14540 + i (offboard; from the tenth on all to 14549, as PX4 does). It also
+binds 18570 + i and sends to 14550, the ground station.
 """
 
 from __future__ import annotations
@@ -27,13 +27,16 @@ _LAST_PORT: Final = 65535
 _SERIALS: Final = (0, 2, 3)
 _INSTANCE: Final = 10
 _OFFBOARD_PORTS: Final = 10
-# Above PX4's base of 14540.
+# Offsets from PX4's base port of 14540.
 _OWN, _GROUND_STATION, _OWN_FOR_GROUND_STATION = 40, 10, 4030
 
 
 class Address(NamedTuple):
-    """Some endpoints of one vehicle, and by which string clients reach the first of them: pymavlink and
-    MAVProxy, and MAVSDK."""
+    """Endpoints of one vehicle.
+
+    ``pymavlink`` and ``mavsdk`` are the connection strings of the first endpoint for pymavlink and MAVProxy,
+    and for MAVSDK.
+    """
 
     endpoints: tuple[Endpoint, ...]
     pymavlink: str
@@ -43,8 +46,11 @@ class Address(NamedTuple):
 def addresses(
     flavour: FlavourName, count: int, base: int | None, host: str, more: tuple[Endpoint, ...]
 ) -> list[Address]:
-    """Those of ``count`` vehicles, from port ``base`` on (None: the firmware's own), listening at ``host``,
-    and ``more`` that all of them open. InputError if ports run out."""
+    """Return the addresses of ``count`` vehicles, from port ``base`` on (None: the firmware's own).
+
+    They listen at ``host``. ``more``: endpoints that every vehicle opens in addition. Raises InputError if
+    ports run out.
+    """
     start = PORT_BASE[flavour] if base is None else base
     of = _ardupilot if flavour == "ardupilot" else _px4
     found = [of(start, index, host, more) for index in range(count)]
@@ -55,8 +61,11 @@ def addresses(
 
 
 def extra(text: str, count: int) -> Endpoint:
-    """An endpoint of ``--to``. EndpointError, and InputError for one that only one of several vehicles could
-    have."""
+    """Parse an endpoint of ``--to``.
+
+    Raises EndpointError, and InputError for a log and for an endpoint that only one of several vehicles could
+    open.
+    """
     endpoint = parse_endpoint(text)
     if isinstance(endpoint, Replay):
         raise InputError(
@@ -89,5 +98,5 @@ def _px4(base: int, index: int, host: str, more: tuple[Endpoint, ...]) -> Addres
 
 
 def _here(host: str) -> str:
-    """This machine's loopback address, of the same protocol as ``host``."""
+    """Return this machine's loopback address, of the same protocol as ``host``."""
     return "::1" if ":" in host else "127.0.0.1"

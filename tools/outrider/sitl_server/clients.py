@@ -1,4 +1,4 @@
-"""How many clients a vehicle has."""
+"""Number of clients of a vehicle."""
 
 from __future__ import annotations
 
@@ -11,14 +11,18 @@ from mavlink_bridge.links.udp import REMEMBERED, UdpCaller, UdpListener
 
 
 class Clients:
-    """Asked now and then for the clients on a node's ``links``: who is connected, or was heard in the last
-    10 s. Multicast does not count: nobody knows who is there."""
+    """Counter of the clients on a node's ``links``, polled now and then.
+
+    A client counts while it is connected, or if it was received within the last 10 s. Multicast does not
+    count: its receivers are unknown.
+    """
 
     def __init__(self, links: Mapping[str, Sequence[Link]], clock: Clock) -> None:
         self._links, self._clock = links, clock
         self._heard: dict[Link, tuple[int, int]] = {}
 
     def __call__(self, name: str) -> int:
+        """Return the number of clients of vehicle ``name``."""
         return sum(map(self._on, self._links[name]))
 
     def _on(self, link: Link) -> int:
@@ -27,7 +31,7 @@ class Clients:
         return self._answered(link) if isinstance(link, UdpCaller) else 0
 
     def _answered(self, link: UdpCaller) -> int:
-        """1 if its only peer has spoken."""
+        """Return 1 if the only peer of ``link`` has sent something within the last 10 s, otherwise 0."""
         received, now = link.counters.received, self._clock.now()
         before, when = self._heard.get(link, (0, -REMEMBERED))
         if received != before:

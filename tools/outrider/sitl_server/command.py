@@ -1,4 +1,4 @@
-"""``outrider sitl``: opens what vehicles are reached by, starts them, shows them, and ends them."""
+"""Command ``outrider sitl``: opens the endpoints, starts the vehicles, shows them and ends them."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from outrider.sitl_server.request import Request
 from outrider.sitl_server.wiring import wire
 
 _LOOK: Final = 0.1
-"""s between two looks at the board."""
+"""Time between two polls of the board (s)."""
 
 
 class Terms(NamedTuple):
-    """How it runs. ``seconds`` of wall time until it ends by itself."""
+    """Conditions of the run; ``seconds``: wall time after which it ends by itself."""
 
     port_base: int | None
     to: tuple[str, ...]
@@ -40,8 +40,10 @@ class Terms(NamedTuple):
 
 
 def run(asked: Request, terms: Terms) -> int:
-    """Until Ctrl-C, SIGTERM, or the time is over; the exit status. InputError for what cannot be opened,
-    OutriderError if a process ends by itself."""
+    """Run until Ctrl-C, SIGTERM or the end of the time limit, and return the exit status.
+
+    Raises InputError if an endpoint cannot be opened, OutriderError if a worker process ends by itself.
+    """
     began = time.monotonic()
     prepare(terms.state, asked.flavour, asked.systems)
     places = _addresses(asked, terms)
@@ -82,7 +84,7 @@ def _addresses(asked: Request, terms: Terms) -> list[Address]:
 
 
 def _wait(crew: Crew, stopped: Sequence[object], count: int) -> None:
-    """Until all vehicles are up."""
+    """Wait until all vehicles are up."""
     while not stopped and not all(crew.board.gauges(index).up for index in range(count)):
         time.sleep(0.02)
         crew.check()

@@ -1,5 +1,7 @@
-"""What people see of the vehicles: a table on a terminal; elsewhere a line for each vehicle at first, and
-then one for each event. All of it on standard error."""
+"""Display of the vehicles on standard error.
+
+On a terminal it is a table; elsewhere one line per vehicle at first, then one line per event.
+"""
 
 from __future__ import annotations
 
@@ -18,14 +20,14 @@ from outrider.terminal.lines import say
 
 
 def announce(asked: Request) -> None:
-    """On a terminal, that they are being started: the first start on a machine compiles for some seconds."""
+    """Announce the start on a terminal: the first start on a machine compiles for some seconds."""
     if sys.stderr.isatty():
         say(f"starting {asked.count} × {asked.vehicle.name}, {asked.flavour} …")
 
 
 @contextmanager
 def watching(asked: Request, places: Sequence[Address], board: Board) -> Iterator[Callable[[], None]]:
-    """Inside it, call what it gives a few times a second. The vehicles are up."""
+    """Show the vehicles, which are up; yield a function to call a few times a second."""
     console = Console(stderr=True)
     if console.is_terminal:
         screen = Screen(asked, places, board, console)

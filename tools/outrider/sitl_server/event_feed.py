@@ -1,4 +1,4 @@
-"""What has happened to vehicles between two looks, in words: modes, motors, clients, and what they said."""
+"""Event feed of the vehicles, as text: changes of mode, arming and clients, and status texts."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from outrider.sitl_server.shared_page import SAYINGS, Board, Gauges
 
 
 class Chronicle:
-    """``look`` tells each event once. How many clients there are by UDP is known some seconds late."""
+    """Event feed; ``look`` returns each event once. The number of UDP clients is some seconds late."""
 
     def __init__(self, asked: Request, board: Board) -> None:
         self._asked, self._board = asked, board
         self._before = [Gauges() for _ in range(asked.count)]
 
     def look(self) -> list[str]:
-        """One line for each event since the last look: when (s since boot), who, what."""
+        """Return one line for each event since the last call: time since boot (s), vehicle, event."""
         lines = []
         for index, system in enumerate(self._asked.systems):
             now = self._board.gauges(index)

@@ -1,4 +1,4 @@
-"""What a run of vehicles comes to, as numbers for scripts."""
+"""Results of a run of vehicles, as numbers for scripts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Value = bool | int | float | str | None | list["Value"] | dict[str, "Value"]
 
 
 def ready(asked: Request, places: Sequence[Address]) -> dict[str, Value]:
-    """All are up: where, and by which strings clients reach them."""
+    """Return endpoints and connection strings of the vehicles, all of which are up."""
     vehicles: list[Value] = [
         {
             "system_id": system,
@@ -27,7 +27,10 @@ def ready(asked: Request, places: Sequence[Address]) -> dict[str, Value]:
 
 
 def summary(asked: Request, board: Board, wall: float) -> dict[str, Value]:
-    """All have ended, ``wall`` seconds after the beginning; their processes have been joined."""
+    """Return the summary ``wall`` seconds after the beginning.
+
+    All worker processes must have been joined.
+    """
     paces, times = board.paces(), os.times()
     vehicles: list[Value] = []
     for index, system in enumerate(asked.systems):
@@ -52,7 +55,10 @@ def summary(asked: Request, board: Board, wall: float) -> dict[str, Value]:
 
 
 def factor(paces: Sequence[Pace], since: Sequence[Pace] = ()) -> float:
-    """Simulated over wall time, of the slowest process; of what came after ``since``, if anything did."""
+    """Return simulated over wall time of the slowest process.
+
+    With ``since`` it is counted from there, if wall time has passed since then in every process.
+    """
     before = since or [Pace()] * len(paces)
     spans = [
         (pace.simulated - then.simulated, pace.wall - then.wall)

@@ -1,4 +1,4 @@
-"""What vehicles keep from one start to the next, a JSON file for each: parameters and plans."""
+"""Persistence of vehicles between starts: parameters and plans, one JSON file per vehicle."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ _IDS: Final = ("SYSID_THISMAV", "MAV_SYS_ID")
 
 
 class Cabinet:
-    """The files in ``directory``, FLAVOUR-ID.json, by the id that a vehicle was started with; nothing is kept
-    without a directory."""
+    """Files FLAVOUR-ID.json in ``directory``, by the id that a vehicle was started with.
+
+    Without a directory nothing is stored.
+    """
 
     def __init__(self, directory: Path | None, flavour: str) -> None:
         self._directory, self._flavour = directory, flavour
@@ -25,13 +27,13 @@ class Cabinet:
         self._complained = False
 
     def saved(self, system: int) -> Saved:
-        """What vehicle ``system`` kept; InputError if its file is damaged."""
+        """Return the stored data of vehicle ``system``. Raises InputError if its file is damaged."""
         kept = Saved()
         path = self._path(system)
         if path is not None and path.exists():
             try:
                 kept = Saved.model_validate_json(path.read_bytes())
-                # Ids are given by --first-id: two vehicles must never have one.
+                # Ids are given by --first-id: two vehicles must never share one.
                 others = {name: v for name, v in kept.parameters.items() if name not in _IDS}
                 kept = kept.model_copy(update={"parameters": others})
             except (OSError, ValidationError) as error:
@@ -43,8 +45,10 @@ class Cabinet:
         return kept
 
     def keep(self, squad: Squad, *, ending: bool = False) -> None:
-        """Write what has changed since the last time, so that a file is always whole. The newest stamp of a
-        signature, which changes all the time, alone is no reason but when ``ending``."""
+        """Write the data that have changed since the last call; a file is replaced as a whole.
+
+        The newest signature stamp changes all the time, so it alone causes a write only when ``ending``.
+        """
         if self._directory is None:
             return
         for seat in squad.seats:
@@ -59,7 +63,7 @@ class Cabinet:
                     self._write(path, found)
 
     def _write(self, path: Path, kept: Saved) -> None:
-        """A directory that is gone or full ends no flight; it is said once."""
+        """Replace the file at ``path``. A missing or full directory ends no flight; it is reported once."""
         beside = path.with_suffix(".new")
         try:
             beside.write_text(kept.model_dump_json(indent=1), encoding="utf-8")
@@ -80,7 +84,7 @@ def _empty(saved: Saved) -> bool:
 
 
 def prepare(directory: Path | None, flavour: str, systems: range) -> None:
-    """Make the directory, and look whether all that is in it can be used. InputError."""
+    """Create the directory and check its files. Raises InputError if it or a file cannot be used."""
     if directory is None:
         return
     try:

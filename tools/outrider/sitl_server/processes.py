@@ -1,4 +1,4 @@
-"""The processes of a run: each has a squad of vehicles, forked from one that has compiled what they need."""
+"""Worker processes of a run, one per group of vehicles, forked after compiling what the vehicles need."""
 
 from __future__ import annotations
 
@@ -19,20 +19,23 @@ from outrider.sitl_server.worker import PERIOD, STRIDE, Worker
 from sitl.autopilot.saved import Saved
 
 FULL: Final = 10
-"""So many vehicles at real-time speed are one process's work before there is another."""
+"""Number of vehicles at real-time speed that fill one process before another is started."""
 _FAREWELL: Final = 5.0
-"""s that a process has to end by itself."""
+"""Time limit for a process to end by itself (s)."""
 
 
 def squads(count: int, speed: float, most: int) -> list[list[int]]:
-    """The indices of ``count`` vehicles, for each of up to ``most`` processes those that it has."""
+    """Distribute the indices of ``count`` vehicles over up to ``most`` processes."""
     busy = ceil(count * max(speed, 1.0) / FULL)
     number = min(count, most, busy)
     return [list(range(squad, count, number)) for squad in range(number)]
 
 
 class Crew:
-    """Forks a process for each squad; ``links`` by vehicle. This process then has no link open any more."""
+    """Worker processes, one per group of vehicles; ``links`` by vehicle.
+
+    After ``start`` this process has no link open.
+    """
 
     def __init__(self, asked: Request, links: list[list[Link]], state: Path | None) -> None:
         self._asked, self._links = asked, links
@@ -45,12 +48,12 @@ class Crew:
         self._processes: list[BaseProcess] = []
 
     def start(self) -> None:
-        """Compile, and fork."""
+        """Compile, then fork the processes."""
         first = self._asked.autopilot(0, 0, Saved())
         for now in (0, PERIOD):
             first.step(now, [])
         fork = multiprocessing.get_context("fork")
-        # One time for all: vehicles of two processes meet in the same air.
+        # One clock for all processes: vehicles of different processes fly in the same air.
         clock = PacedClock(WallClock(), self._asked.speed, STRIDE, self.board)
         for number, worker in enumerate(self._workers):
             process = fork.Process(target=self._child, args=(worker, clock), name=f"squad-{number}")
@@ -59,7 +62,7 @@ class Crew:
         self._close(None)
 
     def check(self) -> None:
-        """OutriderError if a process has ended, which none does by itself."""
+        """Raise OutriderError if a process has ended, which none does by itself."""
         for number, process in enumerate(self._processes):
             if process.exitcode is not None:
                 fault = self.board.fault(number) or f"its process ended with status {process.exitcode}"
@@ -67,7 +70,7 @@ class Crew:
                 raise OutriderError(f"vehicles {systems}: {fault}")
 
     def stop(self) -> None:
-        """Tell all to end, wait for them, and end by force who does not come."""
+        """Ask all processes to end, wait for them, and kill those that do not end in time."""
         self.board.stop = True
         until = time.monotonic() + _FAREWELL
         for process in self._processes:
@@ -82,7 +85,7 @@ class Crew:
         worker.main(clock)
 
     def _close(self, spared: Worker | None) -> None:
-        """All links but those of one worker."""
+        """Close all links except those of ``spared``."""
         for worker in self._workers:
             if worker is not spared:
                 for links in worker.links.values():

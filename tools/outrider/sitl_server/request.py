@@ -1,4 +1,4 @@
-"""What is asked for: how many vehicles, which, where, and how fast time goes. All of it checked."""
+"""Checked request of ``outrider sitl``: number and kind of vehicles, place, speed of time."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ FlavourName = Literal["ardupilot", "px4"]
 StartupName = Literal["quick", "realistic"]
 
 MOST_ID: Final = 254
-"""255 is what ground stations take."""
+"""Highest system id of a vehicle: ground stations use 255."""
 _READY_AFTER: Final = {"ardupilot": 30.0, "px4": 20.0}
-# s from boot; ArduCopter's GPS and EKF take about 40, PX4's less.
+# s from boot; ArduCopter's GPS and EKF take about 40 s, PX4's less.
 
 
 _PLACE: Final = "LATITUDE,LONGITUDE[,ALTITUDE], ±89 and ±180 degrees, −500 to 9000 m above the sea"
@@ -42,7 +42,7 @@ _PLACE: Final = "LATITUDE,LONGITUDE[,ALTITUDE], ±89 and ±180 degrees, −500 t
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line says, as it says it."""
+    """Options of the command line, unchecked."""
 
     count: int = 1
     first_id: int = 1
@@ -63,8 +63,12 @@ class Options:
 
 @dataclass(frozen=True)
 class Request:
-    """``speed``: simulated seconds per second of wall time. ``spacing`` (m) between vehicles, on a grid of
-    so many ``columns`` whose first corner is the ``origin``. ``key``: only what is signed with it counts."""
+    """Checked request.
+
+    ``speed``: simulated seconds per second of wall time. ``spacing``: distance (m) between vehicles on a grid
+    with that number of ``columns``, whose first corner is the ``origin``. ``key``: if given, only
+    messages signed with it are accepted.
+    """
 
     count: int
     first_id: int
@@ -84,20 +88,23 @@ class Request:
 
     @property
     def systems(self) -> range:
-        """System ids."""
+        """System ids of the vehicles."""
         return range(self.first_id, self.first_id + self.count)
 
     @property
     def frame(self) -> FleetFrame:
-        """ENU at the origin."""
+        """ENU frame at the origin."""
         return FleetFrame(self.origin.latitude, self.origin.longitude, self.origin.altitude)
 
     def place(self, index: int) -> Vector:
-        """Where a vehicle stands (m, ENU): rows towards the east, one north of the other."""
+        """Return the start position of vehicle ``index`` (m, ENU).
+
+        Rows run east; each next row is further north.
+        """
         return self.spacing * (index % self.columns), self.spacing * (index // self.columns), 0.0
 
     def autopilot(self, index: int, epoch: int, saved: Saved) -> Autopilot:
-        """A vehicle that boots at ``epoch`` (Unix µs) with what it ``saved`` before."""
+        """Return vehicle ``index``, which boots at ``epoch`` (Unix µs) with the data ``saved`` before."""
         return Autopilot(
             self._config(index, epoch),
             self.vehicle,
@@ -123,7 +130,7 @@ class Request:
             sensors=self.sensors,
             physics=self.physics,
             response=self.response,
-            # Three cells are low at the 10.5 V of BATT_LOW_VOLT; PX4 counts shares.
+            # Three cells are low at the 10.5 V of BATT_LOW_VOLT; PX4 uses relative thresholds.
             battery=BatteryConfig(cells=3 if self.flavour == "ardupilot" else 4),
             epoch=epoch,
             **changes,
@@ -131,7 +138,7 @@ class Request:
 
 
 def checked(options: Options) -> Request:
-    """The options as a request. InputError with a line for each that is wrong."""
+    """Return the options as a request. Raises InputError with one line for each fault."""
     words: dict[str, tuple[str, ...]] = {
         "flavour": get_args(FlavourName),
         "sensors": get_args(ProfileName),
@@ -164,7 +171,7 @@ def checked(options: Options) -> Request:
     if options.wind is not None:
         weather = WeatherConfig.model_validate({"wind": wind_of(options.wind)})
     if options.physics == "jsbsim":
-        # A package that is missing is named before anything is opened.
+        # A missing package is reported before anything is opened.
         import_module("jsbsim")
     return Request(
         options.count,
@@ -186,7 +193,7 @@ def checked(options: Options) -> Request:
 
 
 def _origin(text: str) -> Origin | None:
-    """What ``_PLACE`` says; None if it is not that."""
+    """Return the origin given as ``_PLACE`` describes; None if ``text`` has another form."""
     try:
         numbers = [float(part) for part in text.split(",")]
         if len(numbers) not in (2, 3):

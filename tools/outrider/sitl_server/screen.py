@@ -1,4 +1,4 @@
-"""The vehicles as a table that is always there, and what happened last; on a terminal."""
+"""Live table of the vehicles and the latest events on a terminal."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from outrider.sitl_server.request import Request
 from outrider.sitl_server.shared_page import Board, Gauges, Pace
 
 _REFRESH: Final = 0.5
-"""s between two pictures."""
+"""Time between two pictures (s)."""
 _WINDOW: Final = 4
-"""Pictures over which messages per second are counted."""
+"""Number of pictures over which messages per second are counted."""
 _LATELY: Final = 11
-"""Pictures over which the real-time factor is taken: it is news once a second."""
+"""Number of pictures over which the real-time factor is taken: it changes once a second."""
 _EVENTS: Final = 6
 _FRAME: Final = 6
 # Lines of the terminal that are neither vehicles nor events.
 _WIDE: Final = 96
-# Columns from which on there is room for hosts.
+# Terminal width (columns) from which there is room for hosts.
 _COLUMNS: Final[dict[str, Literal["left", "right"]]] = {
     "id": "right",
     "port": "left",
@@ -49,7 +49,7 @@ _COLUMNS: Final[dict[str, Literal["left", "right"]]] = {
 
 
 class Screen:
-    """``look`` as often as one likes; it draws itself twice a second."""
+    """Live table; ``look`` may be called at any rate, the table is drawn twice a second."""
 
     def __init__(self, asked: Request, places: Sequence[Address], board: Board, console: Console) -> None:
         self._asked, self._places, self._board = asked, places, board
@@ -59,11 +59,11 @@ class Screen:
         self._counts: deque[tuple[float, list[tuple[int, int]]]] = deque(maxlen=_WINDOW)
         self._paces: deque[list[Pace]] = deque(maxlen=_LATELY)
         self._drawn = 0.0
-        # Without a thread of its own, which would take turns from the vehicles' processes.
+        # No refresh thread, which would take CPU time from the vehicles' processes.
         self.live = Live(console=console, auto_refresh=False)
 
     def look(self) -> None:
-        """What there is to see now."""
+        """Draw the current state, at most twice a second."""
         self._events.extend(self._chronicle.look())
         now = time.monotonic()
         if now - self._drawn >= _REFRESH:
@@ -110,7 +110,7 @@ class Screen:
             place,
             mode_name(self._asked.flavour, gauges.custom_mode),
             "yes" if gauges.armed else "",
-            # A vehicle on the ground is not at −0.0.
+            # The sum turns −0.0 of a vehicle on the ground into 0.0.
             *(f"{round(part, 1) + 0.0:.1f}" for part in gauges.position),
             f"{math.hypot(*gauges.velocity):.1f}",
             f"{100.0 * gauges.battery:.0f}%",

@@ -1,5 +1,8 @@
-"""What squads show of themselves: a page of memory that each process writes its own rows of, and anybody
-reads. A row that is half old does not matter to who watches."""
+"""Shared page of memory with the state of the vehicles.
+
+Each worker process writes its own rows, and any process reads them. A row may be half old; for display this
+does not matter.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 SAYINGS: Final = 8
-"""So many of the last texts of a vehicle are kept."""
+"""Number of latest texts that are stored per vehicle."""
 _TEXT: Final = 256
 _FLAGS: Final = 16
-"""Bytes: two numbers."""
+"""Size of two numbers (bytes)."""
 
 
 class Gauges(NamedTuple):
-    """One vehicle as it was a moment ago. ``position`` (m) and ``velocity`` (m/s) are true, ENU from the
-    request's origin; ``battery`` 0…1; ``received`` and ``sent`` count messages; ``clients`` are those
-    connected, or heard within 10 s; ``said`` counts the texts so far; ``time`` (s) since boot."""
+    """Snapshot of one vehicle.
+
+    ``position`` (m) and ``velocity`` (m/s) are true, ENU from the request's origin. ``battery`` is 0…1.
+    ``received`` and ``sent`` count messages. ``clients`` are those connected, or received within 10 s.
+    ``said`` counts the texts so far; ``time`` is s since boot.
+    """
 
     up: bool = False
     armed: bool = False
@@ -35,8 +41,11 @@ class Gauges(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """How one process keeps up: simulated and wall time (s) since its loop began, steps, those that came
-    late by more than a period, deadlines without a step, and lateness (simulated ms)."""
+    """Timing of one process.
+
+    Simulated and wall time (s) since its loop began, steps, steps that were late by more than a period,
+    deadlines without a step, lateness (simulated ms), and overruns.
+    """
 
     simulated: float = 0.0
     wall: float = 0.0
@@ -53,7 +62,10 @@ _SQUAD: Final = len(Pace._fields)
 
 
 class Board:
-    """For so many vehicles in so many squads; made before the processes fork, which share it then."""
+    """Shared page for that number of vehicles and groups.
+
+    It is created before the processes fork, which then share it.
+    """
 
     def __init__(self, vehicles: int, squads: int) -> None:
         numbers = vehicles * _VEHICLE + squads * _SQUAD
@@ -68,7 +80,7 @@ class Board:
 
     @property
     def stop(self) -> bool:
-        """Whether all shall end."""
+        """Whether all processes shall end."""
         return bool(self._flags[0])
 
     @stop.setter
@@ -77,7 +89,7 @@ class Board:
 
     @property
     def lost(self) -> int:
-        """Simulated time (µs) that squads could not keep up with: lost to all of them."""
+        """Simulated time (µs) that the processes could not keep up with; all of them lose it."""
         return int(self._flags[1])
 
     @lost.setter
@@ -85,12 +97,12 @@ class Board:
         self._flags[1] = value
 
     def show(self, index: int, gauges: Gauges) -> None:
-        """Vehicle ``index`` is like this."""
+        """Write the snapshot of vehicle ``index``."""
         up, armed, mode, position, velocity, *rest = gauges
         self._vehicles[index] = (up, armed, mode, *position, *velocity, *rest)
 
     def gauges(self, index: int) -> Gauges:
-        """How vehicle ``index`` is; not ``up`` until it has shown itself."""
+        """Return the snapshot of vehicle ``index``; not ``up`` until its process has written one."""
         up, armed, mode, x, y, z, u, v, w, battery, *counts, time = self._vehicles[index].tolist()
         received, sent, clients, said = map(int, counts)
         return Gauges(
@@ -108,30 +120,30 @@ class Board:
         )
 
     def say(self, index: int, number: int, text: str) -> None:
-        """The text ``number`` (0…) of vehicle ``index``."""
+        """Write the text ``number`` (0…) of vehicle ``index``."""
         self._write(self._texts + (index * SAYINGS + number % SAYINGS) * _TEXT, text)
 
     def saying(self, index: int, number: int) -> str:
-        """One of the last texts of vehicle ``index``."""
+        """Return the text ``number`` of vehicle ``index``, one of its latest."""
         return self._read(self._texts + (index * SAYINGS + number % SAYINGS) * _TEXT)
 
     def show_pace(self, squad: int, pace: Pace) -> None:
-        """Squad ``squad`` keeps up like this."""
+        """Write the timing of group ``squad``."""
         self._squads[squad] = pace
 
     def paces(self) -> list[Pace]:
-        """How each squad keeps up."""
+        """Return the timing of each group."""
         return [
             Pace(simulated, wall, int(steps), int(misses), int(skipped), p99, most, int(overruns))
             for simulated, wall, steps, misses, skipped, p99, most, overruns in self._squads.tolist()
         ]
 
     def fail(self, squad: int, text: str) -> None:
-        """Why the process of ``squad`` ended."""
+        """Write the reason why the process of ``squad`` ended."""
         self._write(self._faults + squad * _TEXT, text)
 
     def fault(self, squad: int) -> str:
-        """Empty if there is none."""
+        """Return the reason why the process of ``squad`` ended; empty if there is none."""
         return self._read(self._faults + squad * _TEXT)
 
     def _write(self, begin: int, text: str) -> None:

@@ -1,4 +1,4 @@
-"""What passes by in datagrams of whole frames: how many, and the STATUSTEXTs among them."""
+"""Traffic counter for datagrams of whole frames, which also collects their STATUSTEXTs."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from mavlink_bridge.wire.framing import STARTS, claimed_length
 _STATUSTEXT: Final = 253
 _HEADER: Final = 10
 _TEXT: Final = 50
-# Of the payload: severity, 50 characters, id, number of the piece.
+# Length of the payload's first fields: severity, 50 characters, id. The number of the piece follows.
 _PIECE: Final = 53
 
 
 class Traffic:
-    """Counts the frames of one vehicle: ``received``, ``sent``; ``sayings`` are the texts that it sent since
-    they were taken out."""
+    """Counter of the frames of one vehicle, ``received`` and ``sent``.
+
+    ``sayings`` are the texts that it has sent since the list was last cleared.
+    """
 
     def __init__(self) -> None:
         self.received = 0
@@ -23,7 +25,7 @@ class Traffic:
         self.sayings: list[str] = []
 
     def receive(self, data: bytes) -> None:
-        """``data`` came in, which may be anything: what looks like a frame is counted."""
+        """Count what looks like frames in received ``data``, which may be anything."""
         at = 0
         while at < len(data):
             length = claimed_length(data, at)
@@ -35,7 +37,7 @@ class Traffic:
                 self.received += 1
 
     def send(self, data: bytes) -> None:
-        """``data`` goes out, version 2 frames."""
+        """Count the frames of outgoing ``data``, which holds version 2 frames, and collect texts."""
         at = 0
         while at < len(data):
             length = data[at + 1]

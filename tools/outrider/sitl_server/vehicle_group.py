@@ -1,4 +1,4 @@
-"""Several vehicles as one node, so that one loop and one process do for all of them."""
+"""Group of vehicles as one node, so that one loop and one process run all of them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from outrider.sitl_server.traffic import Traffic
 from sitl.node import LINK, Autopilot
 
 SPREAD: Final = 240_000
-"""µs (simulated) over which vehicles boot, so that not all are due to tell something at the same time."""
+"""Simulated time over which vehicles boot (µs), so that not all telemetry is due at the same time."""
 SHOWN: Final = 0.2
-"""s of wall time between two looks at a vehicle."""
+"""Wall time between two snapshots of a vehicle (s)."""
 
 
 class Seat:
-    """One vehicle of a squad: ``index`` among all, its ``node``, the ``system`` id that it was started with,
-    its link's name, and when (µs) it boots."""
+    """One vehicle of a group.
+
+    ``index`` is its number among all vehicles, ``node`` the autopilot, ``system`` the id that it was started
+    with, ``link`` its link's name, ``boot`` the time at which it boots (µs).
+    """
 
     def __init__(self, index: int, node: Autopilot, system: int, boot: int) -> None:
         self.index, self.node, self.system = index, node, system
@@ -33,13 +36,13 @@ class Seat:
 
 
 def boot_times(indices: Sequence[int], speed: float, period: int) -> dict[int, int]:
-    """When (µs) each of the vehicles of one squad boots, by index: at steps of that ``period`` (µs)."""
+    """Return the boot time (µs) of each vehicle of one group, by index, at multiples of ``period`` (µs)."""
     spread = round(SPREAD * min(speed, 1.0))
     return {index: spread * number // len(indices) // period * period for number, index in enumerate(indices)}
 
 
 class Squad:
-    """A node whose links are those of its vehicles, by their index."""
+    """Node whose links are those of its vehicles, named by their index."""
 
     name = "squad"
 
@@ -51,14 +54,17 @@ class Squad:
         board: Board,
         speed: float,
     ) -> None:
-        """``vehicles`` by their index among all, which is their row on the ``board``, and when they boot
-        (µs); ``first_id``: the system id of index 0; ``speed`` of time."""
+        """Make a group.
+
+        ``vehicles`` are mapped by their index among all, which is their row on the ``board``. ``boots``:
+        their boot times (µs). ``first_id``: system id of index 0. ``speed``: simulated seconds per second.
+        """
         self.seats = [Seat(index, node, first_id + index, boots[index]) for index, node in vehicles.items()]
         self._board = board
         self._shown = round(SHOWN * 1e6 * speed)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """All vehicles that have booted, each with its own of the ``inbox``."""
+        """Step all vehicles that have booted, each with its own part of the ``inbox``."""
         mail: dict[str, list[Datagram]] = {}
         for link, data in inbox:
             mail.setdefault(link, []).append(Datagram(LINK, data))
@@ -70,7 +76,7 @@ class Squad:
             for datagram in arrived:
                 seat.traffic.receive(datagram.data)
             try:
-                # A process that comes late must not make its vehicles younger than their clocks say.
+                # A late process must not make its vehicles younger than their clocks say.
                 late = not seat.booted and now > seat.boot
                 said = seat.node.step(seat.boot, []) if late else []
                 seat.booted = True
@@ -83,7 +89,7 @@ class Squad:
         return leaving
 
     def show(self, now: int, clients: Callable[[str], int]) -> None:
-        """On the board, all whose turn it is at ``now`` (µs); ``clients`` says how many are on a link."""
+        """Write the snapshots that are due at ``now`` (µs); ``clients`` returns the clients on a link."""
         for seat in self.seats:
             if now < seat.shown:
                 continue

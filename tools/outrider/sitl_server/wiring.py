@@ -1,4 +1,4 @@
-"""Opens what vehicles can be reached by, or says which port is in the way and what to do."""
+"""Opens the endpoints of the vehicles, or names the port in use and the remedy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from outrider.sitl_server.addresses import Address
 
 
 def wire(addresses: Sequence[Address], clock: Clock) -> list[list[Link]]:
-    """The links of each vehicle. InputError if one cannot be opened; then none stays open."""
+    """Return the links of each vehicle. Raises InputError if one cannot be opened; then none stays open."""
     with ExitStack() as opened:
         every: list[list[Link]] = []
         for address in addresses:

@@ -1,4 +1,4 @@
-"""The process of a squad: its vehicles under the wall clock over their links, until all shall end."""
+"""Worker process of a group of vehicles, under the wall clock and over their links."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from outrider.sitl_server.shared_page import Board, Pace
 from outrider.sitl_server.vehicle_group import Squad, boot_times
 
 PERIOD: Final = 10_000
-"""µs (simulated) between two steps from real time to 10 times that."""
+"""Simulated time between two steps (µs), from real time up to 10 times as fast."""
 _FASTEST, _LONGEST = 10.0, 5.0
 _GRID: Final = 2500
 # µs; usual steps of physics.
 STRIDE: Final = 250_000
-"""µs (simulated) that are made up for at once when the machine was busy; what is more is lost."""
+"""Simulated time (µs) that is caught up at once after the machine was busy; anything beyond is lost."""
 _SHOWN: Final = 1.0
-# s between two looks at how the loop keeps up.
+# s between two records of the loop's timing.
 
 
 class Worker:
-    """``indices``: its vehicles; ``links`` of each by its index; ``squad``: its row on the ``board``."""
+    """Worker of one group: ``indices`` are its vehicles, ``links`` theirs by index, ``squad`` its row."""
 
     def __init__(
         self,
@@ -52,8 +52,10 @@ class Worker:
         self._parent = os.getpid()
 
     def main(self, clock: PacedClock) -> None:
-        """The process, from fork to exit, under ``clock``. The parent alone is told by signals when to end,
-        and tells it."""
+        """Run the process, from fork to exit, under ``clock``.
+
+        Signals to end are handled by the parent alone, which sets the board's ``stop``.
+        """
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         sharpen_timers()
@@ -106,14 +108,16 @@ class Worker:
 
 
 def period(speed: float) -> int:
-    """µs (simulated) between two steps when time is ``speed`` times as fast: 10 ms of the wall or less, and
-    1 ms or more as long as that leaves telemetry at 20 Hz in peace."""
+    """Return the simulated time between two steps (µs) when time is ``speed`` times as fast.
+
+    It is 10 ms of wall time or less, and 1 ms or more as long as telemetry at 20 Hz remains possible.
+    """
     of_usual = speed if speed < 1.0 else min(max(speed / _FASTEST, 1.0), _LONGEST)
     return max(int(PERIOD * of_usual) // _GRID, 1) * _GRID
 
 
 def _pace(loop: RealTime, now: int, wall: float) -> Pace:
-    """How ``loop`` keeps up, ``now`` (µs) being ``wall`` seconds after it began."""
+    """Return the timing of ``loop`` at ``now`` (µs), ``wall`` seconds after it began."""
     due, statistics = loop.deadlines, loop.statistics
     lateness = statistics.lateness
     return Pace(

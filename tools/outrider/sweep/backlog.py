@@ -1,5 +1,7 @@
-"""Tasks that wait for a worker. One that was lost is tried once more when all others have ended: what takes
-its worker down again stays lost."""
+"""Queue of tasks that wait for a worker.
+
+A lost task is tried once more after all others have ended; a task that ends its worker again stays lost.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from outrider.sweep.tasks import Task
 
 
 class Backlog:
-    """The tasks that are not begun; its length is how many may begin now."""
+    """Tasks that have not been started; the length is the number that may start now."""
 
     def __init__(self, tasks: Iterable[Task]) -> None:
         self._waiting = deque(tasks)
@@ -21,21 +23,24 @@ class Backlog:
         return len(self._waiting)
 
     def goes_on(self, busy: int) -> bool:
-        """Whether anything is left, with so many tasks ``busy``. With none the lost ones come up again."""
+        """Return whether any task is left, while ``busy`` tasks run.
+
+        If none waits and none runs, the lost tasks wait again.
+        """
         if not self._waiting and not busy:
             self._waiting, self._again = self._again, deque()
         return bool(self._waiting or self._again or busy)
 
     def take(self) -> Task:
-        """The next one to begin. IndexError without one."""
+        """Return the next task. Raises IndexError if there is none."""
         return self._waiting.popleft()
 
     def lost(self, task: Task) -> None:
-        """It was begun, and its worker is gone."""
+        """Add a started task whose worker is gone, unless it has been tried again already."""
         if task.run not in self._tried:
             self._tried.add(task.run)
             self._again.append(task)
 
     def put_back(self, task: Task) -> None:
-        """It was never begun, after all."""
+        """Put back a task that was not started after all."""
         self._waiting.appendleft(task)

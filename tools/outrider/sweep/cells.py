@@ -1,5 +1,8 @@
-"""The cells of a sweep: each combination of the grid made into a scenario (or a scene that draws one for each
-seed), checked as a whole before anything is flown, and named by the hash of all that its runs depend on."""
+"""Cells of a sweep: each combination of the grid as a checked scenario or scene.
+
+A scene draws a scenario for each seed. All cells are checked before anything is flown. The key of a cell is a
+hash of everything that its runs depend on.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +32,11 @@ _KEY_LENGTH = 20
 
 
 class Cell(NamedTuple):
-    """One combination. ``document`` is what is flown, as JSON: a scenario, or a scene if ``is_scene``.
-    ``vehicle`` is that of its scenario. ``key`` is a hash of both; ``slug`` names its files."""
+    """One combination of the grid.
+
+    ``document`` is the scenario, or the scene if ``is_scene``, as JSON. ``vehicle`` is the vehicle of the
+    scenario as JSON. ``key`` is a hash of both; ``slug`` names its files.
+    """
 
     label: str
     slug: str
@@ -41,8 +47,10 @@ class Cell(NamedTuple):
 
 
 def cells(sweep: Sweep, where: str) -> list[Cell]:
-    """Every cell of the sweep, checked. InputError, with a line for each fault that says which cell it is in,
-    and nothing has been flown or written; ``where`` is the sweep's file."""
+    """Return every cell of the sweep, checked; ``where`` is the sweep's file.
+
+    Raises InputError, with a line for each fault and its cell, before anything is flown or written.
+    """
     found: list[Cell] = []
     faults: list[Fault | str] = []
     for number, point in enumerate(points(sweep), 1):
@@ -65,12 +73,12 @@ def cells(sweep: Sweep, where: str) -> list[Cell]:
 
 
 def task(cell: Cell, seed: int) -> Task:
-    """The run of ``cell`` with ``seed``."""
+    """Return the run of ``cell`` with ``seed``."""
     return Task(cell.key, seed, cell.document, cell.vehicle, cell.is_scene)
 
 
 def scenario_of(task: Task) -> Scenario:
-    """The scenario that a task flies. A random one comes out the same each time."""
+    """Return the scenario that a task flies. A random scenario is the same each time."""
     if not task.is_scene:
         return Scenario.model_validate_json(task.document, strict=True)
     scene = Scene.model_validate_json(task.document, strict=True)
@@ -78,8 +86,8 @@ def scenario_of(task: Task) -> Scenario:
 
 
 def scenario_text(scenario: Scenario) -> str:
-    """A scenario file that loads as exactly this scenario, every number to the last bit."""
-    # A wide page: no value is folded over lines.
+    """Return a scenario file that loads as exactly this scenario, with every number exact to the last bit."""
+    # The large width keeps every value on one line.
     text: str = yaml.dump(
         scenario.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=4096
     )
@@ -87,11 +95,13 @@ def scenario_text(scenario: Scenario) -> str:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes whatever our own reader would not take for text: ``1E5`` is a number in YAML 1.2 and in JSON,
-    but not in the YAML 1.1 that the library writes."""
+    """YAML dumper that quotes every text that the project's own reader would not read as text.
+
+    For example, ``1E5`` is a number in YAML 1.2 and in JSON, but not in YAML 1.1, which the library writes.
+    """
 
     def represent_str(self, data: str) -> yaml.ScalarNode:
-        """A text, quoted if it has to be."""
+        """Return the node of a text, quoted if necessary."""
         try:
             is_text = resolve(data) == data
         except ScalarError:
@@ -105,7 +115,7 @@ _Dumper.add_representer(str, _Dumper.represent_str)
 def _cell(sweep: Sweep, point: Point, number: int) -> Cell:
     if sweep.scenes:
         scene = _changed(find("scenes", point.source), Scene, point)
-        # All draws are tried now: what cannot be placed must not end the sweep in its middle.
+        # All scenarios are drawn now: one that cannot be placed must not end the sweep half-way.
         drawn = [_drawn(scene, seed) for seed in sweep.seeds]
         name, document = scene.name, scene.model_dump_json()
         vehicle = _flyable(drawn[0])
@@ -119,7 +129,7 @@ def _cell(sweep: Sweep, point: Point, number: int) -> Cell:
 
 
 def _changed(path: Path, model: type[Model], point: Point) -> Model:
-    """The file with the cell's changes, read again as a file is read: the same checks, the same words."""
+    """Return the file with the cell's changes, read again like a file, with the same checks and messages."""
     base = load(path, model)
     document: dict[str, JsonValue] = base.model_dump(mode="json")
     return read(json.dumps(overlay(document, point.changes)).encode(), point.label, model)
@@ -130,12 +140,12 @@ def _drawn(scene: Scene, seed: int) -> Scenario:
     try:
         return Scenario.model_validate_json(text, strict=True)
     except ValidationError:
-        # The slow way, for its words.
+        # Slower, but with the messages of a file.
         return read(text.encode(), f"seed {seed}", Scenario)
 
 
 def _flyable(scenario: Scenario) -> str:
-    """Its vehicle, as JSON. Loads the scenario as ``outrider swarm`` will when a run is replayed."""
+    """Return the vehicle as JSON, after loading the scenario as ``outrider swarm`` does when a run is replayed."""
     with tempfile.TemporaryDirectory(prefix="outrider-") as folder:
         path = Path(folder) / "scenario.yaml"
         path.write_text(scenario_text(scenario), encoding="utf-8")
@@ -146,5 +156,5 @@ def _flyable(scenario: Scenario) -> str:
 
 
 def _without_place(fault: Fault | str) -> str:
-    """A fault's words without its line and column: those are of a text that the user never saw."""
+    """Return a fault without its line and column, which refer to a text that the user has not seen."""
     return fault.what if isinstance(fault, Fault) else fault

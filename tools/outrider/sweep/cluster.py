@@ -1,9 +1,7 @@
-"""Runs tasks on the workers of a Dask scheduler, with the rules of the local `Pool`: a run whose worker is
-lost is named and tried once more at the end.
+"""Workers of a Dask scheduler, with the rules of the local `Pool`: a lost run is reported and tried once more.
 
-Each task is bound to one worker. So a worker that came later, or after a restart, is asked first what it is,
-and one that would fly something else gets nothing; and no run is begun a second time unnoticed, as Dask would
-begin it.
+Each task is bound to one worker. A worker that joins later, or after a restart, must first report its
+versions; if they differ, it gets no tasks. And no run is started a second time unnoticed, as Dask would do.
 """
 
 from __future__ import annotations
@@ -31,15 +29,15 @@ from outrider.sweep.sources import differences
 from outrider.sweep.tasks import AbandonedError, Ended, Entry, Task
 
 PATIENCE_S = 300.0
-"""So long a sweep waits when there is no worker."""
+"""Time (s) that a sweep waits for a worker."""
 _INTRODUCTION = "__import__('outrider.sweep.dask_tasks', fromlist=['crew']).introduce()"
-"""As a text: a function that a Dask worker cannot find ends it, and there may be no outrider there."""
+"""Given as text: a Dask worker that cannot find a function ends, and outrider may not be installed there."""
 _TICK_S, _LOOK_S, _FETCH_S, _GOODBYE_S, _REPLY_S = 0.5, 1.0, 2.0, 3.0, 20.0
 
 
 @dataclass
 class _Site:
-    """A Dask worker. ``me`` is None until it has said who it is; ``refused`` says why nothing flies there."""
+    """Dask worker. ``me`` is None until it has reported its identity; ``refused`` is the reason why it gets no tasks."""
 
     address: str
     threads: int
@@ -49,20 +47,24 @@ class _Site:
 
     @property
     def free(self) -> bool:
+        """Whether the worker can take a task."""
         return self.me is not None and self.refused is None and self.busy < self.threads
 
 
 class _Flight(NamedTuple):
     task: Task | None
-    """None: the worker is asked who it is."""
+    """None: the worker is asked for its identity."""
     site: _Site
     future: Future[Any]
     since: float
 
 
 class Cluster:
-    """The workers that the scheduler at ``address`` has, now and later; each flies as many runs at a time as
-    it has threads, by ``run``, a ``module:function``. InputError if nobody answers. Use it as a context."""
+    """Present and future workers of the scheduler at ``address``; a context manager.
+
+    Each worker flies as many runs at a time as it has threads, by ``run``, a ``module:function``. Raises
+    InputError if no scheduler answers.
+    """
 
     def __init__(self, address: str, run: str, wall_limit_s: float, patience_s: float = PATIENCE_S) -> None:
         self._address, self._run, self._limit, self._patience = address, run, wall_limit_s, patience_s
@@ -79,15 +81,18 @@ class Cluster:
         return self
 
     def __exit__(self, *_: object) -> None:
-        # Daemons, with a limit: a worker that hangs must not keep the sweep from ending.
+        # Daemon threads with a time limit: a worker that hangs must not keep the sweep from ending.
         for goodbye in (self._dismiss, self._client.close):
             thread = Thread(target=_quietly, args=(goodbye,), daemon=True)
             thread.start()
             thread.join(_GOODBYE_S)
 
     def work(self, tasks: Iterable[Task], ended: Ended, tick: Callable[[], None] = lambda: None) -> None:
-        """Run all tasks, as `Pool.work`. InputError if there are workers and none may fly; AbandonedError if
-        the scheduler is gone, or no worker has been there for long."""
+        """Run all tasks, as `Pool.work` does.
+
+        Raises InputError if there are workers but none is accepted, AbandonedError if the scheduler is gone
+        or there has been no worker for too long.
+        """
         backlog = Backlog(tasks)
         self._served = time.monotonic()
         while backlog.goes_on(sum(flight.task is not None for flight in self._flights.values())):
@@ -99,7 +104,7 @@ class Cluster:
             tick()
 
     def _look(self, backlog: Backlog, ended: Ended) -> None:
-        """Once a second: which workers have come, and which are gone?"""
+        """Check once a second which workers have joined and which are gone."""
         now = time.monotonic()
         if now - self._looked < _LOOK_S:
             return
@@ -117,16 +122,16 @@ class Cluster:
         self._wait(now)
 
     def _there(self) -> dict[str, int]:
-        """The threads of each worker, by its address."""
+        """Return the number of threads of each worker, by its address."""
         scheduler = self._client.scheduler
         try:
             return dict(self._client.sync(scheduler.ncores, workers=None, callback_timeout=_REPLY_S))
         except Exception:
-            # Whatever Dask makes of a connection that has ended, or that nobody answers by.
+            # Any exception that Dask raises for a connection that has ended or does not answer.
             raise self._abandoned("has gone") from None
 
     def _wait(self, now: float) -> None:
-        """See whether there is somebody who flies, and for how long there has been nobody."""
+        """Check whether a worker is available, and for how long there has been none."""
         sites = self._sites.values()
         silent = any(site.me is None and site.refused is None for site in sites)
         if any(site.me is not None and site.refused is None for site in sites):
@@ -155,7 +160,7 @@ class Cluster:
         future.add_done_callback(self._answers.put)
 
     def _hear(self, backlog: Backlog, ended: Ended) -> None:
-        """Take in what has been answered; wait for a while if it is nothing."""
+        """Process the answers that have arrived; wait for a while if there are none."""
         wait = _TICK_S
         with suppress(Empty):
             while True:
@@ -163,19 +168,19 @@ class Cluster:
                 wait = 0.0
                 flight = self._flights.get(future.key)
                 if flight is not None and not self._answered(flight, backlog, ended):
-                    # For the next time; not now, or nobody would look who is still there.
+                    # Tried again next time; not now, or gone workers would not be noticed.
                     self._answers.put(future)
                     return
 
     def _answered(self, flight: _Flight, backlog: Backlog, ended: Ended) -> bool:
-        """Whether the answer could be fetched."""
+        """Return whether the answer could be fetched."""
         answer = self._fetched(flight.future)
         if answer is not None:
             self._take(answer, flight, backlog, ended)
         return answer is not None
 
     def _fetched(self, future: Future[Any]) -> dict[str, Any] | None:
-        """What a worker answered; None if it has died with it, which will be seen, or is slow."""
+        """Return the answer of a worker; None if it is slow or was lost with its worker, which `_look` finds."""
         try:
             answer: dict[str, Any] = future.result(timeout=_FETCH_S)
         except FutureCancelledError:
@@ -185,14 +190,14 @@ class Cluster:
         except Exception as error:
             if isinstance(error, TimeoutError) and future.status != "error":
                 return None
-            # It was raised there: most likely outrider is not installed, or is another one.
+            # Raised on the worker: most likely outrider is missing there, or has another version.
             return {"unable": f"{type(error).__name__}: {' '.join(str(error).split())}"}
         return answer
 
     def _take(self, answer: dict[str, Any], flight: _Flight, backlog: Backlog, ended: Ended) -> None:
         task, site = flight.task, flight.site
         if "restarted" in answer:
-            # Dask has begun it again in another life of the worker, which will be asked who it is now.
+            # Dask has started the task again in the restarted worker, which must now report its identity.
             if self._sites.get(site.address) is site:
                 del self._sites[site.address]
             self._lose(flight, f"its Dask worker {site.address} was restarted", backlog, ended)
@@ -241,7 +246,7 @@ class Cluster:
 
 
 def _quietly(action: Callable[[], object]) -> None:
-    """The scheduler may be gone; then there is nobody to say goodbye to."""
+    """Run ``action`` and ignore errors: the scheduler may be gone."""
     with suppress(Exception):
         action()
 

@@ -1,4 +1,4 @@
-"""``outrider sweep``: from a sweep file to its table, resumable at any moment."""
+"""Command ``outrider sweep``: flies a sweep file and prints its table; resumable at any time."""
 
 from __future__ import annotations
 
@@ -44,13 +44,14 @@ def sweep(
     scheduler: str | None = None,
     failures: Path | None = None,
 ) -> int:
-    """Fly the sweep ``name``, a file or a shipped one, and show its summary; the exit status.
+    """Fly the sweep ``name``, a file or a shipped sweep, show its summary and return the exit status.
 
-    0 all runs ended well; 1 a violation of d_min or a goal not reached; 3 a run raised or is lost for good,
-    or the sweep was interrupted. InputError for what cannot be flown, before anything is. ``runs`` in place
-    of the file's number of seeds; ``jobs`` workers, one for each core by default, or the workers of a Dask
-    ``scheduler``; ``run`` is what a worker calls, ``module:function``. Runs that failed
-    are written to the folder ``failures`` as scenarios.
+    The status is 0 if all runs ended well, 1 after a violation of d_min or a goal not reached, and 3 if a run
+    raised an error or is finally lost, or if the sweep was interrupted. Raises InputError for invalid input
+    before anything is flown. ``runs`` replaces the file's number of seeds. ``jobs`` is the number of workers,
+    by default one for each core; the alternative is a Dask ``scheduler`` with its workers. ``wall_limit_s``
+    is the longest wall time of one run. ``run`` is the function that a worker calls, ``module:function``.
+    Runs that failed are written to the folder ``failures`` as scenarios.
     """
     path = find("sweeps", name)
     spec = load(path, Sweep)
@@ -72,7 +73,7 @@ def sweep(
         waiting = [one for one in tasks if not has_ended(journal, one)]
         labels = {cell.key: cell.label for cell in found}
         with watching(len(tasks), len(tasks) - len(waiting)) as watch:
-            # However it ends, behind the bar.
+            # Runs at every exit, after the bar is closed.
             open_.callback(_name_losses, watch, labels)
             stopped = None
             if waiting:
@@ -113,7 +114,7 @@ def _again(
     failures: Path | None,
     wall_limit_s: float,
 ) -> str:
-    """The command that goes on."""
+    """Return the command that resumes the sweep."""
     words = ["outrider", "sweep", name]
     for option, value, usual in (
         ("--runs", runs, None),
@@ -132,13 +133,13 @@ def _name_losses(watch: Watch, labels: dict[str, str]) -> None:
 
 
 class _Effort:
-    """What this attempt took: no part of the result."""
+    """Effort of this attempt; it is not part of the result."""
 
     def __init__(self, flown: Sequence[Task], watch: Watch, wall_s: float) -> None:
         self.flown, self.lost, self.wall_s = len(flown), watch.lost, wall_s
 
     def document(self, labels: dict[str, str]) -> dict[str, Any]:
-        """Values of JSON; every run that a worker was lost at is named, retried or not."""
+        """Return values of JSON, which name every run that lost its worker, retried or not."""
         lost = [{"cell": labels[one.key], "seed": one.seed, "what": one.what} for one in self.lost]
         return {"flown_now": self.flown, "wall_s": round(self.wall_s, 3), "lost_on_the_way": lost}
 

@@ -1,4 +1,4 @@
-"""Cells flown by seeds for a table or for pictures: all of them, resumable, with progress."""
+"""Flights of several cells and seeds for a table or for pictures: complete, resumable, with progress."""
 
 from __future__ import annotations
 
@@ -16,14 +16,17 @@ from outrider.sweep.progress import watching
 from outrider.sweep.tasks import Entry
 
 Flown = dict[tuple[str, int], Entry]
-"""By the cell's key and the seed."""
+"""Entries by the cell's key and the seed."""
 
 
 def flown(
     of: Header, found: Sequence[Cell], seeds: Sequence[int], folder: Path, run: str, jobs: int | None
 ) -> Flown | None:
-    """Fly each cell with each of ``seeds`` by ``run`` (``module:function``) in ``jobs`` processes, into the
-    journal ``of`` them in ``folder``; None if it was interrupted, which is said."""
+    """Fly each cell with each of ``seeds`` by ``run`` (``module:function``) in ``jobs`` processes.
+
+    The journal with the header ``of`` is in ``folder``. Returns the entries, or None after an interruption,
+    which is reported.
+    """
     with opened(folder / places.JOURNAL, of) as journal:
         tasks = [task(cell, seed) for seed in seeds for cell in found]
         waiting = [one for one in tasks if not has_ended(journal, one)]

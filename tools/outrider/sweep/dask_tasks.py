@@ -1,8 +1,8 @@
-"""What a Dask worker does for a sweep, whose `Cluster` calls these functions there.
+"""Functions that a Dask worker runs for a sweep; `Cluster` calls them there.
 
-It flies nothing itself: for each run that it has at a time it keeps a `Process`, as a local pool does. So a
-run that takes its process down, or is too slow, costs that process, and the Dask worker goes on; and when the
-Dask worker dies its processes end with it.
+The Dask worker does not fly itself: it keeps a `Process` for each concurrent run, as a local pool does. A run
+that ends its process, or is too slow, therefore costs only that process, and the Dask worker continues. When
+the Dask worker dies, its processes end with it.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from outrider.sweep.sources import version_of, versions
 from outrider.sweep.tasks import Task
 
 IDLE_S = 60.0
-"""A process without a run ends after so long: its sweep has been killed."""
+"""Time (s) after which an idle process ends, because its sweep was killed."""
 _TICK_S = 0.5
 ME = uuid4().hex
-"""Another one after a restart, at the same address too."""
+"""Identity of this worker process; it changes with a restart, even at the same address."""
 
 
 class Crew:
-    """The processes of a Dask worker, by the sweep that they fly for."""
+    """Processes of a Dask worker, by sweep."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -35,7 +35,7 @@ class Crew:
         self._over: set[str] = set()
 
     def take(self, sweep: str, run: str) -> Process | None:
-        """One that is ready, or a new one; none for a sweep that is over."""
+        """Return a ready process or a new one; None for a sweep that has ended."""
         with self._lock:
             if sweep in self._over:
                 return None
@@ -51,7 +51,7 @@ class Crew:
             return process
 
     def give_back(self, sweep: str, process: Process) -> None:
-        """Its run has ended."""
+        """Mark a process as idle after its run has ended."""
         timer = Timer(IDLE_S, self.dismiss, (sweep, process))
         timer.daemon = True
         with self._lock:
@@ -59,12 +59,15 @@ class Crew:
         timer.start()
 
     def forget(self, sweep: str, process: Process) -> None:
-        """It has ended."""
+        """Remove a process that has ended."""
         with self._lock:
             self._all.get(sweep, set()).discard(process)
 
     def dismiss(self, sweep: str, only: Process | None = None) -> None:
-        """End those of a sweep, or only one of them if it is idle. Whoever waits for one sees it die."""
+        """End the processes of a sweep, or only one of them if it is idle.
+
+        A caller that waits for one of the processes sees it die.
+        """
         with self._lock:
             idle = self._idle.get(sweep, {})
             for process in [one for one in idle if only is None or one is only]:
@@ -85,19 +88,21 @@ CREW = Crew()
 
 
 def introduce() -> dict[str, Any]:
-    """Who this is, and all that results depend on here."""
+    """Return the identity of this worker, and the versions that results depend on."""
     return {"me": ME, "versions": equipment()}
 
 
 def equipment() -> dict[str, str]:
-    """The versions that must be the same here and where the sweep was begun."""
+    """Return the versions that must be the same here and where the sweep was started."""
     return {**versions(), "distributed": version_of("distributed")}
 
 
 def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> dict[str, Any]:
-    """Fly a task, in JSON, for a ``sweep`` by ``run``, a ``module:function``: its ``entry``. Or
-    ``restarted``: this is not the worker ``me`` that was meant; or ``unable``: why no process can be started
-    here."""
+    """Fly a task, given in JSON, for a ``sweep`` by ``run``, a ``module:function``.
+
+    The result has one key: ``entry``; or ``restarted`` if this is not the worker ``me`` that was meant; or
+    ``unable``, the reason why no process can be started here.
+    """
     if me != ME:
         return {"restarted": True}
     for _ in range(MOST_STARTS):
@@ -129,5 +134,5 @@ def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> di
 
 
 def dismiss(sweep: str) -> None:
-    """The sweep is over: end its processes."""
+    """End the processes of a sweep that is over."""
     CREW.dismiss(sweep)

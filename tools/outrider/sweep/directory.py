@@ -1,8 +1,8 @@
-"""The directory of a sweep, and the commands that replay its runs.
+"""Directory of a sweep, and the commands that replay its runs.
 
 ``journal.jsonl`` · ``summary.json``, ``.html``, ``.parquet`` · ``runs.parquet`` · ``sweep.png`` · ``cells/``:
-scenarios as they are flown, so that a command names one exactly, whatever becomes of the shipped files ·
-``replays/``: where those commands put their runs.
+scenarios as flown, so that a command names one exactly even if the shipped files change · ``replays/``: the
+run directories of those commands.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ JOURNAL, SUMMARY, PICTURE = "journal.jsonl", "summary.json", "sweep.png"
 
 
 def prepare(out: Path | None, name: str) -> Path:
-    """``out``, or ``runs/sweep-NAME``: new, empty, or begun by a sweep. The same command finds it again: that
-    is how a sweep is resumed."""
+    """Return the directory ``out``, or ``runs/sweep-NAME``: new, empty, or that of a sweep.
+
+    The same command finds the directory again and so resumes the sweep. Raises InputError if it holds other
+    files or cannot be created.
+    """
     directory = out if out is not None else Path("runs") / f"sweep-{name}"
     try:
         if directory.is_dir() and any(directory.iterdir()) and not (directory / JOURNAL).is_file():
@@ -33,7 +36,7 @@ def prepare(out: Path | None, name: str) -> Path:
 
 
 def command(directory: Path, cell: Cell, seed: int) -> str:
-    """The command that flies a run again and keeps its logs. Writes the scenario that it names."""
+    """Return the command that flies a run again and keeps its logs, and write the scenario that it names."""
     file = directory / "cells" / (f"{cell.slug}-seed{seed}.yaml" if cell.is_scene else f"{cell.slug}.yaml")
     text = scenario_text(scenario_of(task(cell, seed)))
     file.parent.mkdir(exist_ok=True)

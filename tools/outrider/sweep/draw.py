@@ -1,7 +1,7 @@
-"""A scene and a seed to a scenario: the same every time.
+"""Scenario drawn from a scene and a seed, the same every time.
 
-Every quantity has its own stream of random numbers, so that turning the dial changes what it says and nothing
-by accident.
+Every quantity has its own stream of random numbers, so that a change of the difficulty changes only what it
+is meant to change.
 """
 
 from __future__ import annotations
@@ -19,14 +19,17 @@ from outrider.sweep.scenes import Scene, Things
 from outrider.sweep.trouble import strike
 
 _MARGIN = 10.0
-"""m around all places within which the planner may move."""
+"""Distance (m) around all positions within which the planner may move."""
 _LEAST_RADIUS = 4.0
-"""m, of the circle around an escorted target; it grows with the number of vehicles."""
+"""Least radius (m) of the circle around an escorted target; the radius grows with the number of vehicles."""
 
 
 class Dials(NamedTuple):
-    """What the difficulty makes of a scene with so many vehicles: the half width of the square where they
-    start (m), the speed (m/s), numbers of obstacles, and number, length (m) and interval (s) of jumps."""
+    """Parameters of a scene at its difficulty, for a number of vehicles.
+
+    They are the half width of the square in which the vehicles start (m), the speed (m/s), numbers of
+    obstacles, and number, length (m) and interval (s) of jumps.
+    """
 
     half: float
     speed: float
@@ -38,12 +41,15 @@ class Dials(NamedTuple):
 
 
 def vehicles(scene: Scene, seed: int) -> int:
-    """How many vehicles the seed draws."""
+    """Return the number of vehicles that the seed draws."""
     return int(stream(seed, Stream.SCENE_FLEET).integers(scene.vehicles[0], scene.vehicles[1] + 1))
 
 
 def dials(scene: Scene, count: int, seed: int) -> Dials:
-    """Every dial at the scene's difficulty, for ``count`` vehicles; numbers in all are drawn by the seed."""
+    """Return every parameter at the scene's difficulty, for ``count`` vehicles.
+
+    Obstacles that the scene gives by a total number are drawn by the seed.
+    """
     random = stream(seed, Stream.SCENE_COUNTS)
 
     def at(easy: float, hard: float) -> float:
@@ -71,8 +77,10 @@ def dials(scene: Scene, count: int, seed: int) -> Dials:
 
 
 def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
-    """The scenario of ``seed``, as a document that stands for a scenario file. InputError if it has no room
-    for what it shall hold."""
+    """Return the scenario of ``seed`` as the document of a scenario file.
+
+    Raises InputError if there is no room for everything that it must contain.
+    """
     count = vehicles(scene, seed)
     dial = dials(scene, count, seed)
     where = f"scene {scene.name!r}, seed {seed}"
@@ -121,7 +129,7 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
     if scene.trouble is not None:
         struck = strike(scene.trouble, count, stream(seed, Stream.SCENE_TROUBLE))
         document = overlay(document, leaves(struck))
-    # Three times the longest way, and a minute after the last jump.
+    # Three times the longest path, and a minute after the last jump.
     way = 2.0 * math.sqrt(2.0) * (extent + radius)
     document["cap_s"] = float(min(3600, math.ceil(last_jump + 60.0 + 3.0 * way / dial.speed)))
     return overlay(document, leaves(scene.scenario))

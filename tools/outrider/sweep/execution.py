@@ -1,4 +1,4 @@
-"""Flying what is not flown yet, in worker processes, into a journal."""
+"""Execution of the tasks that have not been flown, by worker processes, with a journal."""
 
 from __future__ import annotations
 
@@ -13,20 +13,25 @@ from outrider.sweep.sources import versions
 from outrider.sweep.tasks import AbandonedError, Ended, Entry, Task
 
 WALL_LIMIT_S = 1800.0
-"""s of wall time for one run."""
+"""Longest wall time of one run (s)."""
 
 
 class Workers(Protocol):
-    """Who runs tasks: a `Pool` of processes here, or a `Cluster` of machines."""
+    """Executor of tasks: a `Pool` of processes on this machine, or a `Cluster` of machines."""
 
     def work(self, tasks: Iterable[Task], ended: Ended, tick: Callable[[], None]) -> None:
-        """Run all tasks. ``ended`` hears of each run that has ended, of a lost one each time; ``tick`` is
-        called at least every second or so. AbandonedError if the rest cannot be run."""
+        """Run all tasks.
+
+        ``ended`` is called for each run that has ended, for a lost run each time; ``tick`` is called at least
+        every second or so. Raises AbandonedError if the remaining tasks cannot be run.
+        """
 
 
 def work(journal: Journal, waiting: Sequence[Task], watch: Watch, workers: Workers) -> str | None:
-    """Run what is waiting; why it was stopped before the end, if it was: somebody pressed Ctrl-C, or there is
-    nobody left to run it."""
+    """Run the waiting tasks; return None, or the reason if it stopped before the end.
+
+    It stops early if the user pressed Ctrl-C or no workers are left.
+    """
 
     def ended(entry: Entry) -> None:
         journal.append(entry)
@@ -46,12 +51,15 @@ def work(journal: Journal, waiting: Sequence[Task], watch: Watch, workers: Worke
 
 
 def has_ended(journal: Journal, one: Task) -> bool:
-    """A lost run has not ended: it is tried again on resume."""
+    """Return whether the task has ended. A lost run has not ended: it is tried again on resume."""
     entry = journal.entries.get(one.run)
     return entry is not None and entry.status != "lost"
 
 
 def header(name: str, found: Sequence[Cell]) -> Header:
-    """The sweep is its cells: more runs of the same go on in the same journal."""
+    """Return the journal's header.
+
+    The cells identify the sweep: more runs of the same cells continue in the same journal.
+    """
     of_cells = hashlib.sha256(" ".join(sorted(cell.key for cell in found)).encode()).hexdigest()
     return Header(name, of_cells, versions())

@@ -1,4 +1,4 @@
-"""What a worker does with a task: the flight, and of its summary what does not depend on the machine."""
+"""Function that a worker runs for a task: the flight, and the machine-independent part of its summary."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from outrider.sweep.tasks import Task
 from sitl.vehicle.config import VehicleConfig
 
 RUN = f"{__name__}:fly"
-"""How a worker finds `fly`."""
+"""Name by which a worker finds `fly`."""
 
 
 def fly(task: Task) -> dict[str, Value]:
-    """Fly it without files. The same task gives the same summary."""
+    """Fly a task without files and return its summary. The same task gives the same summary."""
     return measure(prepared(task), task.seed)
 
 
 def prepared(task: Task) -> Prepared:
-    """What the task flies."""
+    """Return the scenario and the vehicle of a task."""
     return Prepared(_scenario(task), _vehicle(task.vehicle))
 
 
 def _scenario(task: Task) -> Scenario:
-    # A scenario is the same for all seeds of its cell; a scene draws another for each.
+    # A scenario is the same for all seeds of its cell; a scene draws another one for each seed.
     return scenario_of(task) if task.is_scene else _fixed(task._replace(seed=0))
 
 

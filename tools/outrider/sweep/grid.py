@@ -1,5 +1,4 @@
-"""A sweep file: which scenarios or scenes, with which values under which dotted keys, and how many runs of
-each. Typed, checked, frozen; and the cells that its grid spans."""
+"""Sweep file: scenarios or scenes, values by dotted keys, and the number of runs; and the cells of its grid."""
 
 from __future__ import annotations
 
@@ -23,8 +22,11 @@ Name = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class Sweep(Part):
-    """One sweep. Every scenario (or scene) is flown with every combination of the grid's values, and each of
-    these as it is and with each of the values to vary."""
+    """Sweep of scenarios or scenes over a grid of values.
+
+    Every scenario (or scene) is flown with every combination of the grid's values, and each combination as it
+    is and with each of the values to vary.
+    """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     description: str = ""
@@ -61,7 +63,7 @@ class Sweep(Part):
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """What is flown: names or files of scenarios, or of scenes."""
+        """Names or files of the scenarios, or of the scenes."""
         return self.scenarios or self.scenes
 
     @property
@@ -71,8 +73,11 @@ class Sweep(Part):
 
 
 class Point(NamedTuple):
-    """One combination: ``source`` with ``changes`` by dotted key. ``label`` names it within the sweep, by
-    what differs from cell to cell; each key by its end if that is enough."""
+    """One combination: ``source`` with ``changes`` by dotted key.
+
+    ``label`` names the combination within the sweep by the values that differ between cells; each key is
+    shortened to its end if that is unique.
+    """
 
     source: str
     label: str
@@ -80,7 +85,7 @@ class Point(NamedTuple):
 
 
 def points(sweep: Sweep) -> Iterator[Point]:
-    """Every combination, the last key of the grid running fastest, each followed by what varies from it."""
+    """Yield every combination, the last key of the grid varying fastest, each followed by its variations."""
     axes = [*sweep.grid, *sweep.vary]
     names = dict(zip(axes, _short([axis_keys(axis)[0] for axis in axes]), strict=True))
     varied = [(axis, value) for axis, values in sweep.vary.items() for value in values]
@@ -97,13 +102,15 @@ def points(sweep: Sweep) -> Iterator[Point]:
 
 
 def axis_keys(axis: str) -> list[str]:
-    """The dotted keys that an axis of the grid sets."""
+    """Return the dotted keys that an axis of the grid sets."""
     return axis.split(" + ")
 
 
 def overlay(document: Mapping[str, JsonValue], changes: Mapping[str, JsonValue]) -> dict[str, JsonValue]:
-    """``document`` with each dotted key set. Mappings on the way are made where there are none; whether the
-    keys exist is for the model to say."""
+    """Return ``document`` with each dotted key set.
+
+    Missing mappings on the path are created. Whether the keys exist is checked by the model, not here.
+    """
     result: dict[str, JsonValue] = deepcopy(dict(document))
     for key, value in changes.items():
         *way, last = key.split(".")
@@ -119,7 +126,7 @@ def overlay(document: Mapping[str, JsonValue], changes: Mapping[str, JsonValue])
 
 
 def leaves(document: Mapping[str, JsonValue], prefix: str = "") -> dict[str, JsonValue]:
-    """The values of nested mappings by dotted key; the inverse of `overlay`. Empty mappings say nothing."""
+    """Return the values of nested mappings by dotted key: the inverse of `overlay`. Empty mappings are dropped."""
     found: dict[str, JsonValue] = {}
     for key, value in document.items():
         if isinstance(value, dict):
@@ -130,12 +137,12 @@ def leaves(document: Mapping[str, JsonValue], prefix: str = "") -> dict[str, Jso
 
 
 def _within(key: str, other: str) -> bool:
-    """Whether ``key`` is ``other`` or something in it."""
+    """Return whether ``key`` equals ``other`` or lies below it."""
     return f"{key}.".startswith(f"{other}.")
 
 
 def _short(keys: list[str]) -> list[str]:
-    """The shortest end of each dotted key that no other key has too."""
+    """Return the shortest end of each dotted key that is unique among the keys."""
     short = []
     for key in keys:
         parts = key.split(".")
@@ -147,7 +154,7 @@ def _short(keys: list[str]) -> list[str]:
 
 
 def _word(value: JsonValue) -> str:
-    """A value as it may stand in a label: short and on one line."""
+    """Return a value as text for a label: short and on one line."""
     match value:
         case list():
             text = "+".join(_word(one) for one in value) or "none"

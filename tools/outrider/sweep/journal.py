@@ -1,8 +1,8 @@
-"""The journal of a sweep: one JSON line for each finished run, appended and never changed.
+"""Journal of a sweep: one JSON line for each finished run, appended and never changed.
 
-A line counts once its newline is there; what a kill tore off behind the last newline is cut away on resume.
-Each line is one write on a file opened to append, and reaches the disk at the latest `SYNC_S` later (as long
-as the sweep lives) or when the journal closes. The file is locked while a sweep uses it.
+A line counts when its newline is written; an incomplete line after the last newline is removed on resume.
+Each line is one write on a file opened to append. It reaches the disk at most `SYNC_S` later (as long as the
+sweep runs) or when the journal closes. The file is locked while a sweep uses it.
 """
 
 from __future__ import annotations
@@ -25,8 +25,7 @@ SYNC_S = 1.0
 
 
 class Header(NamedTuple):
-    """The journal's first line: which sweep it is of (the hash of all its cells), and by which versions it
-    was flown."""
+    """First line of a journal: the name of the sweep, the hash of all its cells, and the versions of the software."""
 
     name: str
     sweep: str
@@ -34,7 +33,7 @@ class Header(NamedTuple):
 
 
 class Journal:
-    """An open, locked journal. ``entries`` holds the latest of each run, in no particular order."""
+    """Open, locked journal. ``entries`` holds the latest entry of each run, in no particular order."""
 
     def __init__(self, descriptor: int, path: Path, entries: dict[tuple[str, int], Entry]) -> None:
         self._descriptor = descriptor
@@ -44,14 +43,14 @@ class Journal:
         self.entries = entries
 
     def append(self, entry: Entry) -> None:
-        """Write the line of a run that has ended. OutriderError if the disk does not take it."""
+        """Write the line of a run that has ended. Raises OutriderError if the disk does not take it."""
         _write(self._descriptor, self._path, {"run": entry._asdict()})
         self.entries[entry.run] = entry
         self._dirty = True
         self.settle()
 
     def settle(self, at_once: bool = False) -> None:
-        """Bring to the disk what was written, if it is time."""
+        """Flush written lines to the disk, if it is time or ``at_once`` is set."""
         now = time.monotonic()
         if self._dirty and (at_once or now - self._synced >= SYNC_S):
             os.fsync(self._descriptor)
@@ -60,8 +59,11 @@ class Journal:
 
 @contextmanager
 def opened(path: Path, header: Header) -> Iterator[Journal]:
-    """The journal at ``path``, made if it is not there. InputError if it is in use, is of another sweep or
-    other versions, or is damaged before its end; then it is left as it was."""
+    """Open the journal at ``path``, or create it.
+
+    Raises InputError if it is in use, belongs to another sweep or other versions, or is damaged before its
+    end; then it is left unchanged.
+    """
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o644)
     except OSError as error:
@@ -98,7 +100,7 @@ def _write(descriptor: int, path: Path, line: Mapping[str, object]) -> None:
     data = json.dumps(line, allow_nan=False, separators=(",", ":")).encode() + b"\n"
     written = os.write(descriptor, data)
     if written != len(data):
-        # The torn line is cut away on resume; nothing may be written behind it.
+        # The incomplete line is removed on resume; nothing may be written after it.
         raise OutriderError(f"{path}: took only {written} of {len(data)} bytes; is the disk full?")
 
 
@@ -147,7 +149,7 @@ def _parse(line: bytes, path: Path, number: int) -> dict[str, Any]:
 
 
 def _entry(value: object) -> Entry | None:
-    """The entry of a line, None if it is none."""
+    """Return the entry of a line, or None if it is invalid."""
     match value:
         case {
             "key": str(key),

@@ -1,5 +1,7 @@
-"""The summary of a sweep as one HTML page, in the looks of a run's report: offline, without a program, the
-picture in it. Whatever comes from outside is escaped."""
+"""Summary of a sweep as one HTML page with the style of a run's report.
+
+The page works offline, has no script and contains the picture. All external text is escaped.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ _MORE = "img { max-width: 100%; background: #fff; } td.number { text-align: righ
 
 
 def write(path: Path, name: str, cells: Sequence[CellReport], picture: Path) -> None:
-    """Write the page; ``picture`` is a PNG that is there."""
+    """Write the page; ``picture`` is an existing PNG."""
     style = "\n".join([*map(static, STYLES), _MORE])
     digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode("ascii")
     policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; "
@@ -66,7 +68,7 @@ def _outcome(cells: Sequence[CellReport]) -> str:
 
 
 def _table(cells: Sequence[CellReport]) -> str:
-    """A row for each cell: there may be many."""
+    """Return a table with a row for each cell, because there may be many cells."""
     found = rows(cells)
     head = "".join(f"<th scope=col>{escape(words)}</th>" for words, _ in found)
     body = "".join(

@@ -1,5 +1,7 @@
-"""The picture of a sweep: for each cell the times to converge and the least separations, as cumulative curves
-and as spreads, against d_min and the vehicles' own size."""
+"""Picture of a sweep: times to converge and least separations of each cell.
+
+They are drawn as cumulative curves and as spreads, with d_min and the vehicles' span for comparison.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_CURVES = 10
-"""Cells with a colour and a curve of their own; all have a row."""
+"""Number of cells with a colour and a curve of their own; every cell has a row."""
 _LIMIT = "#b00020"
 Reading = Callable[[Run], float | None]
 
@@ -69,7 +71,7 @@ def _headline(name: str, cells: Sequence[CellReport]) -> str:
 def _cumulative(
     axes: Axes, cells: Sequence[CellReport], runs: Sequence[Sequence[Run]], reading: Reading
 ) -> None:
-    """The share of runs at or below each value. Runs that never got there keep the curve below 1."""
+    """Draw the share of runs at or below each value. Runs that never converged keep the curve below 1."""
     all_values = [v for some in runs for run in some if (v := reading(run)) is not None]
     longest = max((v for v in all_values if isfinite(v)), default=0.0)
     for index, cell in enumerate(cells[:MOST_CURVES]):
@@ -78,7 +80,7 @@ def _cumulative(
             continue
         there = values[np.isfinite(values)]
         share = np.arange(1, len(there) + 1) / len(values)
-        # Out to the right end: a curve that ends below 1 shall be seen to.
+        # Drawn to the right edge, so that a curve that ends below 1 is recognisable.
         x, y = [0.0, *there, longest], [0.0, *share, len(there) / len(values)]
         axes.step(x, y, where="post", lw=1.4, color=f"C{index}", label=cell.label)
     axes.set_ylim(0.0, 1.02)
@@ -87,9 +89,12 @@ def _cumulative(
 def _spreads(
     axes: Axes, cells: Sequence[CellReport], runs: Sequence[Sequence[Run]], reading: Reading
 ) -> None:
-    """A row for each cell: every run as a dot, 5 to 95 % as a thin bar, the quartiles as a thick one, the
-    median; runs with a violation stand out."""
-    # The dots' heights only keep them apart.
+    """Draw a row for each cell.
+
+    Every run is a dot, 5 to 95 % are a thin bar, the quartiles a thick one, with the median; runs with a
+    violation are highlighted.
+    """
+    # The height of the dots only separates them.
     scatter = np.random.default_rng(0)
     for index in range(len(cells)):
         color = f"C{index}" if index < MOST_CURVES else "0.4"

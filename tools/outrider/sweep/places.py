@@ -1,7 +1,7 @@
-"""Random places that keep clear of each other: of vehicles, of a target that jumps, of obstacles.
+"""Random positions with distance from each other: of vehicles, of a jumping target, of obstacles.
 
-Each is drawn clear of those before it (random sequential addition); what finds no place is refused with a
-sentence. All in whole millimetres, so that what a file holds is what was checked.
+Each is drawn clear of those before it (random sequential addition); if there is no room, InputError says so.
+All values are whole millimetres, so that a file holds exactly what was checked.
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ from outrider.sweep.scenes import Scene
 Array = NDArray[np.float64]
 
 _BATCH, _ROUNDS = 32, 160
-"""Candidates that are tried at once, and how often, before a place is given up."""
+"""Number of candidates tried at once, and number of trials before a position is given up."""
 
 
 class Circles(NamedTuple):
-    """Places (n, 2) and radii (n,), m: points that obstacles keep clear of have radius 0. With ``hollow``,
-    inside is as good as outside."""
+    """Positions (n, 2) and radii (n,), m, that obstacles keep clear of; points have radius 0.
+
+    If ``hollow``, only the circle itself is kept clear: the inside is as good as the outside.
+    """
 
     centres: Array
     radii: Array
@@ -33,7 +35,10 @@ class Circles(NamedTuple):
 
 
 def scatter(random: np.random.Generator, scene: Scene, count: int, half: float, what: str) -> Array:
-    """Places (count, 3), m, in a square, no two nearer than ``apart`` seen from above."""
+    """Return positions (count, 3), m, in a square of ± ``half`` m, with horizontal distances of at least ``apart``.
+
+    Raises InputError if there is no room; ``what`` names the positions in its message.
+    """
     placed = np.empty((count, 3))
     heights = _mm(random.uniform(*scene.height, size=count))
     for k in range(count):
@@ -53,8 +58,11 @@ def scatter(random: np.random.Generator, scene: Scene, count: int, half: float, 
 
 
 def walk(random: np.random.Generator, jumps: int, length: float, extent: float) -> Array:
-    """Places (jumps + 1, 2) of the target, m: each ``length`` from the one before, all within ±``extent`` ≥
-    ``length``, so that a quarter of all directions leads to an allowed place at least."""
+    """Return positions (jumps + 1, 2) of the target, m, each ``length`` from the one before.
+
+    All lie within ±``extent`` ≥ ``length``, so that at least a quarter of all directions leads to an allowed
+    position.
+    """
     places = [np.zeros(2)]
     while len(places) <= jumps:
         angle = random.uniform(0.0, 2.0 * math.pi)
@@ -72,8 +80,11 @@ def obstacles(
     kept: Sequence[Circles],
     where: str,
 ) -> list[JsonValue]:
-    """``counts`` of spheres, then posts, as they stand in a scenario; each ``clear`` of what is kept, and
-    with a ``gap`` to the others, in a square of ± ``extent`` m."""
+    """Return ``counts`` of spheres, then posts, as in a scenario file.
+
+    Each is ``clear`` of the circles in ``kept`` and has a ``gap`` to the others, in a square of ± ``extent``
+    m. Raises InputError if there is no room.
+    """
     placed = np.empty((0, 3))
     found: list[JsonValue] = []
     kinds = ((scene.spheres, counts[0], "sphere"), (scene.posts, counts[1], "post"))
@@ -108,7 +119,7 @@ def _free(
     kept: Sequence[Circles],
     placed: Array,
 ) -> Array | None:
-    """A place (2,) for an obstacle, m; None if none was found."""
+    """Return a position (2,) for an obstacle, m; None if none was found."""
     for _ in range(_ROUNDS):
         found = _mm(random.uniform(-extent, extent, size=(_BATCH, 2)))
         ok = _apart(found, placed[:, :2]) - placed[:, 2] - radius >= scene.gap
@@ -126,11 +137,11 @@ def _free(
 
 
 def _apart(points: Array, others: Array) -> Array:
-    """Distances (n, m) of points (n, 2) and others (m, 2), m."""
+    """Return the distances (n, m) of points (n, 2) and others (m, 2), m."""
     off = points[:, None] - others[None]
     return np.asarray(np.hypot(off[..., 0], off[..., 1]))
 
 
 def _mm(values: Array | float) -> Array:
-    """Whole millimetres, and no negative zero."""
+    """Round to whole millimetres, without negative zeros."""
     return np.asarray(np.round(values, 3) + 0.0)

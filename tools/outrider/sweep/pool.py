@@ -1,8 +1,8 @@
-"""Runs tasks in local worker processes, each kept for many runs, so that a run costs no imports.
+"""Local worker processes, each used for many runs, so that a run does not repeat the imports.
 
-A worker that dies costs the one run it was at and is replaced. That run is tried once more at the end, when
-all others have ended: what takes its worker down again stays lost. Which worker runs what, and when, depends
-on the machine; results come from the task alone.
+A worker that dies costs only its current run and is replaced. That run is tried once more after all others
+have ended; a run that ends its worker again stays lost. Which worker runs which task, and when, depends on
+the machine; the results depend on the task alone.
 """
 
 from __future__ import annotations
@@ -17,13 +17,15 @@ from outrider.sweep.process import Process
 from outrider.sweep.tasks import Ended, Entry, Task
 
 MOST_STARTS = 5
-"""Workers in a row that die before they are ready; then it is not bad luck."""
+"""Number of workers in a row that may die before they are ready; more indicates a permanent error."""
 _TICK_S = 0.5
 
 
 class Pool:
-    """``jobs`` workers that call ``run``, a ``module:function``. Use it as a context: it leaves no process
-    behind, whatever happens."""
+    """Pool of ``jobs`` workers that call ``run``, a ``module:function``.
+
+    It is a context manager, which leaves no process behind in any case.
+    """
 
     def __init__(self, run: str, jobs: int, wall_limit_s: float) -> None:
         self._run, self._jobs, self._limit = run, jobs, wall_limit_s
@@ -41,12 +43,15 @@ class Pool:
 
     @property
     def workers(self) -> list[int]:
-        """Process ids."""
+        """Process ids of the workers."""
         return [worker.process.pid for worker in self._workers]
 
     def work(self, tasks: Iterable[Task], ended: Ended, tick: Callable[[], None] = lambda: None) -> None:
-        """Run all tasks. ``ended`` hears of each run that has ended, at once; of a lost one each time.
-        ``tick`` is called at least every half second. OutriderError if no worker can be started."""
+        """Run all tasks.
+
+        ``ended`` is called at once for each run that has ended, for a lost run each time. ``tick`` is called
+        at least every half second. Raises OutriderError if no worker can be started.
+        """
         backlog = Backlog(tasks)
         while backlog.goes_on(busy := sum(worker.task is not None for worker in self._workers)):
             alive = len(self._workers)
@@ -83,7 +88,7 @@ class Pool:
             self._stillborn = 0
 
     def _buried(self, worker: Process) -> Entry | None:
-        """If the worker is dead or too slow it is taken away; the entry of the run that it was at."""
+        """Remove the worker if it is dead or too slow, and return the entry of its run, if it had one."""
         if not worker.dead and not worker.overdue(self._limit):
             return None
         self._selector.unregister(worker.output)

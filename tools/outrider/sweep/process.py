@@ -1,5 +1,7 @@
-"""A process that flies runs one after the other, as `worker` says, and the pipe to it. Whoever has it may end
-it in the middle of a run: that costs the one run."""
+"""Process that flies runs one after the other, see `worker`, and the pipe to it.
+
+It may be ended in the middle of a run; only that run is lost.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,11 @@ from outrider.errors import OutriderError
 from outrider.sweep.tasks import Entry, Task
 
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""There are as many workers as cores; a library that starts threads of its own only slows them down."""
+"""Limits libraries to one thread: there are as many workers as cores, and more threads slow them down."""
 
 
 class _Reply(NamedTuple):
-    """The parts of a worker's line."""
+    """Fields of a worker's result line."""
 
     status: Any
     what: Any
@@ -29,11 +31,14 @@ class _Reply(NamedTuple):
 
 
 class Process:
-    """One process and the pipe to it. ``task`` is what it is at, ``since`` when (monotonic, s) it began."""
+    """Worker process and the pipe to it.
+
+    ``task`` is its current task, ``since`` the start time of it (monotonic, s).
+    """
 
     def __init__(self, run: str) -> None:
         environment = {**os.environ, **_ONE_THREAD}
-        # Tasks may be tests' own: the worker finds the modules that this process finds.
+        # Tasks may use functions of tests: the worker finds the same modules as this process.
         environment["PYTHONPATH"] = os.pathsep.join(path or os.getcwd() for path in sys.path)
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-m", "outrider.sweep.worker", run],
@@ -41,7 +46,7 @@ class Process:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             env=environment,
-            process_group=0,  # Ctrl-C is for the sweep: it ends the workers itself
+            process_group=0,  # Ctrl-C reaches only the sweep, which ends the workers itself
         )
         if self.process.stdin is None or self.process.stdout is None:
             raise OutriderError("a worker has no pipes")
@@ -55,14 +60,14 @@ class Process:
         self.cannot: str | None = None
 
     def give(self, task: Task) -> None:
-        """Hand over the next task. If the worker has just died, that is seen when it is heard."""
+        """Send the next task. If the worker has just died, the next `receive` finds that."""
         self.task, self.since = task, time.monotonic()
         with suppress(BrokenPipeError):
             self._input.write(json.dumps(task._asdict()).encode() + b"\n")
             self._input.flush()
 
     def receive(self) -> None:
-        """Read what has come; called when there is something, and that may be the end."""
+        """Read available output; call it when the pipe is readable, which may be its end."""
         data = os.read(self.output.fileno(), 1 << 20)
         self.dead = not data
         *lines, self._buffer = (self._buffer + data).split(b"\n")
@@ -76,27 +81,27 @@ class Process:
                 self._reply = _Reply(**said)
 
     def take_entry(self) -> Entry | None:
-        """How the run has ended that it was at; None if it has not."""
+        """Return the entry of the run if it has ended, otherwise None."""
         if self._reply is None or self.task is None:
             return None
         reply, self._reply = self._reply, None
         return Entry(*self.task.run, reply.status, reply.what, reply.summary, reply.wall_s)
 
     def overdue(self, limit_s: float) -> bool:
-        """Whether its run has taken longer than it may."""
+        """Return whether the run has taken longer than ``limit_s`` (s)."""
         return self.task is not None and time.monotonic() - self.since >= limit_s
 
     def bury(self, limit_s: float) -> str:
-        """End it because it is dead, or slower than ``limit_s``; which of both, as what became of its run."""
+        """End the process and return why: it is dead, or slower than ``limit_s``."""
         dead, status = self.dead, self.end()
         return f"its worker {death(status)}" if dead else f"took longer than {limit_s:g} s of wall time"
 
     def lost(self, task: Task, what: str) -> Entry:
-        """The entry of the ``task`` that it was at."""
+        """Return the entry of the lost ``task``."""
         return Entry(*task.run, "lost", what, None, round(time.monotonic() - self.since, 3))
 
     def end(self) -> int:
-        """Kill it if it still lives; its exit status. It is dead from then on, and gets no task any more."""
+        """Kill the process if it is alive, and return its exit status. Afterwards it is dead and gets no task."""
         self.dead = True
         self.process.kill()
         self.output.close()
@@ -106,7 +111,7 @@ class Process:
 
 
 def death(status: int) -> str:
-    """How a process with this exit status ended, in words."""
+    """Describe in words how a process with this exit status ended."""
     if status >= 0:
         return f"ended with status {status}"
     try:

@@ -1,4 +1,4 @@
-"""Progress of a sweep on standard error: a bar with the time left; without a terminal a line now and then."""
+"""Progress of a sweep on standard error: a bar with the time left, or occasional lines without a terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from outrider.terminal.progress_lines import ProgressLines
 
 
 class Watch:
-    """Counts how the runs end, and says so. ``lost`` holds every loss of this attempt, retried or not."""
+    """Counter of the runs' results, with display. ``lost`` holds every loss of this attempt, retried or not."""
 
     def __init__(self, total: int, finished: int, bar: Progress | None) -> None:
         self._total, self._before, self._left = total, finished, total - finished
@@ -28,7 +28,7 @@ class Watch:
         self.lost: list[Entry] = []
 
     def ended(self, entry: Entry) -> None:
-        """A run has ended."""
+        """Count a run that has ended."""
         ending = run_of(entry).ending
         self._count[ending] += 1
         if ending is Ending.LOST:
@@ -38,7 +38,7 @@ class Watch:
         self.tick()
 
     def tick(self) -> None:
-        """Time has passed."""
+        """Update the display."""
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self._before + self._ended, words=self._words())
         else:
@@ -60,7 +60,7 @@ class Watch:
 
 @contextmanager
 def watching(total: int, finished: int) -> Iterator[Watch]:
-    """A `Watch` over ``total`` runs of which some are ``finished`` already."""
+    """Provide a `Watch` over ``total`` runs, ``finished`` of which have ended already."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield Watch(total, finished, None)
@@ -75,7 +75,7 @@ def watching(total: int, finished: int) -> Iterator[Watch]:
 
 
 def duration(seconds: float) -> str:
-    """``42 s``, ``7 min``, ``1 h 05 min``."""
+    """Return a duration as text: ``42 s``, ``7 min``, ``1 h 05 min``."""
     if seconds < 90.0:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60.0)

@@ -1,4 +1,4 @@
-"""Runs that failed as scenario files, to be flown again after every change."""
+"""Failed runs as scenario files, to be flown again after every change."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _KEY = 8
 
 
 def prepare(folder: Path) -> None:
-    """Make the ``folder``, before anything is flown. InputError if that cannot be."""
+    """Create the ``folder`` before anything is flown. Raises InputError if that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -27,10 +27,12 @@ def prepare(folder: Path) -> None:
 
 
 def write(folder: Path, sweep: str, cells: Sequence[Cell], runs: Mapping[str, Sequence[Run]]) -> list[Path]:
-    """A file in ``folder`` for each run that did not end well: SWEEP-CELL-KEY-seedN.yaml, where KEY tells
-    what is flown; it begins with what went wrong and the command that flies it. ``runs`` holds those of each
-    cell by its key. What is there stays, as somebody may have changed it. InputError if one cannot be
-    written."""
+    """Write a file to ``folder`` for each run that did not end well, and return the files.
+
+    The names are SWEEP-CELL-KEY-seedN.yaml, where KEY is the start of the cell's key. A file starts with the
+    reason and the command that flies it. ``runs`` holds the runs of each cell by its key. An existing file
+    stays, because it may have been edited. Raises InputError if a file cannot be written.
+    """
     files: dict[Path, str] = {}
     for cell in cells:
         for run in runs[cell.key]:
@@ -52,7 +54,7 @@ def _text(path: Path, sweep: str, cell: Cell, run: Run) -> str:
         words.append(f"least separation {run.separation:g} m")
     if run.what:
         words.append(run.what)
-    # One line each, whatever an error or a label says.
+    # Each on one line, even if an error or a label has several.
     why, label = (" ".join(text.split()) for text in (", ".join(words), cell.label))
     command = shlex.join(["outrider", "swarm", path.name, "--seed", str(run.seed)])
     head = f"{_MARK}: sweep {sweep}, {label}, seed {run.seed}: {why}\n# {command}\n"

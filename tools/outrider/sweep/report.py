@@ -1,6 +1,9 @@
-"""The runs of a sweep to its summary: for each cell counts, rates, times and separations with their
-intervals, and the worst runs with the commands that replay them. A function of the runs alone: not of who
-flew them, when, or in how many attempts."""
+"""Summary of a sweep, computed from its runs.
+
+Each cell has counts, rates, times and separations with their intervals, and its worst runs with the commands
+that replay them. The summary is a function of the runs alone: it does not depend on the machine, the time or
+the number of attempts.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +20,15 @@ METHOD = (
     "longer than every run that did; rates are of the runs that ended"
 )
 WORST = 3
-"""So many runs of each kind are named for each cell."""
+"""Number of runs of each kind that are named for each cell."""
 Command = Callable[[int], str]
 
 
 class Spread(NamedTuple):
-    """Of one figure over the runs of a cell. Of separations ``extreme`` is the least, of errors the
-    largest."""
+    """Distribution of one figure over the runs of a cell.
+
+    ``extreme`` is the least separation, or the largest error.
+    """
 
     extreme: float | None
     tail: float | None
@@ -32,7 +37,7 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class Named:
-    """A run that is worth a look: why, its figures, and the command that flies it again."""
+    """Run that needs attention: the reason, its figures, and the command that flies it again."""
 
     seed: int
     why: str
@@ -45,8 +50,11 @@ class Named:
 
 @dataclass(frozen=True)
 class CellReport:
-    """A cell. ``violations``, ``stuck``, ``failed``, ``faults`` and ``lost`` count runs. Times in s,
-    separations in m: ``p5`` is the tail of separations, ``p95`` that of times and errors."""
+    """Summary of a cell.
+
+    ``violations``, ``stuck``, ``failed``, ``faults`` and ``lost`` count runs. Times in s, separations in m.
+    The tail is p5 for separations, p95 for times and errors.
+    """
 
     label: str
     key: str
@@ -73,8 +81,10 @@ class CellReport:
 
 
 def cell_report(label: str, key: str, runs: Sequence[Run], command: Command) -> CellReport:
-    """The report of one cell from all its runs, in the order of seeds. ``command`` gives the command that
-    replays a seed."""
+    """Return the report of one cell from all its runs, in the order of seeds.
+
+    ``command`` returns the command that replays a seed.
+    """
     done = [run for run in runs if run.ending not in (Ending.LOST, Ending.FAULT)]
     with_goal = [run for run in done if run.converged is not None]
     count = {ending: sum(run.ending is ending for run in runs) for ending in Ending}
@@ -107,8 +117,10 @@ def cell_report(label: str, key: str, runs: Sequence[Run], command: Command) -> 
 
 
 def exit_status(cells: Iterable[CellReport]) -> int:
-    """0: all runs ended well; 1: a violation, or a goal that was not reached; 3: a run that raised, or stays
-    lost."""
+    """Return 0 if all runs ended well, 1 for a violation or a goal not reached, 3 for an error or a lost run.
+
+    The last one takes precedence.
+    """
     cells = list(cells)
     if any(cell.faults or cell.lost for cell in cells):
         return 3
@@ -116,7 +128,7 @@ def exit_status(cells: Iterable[CellReport]) -> int:
 
 
 def document(name: str, first_seed: int, cells: Sequence[CellReport]) -> dict[str, Any]:
-    """The summary for scripts: values of JSON, the same for the same runs. What is not finite is null."""
+    """Return the summary for scripts: values of JSON, the same for the same runs. Infinite values are null."""
     total = {
         field: sum(getattr(cell, field) for cell in cells)
         for field in ("runs", "ended", "violations", "stuck", "failed", "faults", "lost")
@@ -184,8 +196,11 @@ def _present(values: Iterable[float | None]) -> list[float]:
 
 
 def _named(runs: Sequence[Run], command: Command) -> tuple[Named, ...]:
-    """Every run that raised or is lost; and a few of each other kind, violations first, then what did not
-    arrive, the nearest, the slowest. Each run once; equals in the order of seeds."""
+    """Return the runs to be named: every run that raised an error or is lost, and a few of each other kind.
+
+    The order is: violations, runs that failed or are stuck, the smallest distances, the longest times, then
+    errors and lost runs. Each run occurs once; equal runs are in the order of seeds.
+    """
 
     def nearness(run: Run) -> float:
         return min((d for d in (run.separation, run.to_obstacle) if d is not None), default=inf)

@@ -1,4 +1,4 @@
-"""What a sweep wants to know of one finished run, taken from its journal entry."""
+"""Figures of one finished run, taken from its journal entry."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from outrider.sweep.tasks import Entry
 
 
 class Ending(Enum):
-    """How a run ended, the worst first. ``STUCK``: not converged by the cap, without a violation. ``FAILED``:
-    the flight did not come about. ``FAULT``: it raised. ``LOST``: its worker died or was too slow."""
+    """Result of a run, the worst first.
+
+    ``STUCK``: not converged within the time limit, without a violation. ``FAILED``: the flight did not take
+    place as intended. ``FAULT``: it raised an error. ``LOST``: its worker died or was too slow.
+    """
 
     VIOLATION = "violation"
     FAILED = "failed"
@@ -22,9 +25,12 @@ class Ending(Enum):
 
 
 class Run(NamedTuple):
-    """One run. ``seconds`` to converge: inf if it did not, None if there was no goal. ``separation``: least
-    distance between vehicles, m; ``to_obstacle``: from a centre to a surface, m. ``yaw`` (deg) and
-    ``tracking`` (m) are the run's 95th percentiles. ``what`` says what went wrong."""
+    """Figures of one run.
+
+    ``seconds`` to converge: inf if it did not, None if there was no goal. ``separation``: least distance
+    between vehicles, m; ``to_obstacle``: least distance from a centre to a surface, m. ``yaw`` (deg) and
+    ``tracking`` (m) are the run's 95th percentiles. ``what`` describes an error.
+    """
 
     seed: int
     ending: Ending
@@ -41,7 +47,7 @@ class Run(NamedTuple):
 
 
 def run_of(entry: Entry) -> Run:
-    """The figures of an entry. What its summary does not have is None."""
+    """Return the figures of an entry. Figures that its summary does not have are None."""
     if entry.summary is None:
         ending = Ending.LOST if entry.status == "lost" else Ending.FAULT
         nothing = (None,) * 4

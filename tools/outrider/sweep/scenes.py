@@ -1,5 +1,7 @@
-"""A scene file: how to draw random scenarios. One seed is one scenario; ``difficulty`` turns every dial at
-once, from its easy end to its hard end."""
+"""Scene file: rules for drawing random scenarios.
+
+One seed gives one scenario; ``difficulty`` sets every parameter between its easy and its hard value.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ from outrider.sweep.trouble import Trouble
 
 Metres = Annotated[float, Field(gt=0.0, le=200.0)]
 Span = tuple[Metres, Metres]
-"""Drawn evenly between the two."""
+"""Interval; values are drawn uniformly from it."""
 Number = Annotated[int, Field(ge=0, le=500)]
 Amount = Annotated[float, Field(ge=0.0, le=50.0)]
 
@@ -28,7 +30,7 @@ DECIDED = (
     "companion.limits.v_max",
     "companion.surface.radius",
 )
-"""Keys of a scenario that a scene decides, dotted."""
+"""Dotted keys of a scenario that a scene decides."""
 
 
 class Density(Part):
@@ -46,35 +48,35 @@ class Speed(Part):
 
 
 class PerVehicle(Part):
-    """How many, for each vehicle; the sum is rounded."""
+    """Number for each vehicle; the total is rounded."""
 
     easy: Amount
     hard: Amount
 
 
 class Count(Part):
-    """How many; rounded."""
+    """Number, rounded."""
 
     easy: Amount
     hard: Amount
 
 
 class Distance(Part):
-    """m."""
+    """Distance, m."""
 
     easy: Metres
     hard: Metres
 
 
 class Interval(Part):
-    """s; the hard end is the shorter."""
+    """Interval, s; the hard value is the shorter one."""
 
     easy: float = Field(gt=0.0, le=600.0)
     hard: float = Field(gt=0.0, le=600.0)
 
 
 class Things(Part):
-    """Obstacles of a kind: so many for each vehicle, or so many in all."""
+    """Obstacles of one kind: a number for each vehicle, or a total number."""
 
     per_vehicle: PerVehicle | None = None
     count: tuple[Number, Number] | None = Field(
@@ -103,7 +105,7 @@ class Poles(Things):
 
 
 class Jumps(Part):
-    """A target that is suddenly elsewhere, several times; the first time at the goal event."""
+    """Jumps of the target to other positions, several times; the first jump is at the goal event."""
 
     count: Count
     length: Distance = Field(description="m, of each jump")
@@ -111,8 +113,10 @@ class Jumps(Part):
 
 
 class Scene(Part):
-    """How a scenario is drawn. All distances between places are horizontal, so that taking off and landing is
-    as clear as flying."""
+    """Rules by which a scenario is drawn.
+
+    All distances between positions are horizontal, so that take-off and landing are as clear as the flight.
+    """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,50}$")
     description: str = ""

@@ -1,4 +1,4 @@
-"""A Dask scheduler's address, and the client that speaks with it."""
+"""Address of a Dask scheduler, and the client connected to it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:\[\]]+):
 
 
 def connected(address: str) -> Any:
-    """A `distributed.Client` of the scheduler at ``address``. InputError if there is none."""
+    """Return a `distributed.Client` of the scheduler at ``address``. Raises InputError if there is none."""
     found = _ADDRESS.fullmatch(address)
     if found is None or not 0 < int(found["port"]) < 65536:
         raise InputError(
@@ -29,7 +29,7 @@ def connected(address: str) -> Any:
             "(DASK_DISTRIBUTED__COMM__TLS__CA_FILE and so on)"
         )
     ended: list[Any] = []
-    # In a thread, as Dask waits for ever for a first word that is none of its protocol.
+    # In a thread, because Dask waits without limit for the first message of a server with another protocol.
     thread = Thread(target=_connect, args=(address, ended), daemon=True)
     thread.start()
     thread.join(2 * CONNECT_S)
@@ -51,7 +51,7 @@ def connected(address: str) -> Any:
 
 
 def _check_alike(client: Any, address: str) -> None:
-    """InputError if the scheduler has not the Dask that is here."""
+    """Raise InputError if the scheduler's version of Dask differs from the one here."""
     there = client.sync(client.scheduler.versions, callback_timeout=CONNECT_S)
     theirs, ours = there["packages"]["distributed"], version_of("distributed")
     if theirs != ours:
@@ -66,7 +66,7 @@ def _has_tls() -> bool:
     try:
         settings = Security().get_connection_args("client")  # type: ignore[no-untyped-call]
     except OSError as error:
-        # A file that is not there, or that is no certificate.
+        # The file does not exist, or is not a certificate.
         raise InputError(
             f"--scheduler: the files of Dask's settings distributed.comm.tls cannot be used: {error}"
         ) from None
@@ -74,21 +74,21 @@ def _has_tls() -> bool:
 
 
 def _connect(address: str, ended: list[Any]) -> None:
-    """Put into ``ended`` the client, or what it raised."""
+    """Append to ``ended`` the client, or the exception that was raised."""
     from distributed import Client
     from distributed.versions import VersionMismatchWarning
 
-    # What Dask would say of connections that come and go the sweep says itself.
+    # The sweep itself reports connections that come and go.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    # Which versions a worker has is looked at when it comes.
+    # The versions of a worker are checked when it joins.
     warnings.simplefilter("ignore", VersionMismatchWarning)
     try:
         client = Client(  # type: ignore[no-untyped-call]
             address, timeout=CONNECT_S, set_as_default=False, name="outrider-sweep"
         )
     except Exception as error:
-        # Whatever it is that speaks there.
+        # Any exception: the server may speak any protocol.
         ended.append(error)
         return
     try:

@@ -1,5 +1,7 @@
-"""Which code flies: a hash over our own sources, as a version that seldom changes says nothing, and the
-versions of what else results come from."""
+"""Versions of the code that flies: a hash over the project's sources, and the versions of other packages.
+
+The project's own version changes too seldom to identify the code.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ _OTHERS = ("outrider", "numpy", "scipy", "numba", "piqp", "jsbsim", "filterpy", 
 
 
 def versions() -> dict[str, str]:
-    """All that results depend on beside the task."""
+    """Return everything besides the task that results depend on."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     found["code"] = digest(sources())
     for package in _OTHERS:
@@ -28,7 +30,7 @@ def versions() -> dict[str, str]:
 
 
 def differences(theirs: Mapping[str, str], ours: Mapping[str, str], word: str) -> list[str]:
-    """In which of `versions` two differ, as ``numpy 2.3.0 (WORD 2.4.1)``."""
+    """Return the entries of two `versions` that differ, as ``numpy 2.3.0 (WORD 2.4.1)``."""
     return [
         f"{name} {theirs.get(name)} ({word} {ours.get(name)})"
         for name in sorted(theirs.keys() | ours.keys())
@@ -37,7 +39,7 @@ def differences(theirs: Mapping[str, str], ours: Mapping[str, str], word: str) -
 
 
 def version_of(package: str) -> str:
-    """``none`` if it is not installed."""
+    """Return the version of a package, or ``none`` if it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -45,8 +47,11 @@ def version_of(package: str) -> str:
 
 
 def sources() -> dict[str, Path]:
-    """All files that a flight depends on and no cell of a sweep holds: our packages' code, and the recorded
-    targets; by a name that is the same wherever they lie."""
+    """Return all files that a flight depends on and that are not in a cell of a sweep.
+
+    They are the code of the project's packages and the recorded targets, by names that do not depend on their
+    location.
+    """
     found: dict[str, Path] = {}
     for package in _PACKAGES:
         spec = find_spec(package)
@@ -59,7 +64,7 @@ def sources() -> dict[str, Path]:
 
 
 def digest(files: Mapping[str, Path]) -> str:
-    """Another one if a name or a byte of ``files`` changes, whatever their order."""
+    """Return a hash of the names and the contents of ``files``, independent of their order."""
     whole = hashlib.sha256()
     for name in sorted(files):
         whole.update(f"{name} {hashlib.sha256(files[name].read_bytes()).hexdigest()}\n".encode())

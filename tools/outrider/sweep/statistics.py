@@ -1,10 +1,10 @@
-"""Rates and quantiles with 95 % intervals that assume nothing about how the values are distributed.
+"""Rates and quantiles with 95 % intervals that assume nothing about the distribution of the values.
 
 Rates: Wilson's score interval (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927). Quantiles: order statistics; two
-values of the sample enclose the true quantile with a probability that the binomial distribution gives
-(H. A. David and H. N. Nagaraja, Order Statistics, 3rd ed., Sec. 7.1). Both are exact functions of the sample:
-nothing is drawn, so the same runs give the same intervals. Values may be +inf: a run that never converged
-took longer than every run that did.
+values of the sample enclose the true quantile with a probability that the binomial distribution gives (H. A.
+David and H. N. Nagaraja, Order Statistics, 3rd ed., Sec. 7.1). Both are exact functions of the sample: no
+random numbers are drawn, so the same runs give the same intervals. Values may be +inf: a run that never
+converged took longer than every run that did.
 """
 
 from __future__ import annotations
@@ -22,8 +22,10 @@ CONFIDENCE = 0.95
 
 
 class Interval(NamedTuple):
-    """``low`` ≤ ``value`` ≤ ``high``. Of a quantile: -inf or +inf where the sample is too small to bound
-    it."""
+    """Interval with ``low`` ≤ ``value`` ≤ ``high``.
+
+    A bound of a quantile is -inf or +inf if the sample is too small for a finite one.
+    """
 
     value: float
     low: float
@@ -31,7 +33,10 @@ class Interval(NamedTuple):
 
 
 def rate(successes: int, trials: int) -> Interval | None:
-    """The share of ``successes`` with Wilson's 95 % interval; None without trials."""
+    """Return the share of ``successes`` with Wilson's 95 % interval; None without trials.
+
+    Raises ValueError if there are more successes than trials, or fewer than 0.
+    """
     if not 0 <= successes <= trials:
         raise ValueError(f"{successes} successes of {trials} trials")
     if trials == 0:
@@ -39,15 +44,18 @@ def rate(successes: int, trials: int) -> Interval | None:
     share, z2 = successes / trials, Z_95**2
     centre = (share + z2 / (2 * trials)) / (1 + z2 / trials)
     half = Z_95 / (1 + z2 / trials) * sqrt(share * (1 - share) / trials + z2 / (4 * trials**2))
-    # At the ends the interval closes exactly; rounding must not leave it open.
+    # At 0 and 1 the interval must close exactly, without rounding errors.
     low = 0.0 if successes == 0 else centre - half
     high = 1.0 if successes == trials else centre + half
     return Interval(share, low, high)
 
 
 def quantile(values: Sequence[float], level: float) -> Interval | None:
-    """The least value that at least a share ``level`` of the sample does not exceed, with a 95 % interval
-    between two values of the sample; None without values."""
+    """Return the quantile of ``values`` at ``level`` with a 95 % interval; None without values.
+
+    The quantile is the least value that at least a share ``level`` of the sample does not exceed; the bounds
+    are values of the sample. Raises ValueError if ``level`` is not between 0 and 1.
+    """
     if not 0.0 < level < 1.0:
         raise ValueError(f"level {level} is not between 0 and 1")
     ordered = sorted(values)
@@ -63,9 +71,12 @@ def quantile(values: Sequence[float], level: float) -> Interval | None:
 
 
 def ranks(count: int, level: float) -> tuple[int, int]:
-    """Ranks (l, u), counted from 1, of a sample of ``count``: the true quantile is below x(l) with a
-    probability of at most 2.5 %, and above x(u) too. l is 0, u is ``count`` + 1, where no rank does that."""
-    # x(l) > quantile ⟺ fewer than l values lie at or below it; their number is binomial.
+    """Return the ranks (l, u), counted from 1, that bound the quantile of a sample of ``count`` values.
+
+    The true quantile is below x(l) with a probability of at most 2.5 %, and above x(u) likewise. l is 0, and
+    u is ``count`` + 1, if no rank achieves that.
+    """
+    # x(l) > quantile ⟺ fewer than l values are at or below it; their number is binomially distributed.
     below = np.concatenate([[0.0], np.cumsum(_binomial(count, level))])
     tail = (1.0 - CONFIDENCE) / 2
     lower = int(np.searchsorted(below[: count + 1], tail, side="right")) - 1
@@ -74,23 +85,23 @@ def ranks(count: int, level: float) -> tuple[int, int]:
 
 
 def least(values: Sequence[float]) -> float | None:
-    """The smallest finite value; None if there is none."""
+    """Return the smallest finite value; None if there is none."""
     return min((value for value in values if isfinite(value)), default=None)
 
 
 def largest(values: Sequence[float]) -> float | None:
-    """The largest finite value; None if there is none."""
+    """Return the largest finite value; None if there is none."""
     return max((value for value in values if isfinite(value)), default=None)
 
 
 def plain(values: Sequence[float], level: float) -> float | None:
-    """The quantile alone, None if there are no values or it is not finite."""
+    """Return the quantile alone; None if there are no values or it is not finite."""
     found = quantile(values, level)
     return None if found is None or not isfinite(found.value) else found.value
 
 
 def _binomial(count: int, probability: float) -> NDArray[np.float64]:
-    """Probabilities (count + 1,) of 0…count successes, through logarithms so that no factor overflows."""
+    """Return the probabilities (count + 1,) of 0…count successes, by logarithms so that no factor overflows."""
     k = np.arange(count + 1)
     choose = np.array([lgamma(count + 1) - lgamma(i + 1) - lgamma(count - i + 1) for i in range(count + 1)])
     return np.asarray(np.exp(choose + k * log(probability) + (count - k) * log(1.0 - probability)))

@@ -1,4 +1,4 @@
-"""The summary of a sweep for people."""
+"""Summary of a sweep as a table for people."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from outrider.sweep.report import METHOD, CellReport, Named, Spread
 from outrider.sweep.statistics import Interval
 
 WIDTH = 120
-"""Characters, where there is no terminal."""
+"""Width in characters if there is no terminal."""
 MOST_NAMED = 12
 _WORDS_WIDTH, _CELL_WIDTH = 42, 26
 _ORDER = ("violation", "failed", "stuck", "fault", "lost", "nearest", "slowest")
@@ -32,14 +32,14 @@ def show(name: str, cells: Sequence[CellReport], console: Console | None = None)
     named.sort(key=lambda pair: _ORDER.index(pair[1].why))
     for cell, one in named[:MOST_NAMED]:
         console.print(Text(f"\n{_reason(cell, one)}"))
-        # Not wrapped: it is there to be copied.
+        # Not wrapped, so that it can be copied.
         console.print(Text(f"  {one.command}"), soft_wrap=True)
     if len(named) > MOST_NAMED:
         console.print(Text(f"\nand {len(named) - MOST_NAMED} more in the summary"))
 
 
 def _table(name: str, cells: Sequence[CellReport]) -> Table:
-    """A column for each cell, so that what is compared stands side by side."""
+    """Return a table with a column for each cell, so that compared values stand side by side."""
     table = Table(title=f"sweep {name}")
     table.add_column("", no_wrap=True)
     for cell in cells:
@@ -50,7 +50,7 @@ def _table(name: str, cells: Sequence[CellReport]) -> Table:
 
 
 def rows(cells: Sequence[CellReport]) -> list[tuple[str, list[str]]]:
-    """What each figure is, and its text for each cell; without those that say nothing of any."""
+    """Return the name of each figure and its text for each cell; figures without any text are omitted."""
     found = [(words, [text_of(cell) for cell in cells]) for words, text_of in _ROWS]
     return [(words, texts) for words, texts in found if any(texts)]
 
@@ -73,7 +73,7 @@ def _share(count: int | None, value: Interval | None) -> str:
 
 
 def _seconds(value: Interval | None) -> str:
-    """No time is below 0; what the sample does not bound is ∞."""
+    """Return a time with its interval: the lower bound is at least 0, a missing bound is ∞."""
     if value is None:
         return ""
     if value.low == inf:
@@ -92,7 +92,7 @@ def _number(value: float | None, digits: int) -> str:
 
 
 def _count(number: int) -> str:
-    """Nothing for none: a row that says nothing is left out."""
+    """Return the number as text, empty for 0: an empty row is omitted."""
     return str(number) if number else ""
 
 

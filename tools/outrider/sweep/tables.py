@@ -1,4 +1,4 @@
-"""The summary and the runs of a sweep as Parquet, where pyarrow is installed (extra ``export``)."""
+"""Summary and runs of a sweep as Parquet files, if pyarrow is installed (extra ``export``)."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ CELLS, RUNS = "summary.parquet", "runs.parquet"
 
 
 def write(folder: Path, cells: Sequence[CellReport], runs: Mapping[str, Sequence[Run]]) -> None:
-    """A row for each cell, with its intervals, and a row for each run, in the order of seeds. What is not
-    known, or did not come about, is null. Without pyarrow there are none, and none that are older."""
+    """Write a row for each cell, with its intervals, and a row for each run, in the order of seeds.
+
+    Values that are not known or not finite are null. Without pyarrow no files are written, and older ones are
+    removed.
+    """
     if find_spec("pyarrow") is None:
         for name in (CELLS, RUNS):
             (folder / name).unlink(missing_ok=True)
@@ -102,5 +105,5 @@ def _run_row(cell: CellReport, run: Run) -> dict[str, Any]:
 
 
 def _finite(value: float | None) -> float | None:
-    """A number; never is none."""
+    """Return a finite number unchanged, otherwise None."""
     return value if value is not None and isfinite(value) else None

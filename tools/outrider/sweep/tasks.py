@@ -1,4 +1,4 @@
-"""What goes to a worker, and what comes back."""
+"""Tasks for workers, and the entries that they return."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ Status = Literal["done", "fault", "lost"]
 
 
 class Task(NamedTuple):
-    """One run: ``key`` (the hash of what is flown) and ``seed`` name it. ``document`` is the scenario as
-    JSON, or, if ``is_scene``, the scene that draws one for the seed; ``vehicle`` is its vehicle as JSON."""
+    """One run, identified by ``key`` (the hash of what is flown) and ``seed``.
+
+    ``document`` is the scenario as JSON, or, if ``is_scene``, the scene that draws a scenario for the seed.
+    ``vehicle`` is its vehicle as JSON.
+    """
 
     key: str
     seed: int
@@ -22,13 +25,16 @@ class Task(NamedTuple):
 
     @property
     def run(self) -> tuple[str, int]:
-        """What names the run."""
+        """Identity of the run."""
         return self.key, self.seed
 
 
 class Entry(NamedTuple):
-    """How a run ended. ``done`` with its ``summary``; ``fault``: it raised, and ``what`` says what; ``lost``:
-    its worker died or was too slow. ``wall_s`` is no part of the result."""
+    """Result of a run.
+
+    ``status`` is ``done``, with its ``summary``; ``fault``: it raised an error, described by ``what``; or
+    ``lost``: its worker died or was too slow. ``wall_s`` is not part of the result.
+    """
 
     key: str
     seed: int
@@ -39,7 +45,7 @@ class Entry(NamedTuple):
 
     @property
     def run(self) -> tuple[str, int]:
-        """What names the run."""
+        """Identity of the run."""
         return self.key, self.seed
 
 
@@ -47,4 +53,4 @@ Ended = Callable[[Entry], None]
 
 
 class AbandonedError(OutriderError):
-    """There is nobody left to run tasks. What has ended is kept."""
+    """There are no workers left to run tasks. The entries of ended runs are kept."""

@@ -1,8 +1,7 @@
-"""What goes wrong in a drawn scenario: sensors, links, wind, clocks, companions that hang or vanish, a swarm
-that is cut in two.
+"""Random disturbances of a drawn scenario: sensors, links, wind, clocks, companion faults and partitions.
 
-Numbers and times are drawn evenly within their bounds; loss, delay and jitter as least + (most − least)·x³
-with x even, for where nearly everything is lost nobody moves, and little is tried.
+Numbers and times are drawn uniformly within their bounds. Loss, delay and jitter are drawn as least + (most −
+least)·x³ with uniform x, because where nearly everything is lost no vehicle moves, and little is tested.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ Few = Annotated[int, Field(ge=0, le=20)]
 
 
 class Trouble(Part):
-    """Bounds: least and most of what the swarm's links, the air, the clocks and the companions may suffer."""
+    """Bounds (least and most) of the disturbances of swarm links, wind, clocks and companions."""
 
     sensors: tuple[Literal["truth", "rtk", "gnss", "sih"], ...] = Field(
         ("rtk",), min_length=1, description="one of"
@@ -53,7 +52,7 @@ class Trouble(Part):
 
 
 def strike(trouble: Trouble, count: int, random: np.random.Generator) -> dict[str, JsonValue]:
-    """What happens to a fleet of ``count``, as part of a scenario file."""
+    """Return the disturbances of a fleet of ``count`` vehicles, as part of a scenario file."""
 
     def drawn(span: tuple[float, float]) -> float:
         return round(float(random.uniform(*span)), 4)
@@ -67,7 +66,7 @@ def strike(trouble: Trouble, count: int, random: np.random.Generator) -> dict[st
     document: dict[str, JsonValue] = {"sensors": str(random.choice(trouble.sensors))}
     loss, delay_ms, jitter_ms = (bad(span) for span in (trouble.loss, trouble.delay_ms, trouble.jitter_ms))
     if trouble.fitting_epochs > random.uniform():
-        # As whoever sets the fleet up would: no shorter than a plan takes to arrive.
+        # A sensible configuration: the epoch is not shorter than the time in which a plan arrives.
         epochs = max(int(np.ceil((delay_ms + jitter_ms) / (1e-3 * _KNOT_US))), 1)
         document["companion"] = {"certified": {"epoch_us": _KNOT_US * epochs}}
     document["links"] = {

@@ -1,8 +1,8 @@
-"""A worker process: ``python -m outrider.sweep.worker MODULE:FUNCTION``.
+"""Worker process: ``python -m outrider.sweep.worker MODULE:FUNCTION``.
 
-Reads one task a line on standard input, runs it, writes one result a line on standard output; all in JSON. It
-ends when its input ends, in the middle of a run too: a worker never outlives its sweep. What a run prints
-goes to standard error.
+It reads one task per line on standard input, runs it and writes one result per line on standard output, all
+in JSON. It ends when its input ends, even in the middle of a run: a worker never outlives its sweep. Output
+of a run goes to standard error.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from typing import Any, BinaryIO
 from outrider.sweep.tasks import Task
 
 Run = Callable[[Task], dict[str, Any]]
-"""Flies a task and returns its summary: values of JSON, the same for the same task."""
+"""Function that flies a task and returns its summary: values of JSON, the same for the same task."""
 MOST_WORDS = 500
 
 
 def resolve(name: str) -> Run:
-    """The function that ``module:function`` names."""
+    """Return the function that ``module:function`` names."""
     module, _, function = name.partition(":")
     found: Run = getattr(import_module(module), function)
     return found
 
 
 def serve(run: Run, lines: SimpleQueue[bytes], out: BinaryIO) -> None:
-    """Run one task after the other, for ever."""
+    """Run one task after the other, without end."""
     _say(out, {"ready": os.getpid()})
     while True:
         task = Task(**json.loads(lines.get()))
@@ -41,17 +41,17 @@ def serve(run: Run, lines: SimpleQueue[bytes], out: BinaryIO) -> None:
         result: dict[str, Any]
         try:
             summary = run(task)
-            # Now, not while it is sent: what cannot be JSON is a fault of the run.
+            # Checked here, not while it is sent: a summary that is not JSON is a fault of the run.
             json.dumps(summary, allow_nan=False)
             result = {"status": "done", "what": None, "summary": summary}
         except Exception as error:
-            # Whatever goes wrong in one run must not cost the others; it is written down with its place.
+            # No error in one run may stop the others; it is recorded with its location.
             result = {"status": "fault", "what": _words(error), "summary": None}
         _say(out, {**result, "wall_s": round(time.perf_counter() - began, 3)})
 
 
 def main() -> None:
-    """Be a worker until the input ends."""
+    """Run tasks until the input ends."""
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     lines: SimpleQueue[bytes] = SimpleQueue()
@@ -79,7 +79,7 @@ def _say(out: BinaryIO, message: dict[str, Any]) -> None:
 
 
 def _words(error: Exception) -> str:
-    """The error in a line: its type, its message, and where it was raised."""
+    """Describe the error in one line: its type, its message, and the place where it was raised."""
     place = error.__traceback__
     while place is not None and place.tb_next is not None:
         place = place.tb_next

@@ -1,6 +1,5 @@
-"""The pytest plugin: flights and logs in tests of whoever has outrider installed.
+"""Pytest plugin: takes scenarios and logs, gives flights and set-points with assertions to tests.
 
-    plugin → flown, replayed → setpoints, golden, modes → assertions in words
-
-docs/testing.md has an example to copy.
+The steps are ``plugin`` → ``flown``, ``scenes`` → ``setpoints``, ``golden`` → assertions with readable
+messages. docs/testing.md has an example to copy.
 """

@@ -1,4 +1,4 @@
-"""A flight of a scenario in a test, and a log that drove a companion, with assertions in words."""
+"""Flight of a scenario in a test, and replay of a log, with assertions."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _HEARTBEAT = 0
 
 
 class Transition(NamedTuple):
-    """From ``time`` (µs) on an autopilot is in ``mode``."""
+    """Change of an autopilot's mode: from ``time`` (µs) on it is in ``mode``."""
 
     time: int
     mode: str
 
 
 class Flown:
-    """A finished flight: its ``summary``, and what it left in ``directory``."""
+    """Finished flight: its ``summary``, and its files in ``directory``."""
 
     def __init__(
         self, directory: Path, summary: dict[str, Value], systems: Sequence[int], golden: Golden
@@ -38,12 +38,12 @@ class Flown:
         self._golden = golden
 
     def setpoints(self, system: int | None = None) -> Setpoints:
-        """What a vehicle, the first if none is named, was told by its companion."""
+        """Return the set-points that a companion sent to a vehicle, by default the first."""
         system = self.systems[0] if system is None else system
         return Setpoints(f"vehicle {system}", setpoints(self.log(system)), self._golden)
 
     def log(self, system: int) -> Path:
-        """The tlog of a vehicle. AssertionError if there is none of that id."""
+        """Return the path of a vehicle's tlog. Raises AssertionError for an unknown id."""
         if system not in self.systems:
             raise AssertionError(
                 f"there is no vehicle {system}; there are {', '.join(map(str, self.systems))}"
@@ -51,12 +51,14 @@ class Flown:
         return self.directory / names.log(system)
 
     def modes(self, system: int | None = None) -> list[Transition]:
-        """The modes that a vehicle's autopilot went through, by its HEARTBEATs."""
+        """Return the modes of a vehicle's autopilot in order, from its HEARTBEATs."""
         return modes(self.log(self.systems[0] if system is None else system), system or self.systems[0])
 
     def assert_separation(self, at_least: float) -> None:
-        """No two vehicles came nearer than that (m between centres, on true positions), and there is no
-        violation of any d_min."""
+        """Assert that no two vehicles came nearer than ``at_least`` and that no d_min was violated.
+
+        ``at_least`` is in m between centres, on true positions.
+        """
         __tracebackhide__ = True
         least, violations = self.summary["min_separation_m"], self.summary["d_min_violations"]
         if not isinstance(least, float):
@@ -67,7 +69,7 @@ class Flown:
             raise AssertionError(f"{violations} violations of d_min")
 
     def assert_converged(self, within: float) -> None:
-        """Everybody was where it should be within so many s of the goal event."""
+        """Assert that every vehicle was at its goal within ``within`` s of the goal event."""
         __tracebackhide__ = True
         seconds = self.summary["convergence_time_s"]
         if not isinstance(seconds, float):
@@ -78,7 +80,7 @@ class Flown:
             raise AssertionError(f"converged after {seconds:g} s; {within:g} s are allowed")
 
     def assert_standoff(self, p95: float) -> None:
-        """Distances from the destination surface are within so many m, 95 of 100."""
+        """Assert that 95 % of the distances from the destination surface are within ``p95`` m."""
         __tracebackhide__ = True
         found = self.summary["standoff_error_m"]
         value = found["p95"] if isinstance(found, dict) else None
@@ -88,14 +90,14 @@ class Flown:
             raise AssertionError(f"the stand-off error is {value:g} m at p95; {p95:g} m are allowed")
 
     def assert_modes(self, *expected: str, system: int | None = None) -> None:
-        """The autopilot went through these modes, in this order and no others."""
+        """Assert that the autopilot had exactly these modes, in this order."""
         __tracebackhide__ = True
         found = [transition.mode for transition in self.modes(system)]
         if found != list(expected):
             raise AssertionError(f"the modes were {' → '.join(found)}, not {' → '.join(expected)}")
 
     def assert_reenacts(self) -> None:
-        """From its log alone every companion sends the same bytes again."""
+        """Assert that every companion sends the same bytes again when re-run from its log."""
         __tracebackhide__ = True
         for one in again(self.directory):
             if not one.identical:
@@ -105,8 +107,11 @@ class Flown:
 
 
 class Replayed(Setpoints):
-    """What a companion would have sent to a log's vehicle. ``sent``: what it was sent; ``reasons``: steps of
-    10 ms without a set-point, by what was missing."""
+    """Set-points that a companion would have sent to a log's vehicle.
+
+    ``sent``: those that were sent to it; ``reasons``: steps of 10 ms without a set-point, by what was
+    missing.
+    """
 
     def __init__(self, name: str, found: Rehearsed, golden: Golden) -> None:
         super().__init__(name, found.would, golden)
@@ -116,7 +121,7 @@ class Replayed(Setpoints):
 
 
 def modes(log: Path, system: int) -> list[Transition]:
-    """The modes of the autopilot of ``system``, by its HEARTBEATs in ``log``."""
+    """Return the modes of the autopilot of ``system``, from its HEARTBEATs in ``log``."""
     codec = Codec(
         lambda identifier, sender, component: (identifier, sender, component) == (_HEARTBEAT, system, 1)
     )

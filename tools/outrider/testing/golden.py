@@ -1,5 +1,4 @@
-"""Golden files: the set-points of a flight that was looked at and found good, as text that a diff can
-show."""
+"""Golden files: set-points of a flight that was inspected and accepted, as text for a diff."""
 
 from __future__ import annotations
 
@@ -27,22 +26,25 @@ _NAMES = (
 _UNITS = (*("m",) * 3, *("m/s",) * 3, *("m/s²",) * 3, "rad", "", "")
 _YAW, _ACCELERATIONS = 9, slice(6, 9)
 _JOLT = 10.0
-"""Accelerations may be off by so many times more: they are what noise is seen in first."""
+"""Factor on the tolerance of accelerations, in which noise shows first."""
 _DIGITS = 4
 _EVERY = 1_000
-"""µs: times are told to the millisecond."""
+"""Resolution of times (µs): they are stored in milliseconds."""
 
 
 class Golden:
-    """The golden files in ``directory``; ``update``: write instead of compare."""
+    """Golden files in ``directory``; ``update``: write them instead of comparing."""
 
     def __init__(self, directory: Path, *, update: bool) -> None:
         self._directory, self._update = directory, update
         self.written: list[Path] = []
 
     def check(self, name: str, whose: str, of: Course, within: float) -> None:
-        """AssertionError, which says where and by how much, if the set-points ``of`` are not those of the
-        file ``name``. See ``Setpoints.assert_golden``."""
+        """Compare the set-points ``of`` with the golden file ``name``, or write it.
+
+        Raises AssertionError, which says where and by how much, if they differ; ValueError for a bad ``name``
+        or ``within``. See ``Setpoints.assert_golden``.
+        """
         __tracebackhide__ = True
         if not within > 0.0:
             raise ValueError(f"within = {within:g} must be more than 0")
@@ -66,8 +68,10 @@ class Golden:
 
 
 def table(of: Course) -> np.ndarray:
-    """(n, 13): ms since the first, position, velocity and acceleration NED, yaw, mask and frame; rounded as
-    the file is."""
+    """Return set-points as an array (n, 13), rounded as the file is.
+
+    Columns: ms since the first, position, velocity and acceleration NED, yaw, mask and frame.
+    """
     since = (of.times - (of.times[0] if len(of.times) else 0)) // _EVERY
     last = np.column_stack([of.yaw, of.masks, of.frames])
     columns = [since[:, None], of.positions, of.velocities, of.accelerations, last]
@@ -76,7 +80,7 @@ def table(of: Course) -> np.ndarray:
 
 
 def packed(values: np.ndarray) -> bytes:
-    """The file; the same values give the same bytes."""
+    """Return the bytes of the file; the same values give the same bytes."""
     text = StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_HEAD)
@@ -85,7 +89,7 @@ def packed(values: np.ndarray) -> bytes:
 
 
 def unpacked(path: Path) -> np.ndarray:
-    """The values of a file, (n, 13). AssertionError if it is none."""
+    """Return the values of a file, (n, 13). Raises AssertionError if it is no golden file."""
     __tracebackhide__ = True
     try:
         rows = list(csv.reader(StringIO(gzip.decompress(path.read_bytes()).decode())))
@@ -98,8 +102,10 @@ def unpacked(path: Path) -> np.ndarray:
 
 
 def difference(golden: np.ndarray, found: np.ndarray, within: float) -> str:
-    """Where ``found`` first leaves ``golden`` (n, 13), and where it is furthest off; empty if it never
-    does."""
+    """Return where ``found`` first deviates from ``golden`` (n, 13), and where it deviates most.
+
+    The text is empty if it never does.
+    """
     count = min(len(golden), len(found))
     times = golden[:count, 0] != found[:count, 0]
     if times.any():
@@ -109,7 +115,7 @@ def difference(golden: np.ndarray, found: np.ndarray, within: float) -> str:
             f"{golden[k, 0] * 1e-3:.3f} s"
         )
     off = np.abs(found[:count, 1:] - golden[:count, 1:])
-    # An angle has no ends; and what neither has is no difference.
+    # Yaw differences wrap around; a value that is NaN in both is no difference.
     off[:, _YAW] = np.abs((off[:, _YAW] + np.pi) % (2.0 * np.pi) - np.pi)
     off[:, _ACCELERATIONS] /= _JOLT
     neither = np.isnan(found[:count, 1:]) & np.isnan(golden[:count, 1:])

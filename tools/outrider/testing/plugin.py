@@ -1,4 +1,4 @@
-"""The fixtures ``fly`` and ``replay``. Everything heavy is imported when a test asks for it."""
+"""Fixtures ``fly`` and ``replay``. Heavy modules are imported when a test uses them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """``--update-golden``."""
+    """Add the option ``--update-golden``."""
     group = parser.getgroup("outrider")
     group.addoption(
         "--update-golden", action="store_true", help="write golden files of set-points instead of comparing"
@@ -23,21 +23,24 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def golden(request: pytest.FixtureRequest) -> Iterator[Golden]:
-    """The golden files in the folder ``golden`` beside the test."""
+    """Provide the golden files in the folder ``golden`` beside the test."""
     from outrider.testing.golden import Golden
 
     update = bool(request.config.getoption("update_golden"))
     files = Golden(request.path.parent / "golden", update=update)
     yield files
     for path in files.written:
-        # In the captured output, which -rP shows.
+        # Appears in the captured output, which -rP shows.
         print(f"golden file written: {path}")  # noqa: T201
 
 
 @pytest.fixture
 def fly(tmp_path: Path, golden: Golden) -> Callable[..., Flown]:
-    """``fly("antipodal-8", seed=3, vehicles=4, companion={…})``: a scenario, by name or file, with changes of
-    its keys, flown in lock-step. InputError for what makes no sense."""
+    """Fly a scenario in lock-step: ``fly("antipodal-8", seed=3, vehicles=4, companion={…})``.
+
+    The scenario is a name or a file; further arguments change its keys. Raises InputError for invalid
+    changes.
+    """
 
     def call(scenario: str | Path, seed: int = 1, **changes: Any) -> Flown:
         from outrider.testing.scenes import flown
@@ -49,8 +52,11 @@ def fly(tmp_path: Path, golden: Golden) -> Callable[..., Flown]:
 
 @pytest.fixture
 def replay(golden: Golden) -> Callable[..., Replayed]:
-    """``replay("flight.tlog", own=1, target=2)``: what a companion would have sent. Settings are those of the
-    scenario ``like``, with changes of its companions' keys. InputError for what makes no sense."""
+    """Replay a log to a companion: ``replay("flight.tlog", own=1, target=2)``.
+
+    The result is what a companion would have sent. Settings are those of the scenario ``like``; further
+    arguments change its companions' keys. Raises InputError for invalid arguments.
+    """
 
     def call(
         log: str | Path,

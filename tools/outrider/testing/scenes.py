@@ -1,4 +1,4 @@
-"""Scenarios with changes, flown or listened to."""
+"""Scenarios with changes, flown or used to replay a log."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sitl.vehicle.config import VehicleConfig
 
 
 def flown(scenario: str | Path, seed: int, changes: dict[str, Any], folder: Path, golden: Golden) -> Flown:
-    """Fly it; the run directory is made in ``folder``."""
+    """Fly the changed scenario; the run directory is created in ``folder``."""
     of = changed(str(scenario), changes)
     vehicle = load(find("vehicles", of.vehicle), VehicleConfig)
     number = 1
@@ -44,7 +44,7 @@ def replayed(
     changes: dict[str, Any],
     golden: Golden,
 ) -> Replayed:
-    """Let a companion listen to it."""
+    """Run a companion over ``log`` and return what it would have sent."""
     config = changed(like, {"companion": changes}).companion
     cast = Cast(own, None if neighbours is None else frozenset(neighbours), target)
     try:
@@ -56,8 +56,10 @@ def replayed(
 
 
 def changed(name: str, changes: dict[str, Any]) -> Scenario:
-    """A scenario, by name or file, with ``changes`` merged in, mapping by mapping. InputError for what makes
-    no sense."""
+    """Return a scenario, by name or file, with ``changes`` merged in, mapping by mapping.
+
+    Raises InputError for invalid changes.
+    """
     document = merged(load(find("scenarios", name), Scenario).model_dump(), changes)
     try:
         return Scenario.model_validate(document)
@@ -67,11 +69,11 @@ def changed(name: str, changes: dict[str, Any]) -> Scenario:
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """``base`` with ``changes``, mapping by mapping."""
+    """Return ``base`` with ``changes`` merged in, mapping by mapping."""
     result = deepcopy(base)
     for key, value in changes.items():
         inner = result.get(key)
-        # What is of another kind has other keys: it replaces the old one.
+        # A mapping of another kind has other keys, so it replaces the old one.
         if (
             isinstance(inner, dict)
             and isinstance(value, dict)

@@ -1,4 +1,4 @@
-"""What a vehicle was told, or would have been, with assertions in words."""
+"""Set-points that a vehicle was sent, or would have been, with assertions."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from outrider.shadow.setpoints import Course, Facts, course, facts, steps
 from outrider.testing.golden import Golden
 
 _MEAN = 1_000_000
-"""µs over which a rate is meant."""
+"""Interval over which a rate is counted (µs)."""
 
 
 class Setpoints:
-    """A row of SET_POSITION_TARGET_LOCAL_NED with its times (µs), of the vehicle called ``name``. ``golden``
-    is where its files are."""
+    """Sequence of SET_POSITION_TARGET_LOCAL_NED with times (µs), for the vehicle called ``name``.
+
+    ``golden`` holds its golden files.
+    """
 
     def __init__(self, name: str, told: Sequence[tuple[int, SetpointLocal]], golden: Golden) -> None:
         self.name, self.told, self._golden = name, tuple(told), golden
@@ -26,7 +28,7 @@ class Setpoints:
 
     @property
     def course(self) -> Course:
-        """As arrays: NED, SI."""
+        """Set-points as arrays: NED, SI units."""
         return course(self.told)
 
     @property
@@ -37,8 +39,11 @@ class Setpoints:
     def assert_continuous(
         self, *, step: float = 0.3, speed: float | None = None, acceleration: float | None = None
     ) -> None:
-        """All is finite, no position is further than ``step`` (m) from the one before (where they follow each
-        other within 0.1 s), and none exceeds ``speed`` (m/s) or ``acceleration`` (m/s²)."""
+        """Assert that all values are finite, and that no limit is exceeded.
+
+        ``step`` (m) limits the distance between two positions that follow each other within 0.1 s; ``speed``
+        (m/s) and ``acceleration`` (m/s²) limit the magnitudes.
+        """
         __tracebackhide__ = True
         found = self.facts
         if not found.setpoints:
@@ -54,8 +59,10 @@ class Setpoints:
         self._below("m/s²", np.linalg.norm(of.accelerations, axis=1), acceleration)
 
     def assert_rate(self, *, at_least: float, gap: float = 0.5) -> None:
-        """In every second between the first and the last ``at_least`` so many a second, and nowhere none for
-        longer than ``gap`` (s)."""
+        """Assert ``at_least`` set-points in every second, and no pause longer than ``gap`` (s).
+
+        The seconds are counted from the first set-point; an incomplete last one is ignored.
+        """
         __tracebackhide__ = True
         times = self.course.times
         if len(times) < 2:
@@ -81,9 +88,11 @@ class Setpoints:
             )
 
     def assert_golden(self, name: str, *, within: float = 0.01) -> None:
-        """The same set-points as the golden file ``name`` beside the test: positions ``within`` so many m,
-        velocities within so many m/s, yaw within so many rad, at the same times. With ``--update-golden`` the
-        file is written instead."""
+        """Assert the same set-points, at the same times, as the golden file ``name`` beside the test.
+
+        Positions may differ by ``within`` m, velocities by ``within`` m/s, yaw by ``within`` rad. With
+        ``--update-golden`` the file is written instead.
+        """
         __tracebackhide__ = True
         self._golden.check(name, self.name, self.course, within)
 

@@ -1,5 +1,6 @@
-"""The live view: moments of a flight → bounded line → stage in the browser; wishes come back the same way.
+"""Live view: draws a flight, a run directory or MAVLink links in the browser, and returns view commands.
 
-``scene`` and ``moment`` are the picture's data; ``lockstep``, ``realtime``, ``listener`` and ``player`` make
-them; ``stage`` and ``panel`` draw them with viser. Whoever flies never waits for who looks on.
+The data path is: snapshots of a flight → bounded channel → renderer in the browser. View commands return the
+same way. ``outrider.scene`` has the picture's data; the flight, ``listener`` and ``player`` produce them;
+``renderer`` and ``panel`` draw them with viser. A flight never waits for its view.
 """

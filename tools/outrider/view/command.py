@@ -1,4 +1,4 @@
-"""``outrider view``: a run that is played, or vehicles that are listened to."""
+"""Command ``outrider view``: plays a run, or shows vehicles from their MAVLink messages."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _ALLOWED: Final = (
 
 
 class Terms(NamedTuple):
-    """How it is shown. ``seconds`` of wall time until it ends by itself."""
+    """Options of the view. ``seconds`` is the wall time after which it ends by itself."""
 
     host: str = "127.0.0.1"
     port: int = 8080
@@ -43,7 +43,10 @@ class Terms(NamedTuple):
 
 
 def view(sources: Sequence[str], terms: Terms) -> int:
-    """Until Ctrl-C, SIGTERM, or the time is over; the exit status. InputError for what cannot be shown."""
+    """Show ``sources`` until Ctrl-C, SIGTERM or the end of the time, and return the exit status.
+
+    Raises InputError if the sources cannot be shown.
+    """
     if len(sources) == 1 and ":" not in sources[0] and not sources[0].startswith("/dev/"):
         with share_progress() as watch:
             player = load(Path(sources[0]), watch)
@@ -96,7 +99,10 @@ def _serve(source: Source, terms: Terms, does: str) -> int:
 
 
 def _write(player: Player, path: Path) -> int:
-    """The run as one file; the exit status. InputError if there is a file already, or none can be there."""
+    """Write the run as one HTML file and return the exit status.
+
+    Raises InputError if the file exists or its directory does not.
+    """
     if path.exists():
         raise InputError(f"--html {path}: is there already; allowed: a new file")
     if not path.parent.is_dir():
@@ -110,6 +116,6 @@ def _write(player: Player, path: Path) -> int:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Standard output is for scripts, and the server would say there that it stopped."""
+    """Discard standard output, which is for scripts; the server would print there that it stopped."""
     with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
         yield

@@ -1,4 +1,4 @@
-"""Vehicles somewhere, as their MAVLink tells of them. Nothing is ever sent."""
+"""Source of vehicles that are observed through their MAVLink messages. Nothing is ever sent."""
 
 from __future__ import annotations
 
@@ -22,10 +22,13 @@ from outrider.scene.snapshot import NO_PLAN, Array, Moment, Single, State, euler
 from outrider.scene.view_commands import Wishes
 
 LOST, CARRIED, FRESH = 10.0, 0.5, 1.0
-"""s after which a vehicle unheard of is no longer shown; for which it is carried on at its velocity; for
-which attitudes and plans count."""
+"""Limits of age (s).
+
+A vehicle without a message for LOST is no longer shown; its position is extrapolated with its velocity for
+CARRIED; attitudes and plans are valid for FRESH.
+"""
 PICTURE, NEW_SCENE = 0.04, 1.0
-"""s between two moments, and between two scenes."""
+"""Shortest time (s) between two snapshots, and between two scenes."""
 MOST = 250
 _ACCEPTED = {0, 30, 33, 251, 385}
 """HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, NAMED_VALUE_FLOAT, TUNNEL."""
@@ -40,7 +43,7 @@ class _Fix(NamedTuple):
 
 
 class _Heard:
-    """All that one system has said. Times are s on the wall."""
+    """Last data received from one system. Times are wall times in s."""
 
     def __init__(self, fix: _Fix) -> None:
         self.fix = fix
@@ -53,19 +56,22 @@ class _Heard:
         self.held: int | None = None
 
     def flown(self, wall: float) -> Single:
-        """The plan (KNOTS, 6), if it is fresh and its vehicle has not said that it is disarmed."""
+        """Return the plan (KNOTS, 6); NaN if it is out of date or the vehicle has reported to be disarmed."""
         idle = self.beat is not None and not is_armed(self.beat)
         return NO_PLAN if idle or wall - self.planned >= FRESH else self.plan
 
     @property
     def mode(self) -> str:
-        """As its autopilot told it; empty before."""
+        """Mode reported by the autopilot; empty before the first report."""
         return "" if self.beat is None else told_mode(self.beat)
 
 
 class Listener:
-    """The ``Source`` that hears ``links``. ``whole``: for each, whether what arrives are datagrams.
-    ``target``: the system id of what is escorted."""
+    """``Source`` that receives from ``links``.
+
+    ``whole`` tells for each link whether it delivers whole datagrams. ``target`` is the system id of the
+    escorted target.
+    """
 
     span: tuple[float, float] | None = None
     begin = Wishes()
@@ -86,7 +92,7 @@ class Listener:
         self._scene_at = self._begun = self._next = -np.inf
 
     def poll(self, wall: float) -> Sequence[Scene | Moment]:
-        """A scene when there is somebody new, and a moment as often as one can be seen."""
+        """Return a scene when the set of vehicles changes, and snapshots at the rate of the picture."""
         for link, datagrams, codec in self._links:
             for data in link.receive():
                 for message in codec.feed(data, whole=datagrams):
@@ -106,7 +112,7 @@ class Listener:
         return found
 
     def wish(self, wishes: Wishes, sought: float | None) -> None:
-        """Nobody is told."""
+        """Ignore view commands, because nothing is sent."""
 
     def _hear(self, wall: float, message: Message) -> None:
         system, component = message.source
@@ -143,7 +149,11 @@ class Listener:
             self._heard[system] = _Heard(fix)
 
     def _tunnel(self, wall: float, heard: _Heard, said: Tunnel) -> None:
-        """A plan, in a frame whose origin nobody told: on average it begins where its vehicle is."""
+        """Store a plan, shifted into the fleet frame.
+
+        The origin of the plan's frame is unknown: the median offset between vehicles and the first points of
+        their plans gives it.
+        """
         self._certified |= said.payload_type == ROSTER
         if said.payload_type != PAYLOAD_TYPE:
             return
@@ -187,7 +197,7 @@ class Listener:
 
 
 def _carried(fix: _Fix, wall: float) -> Array:
-    """Where it is by now; nowhere if nothing has been heard of it for long."""
+    """Return the extrapolated position (3,); NaN if nothing has been received for more than LOST."""
     age = wall - fix.at
     if age > LOST:
         return np.full(3, np.nan)

@@ -1,4 +1,4 @@
-"""A flight that another process flies, at the other end of a line."""
+"""Source of a flight in another process, at the other end of a channel."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from outrider.view.player import Player
 
 
 class Ready(NamedTuple):
-    """The first that a view says: where it serves, or why it does not."""
+    """First message of a view: the address at which it serves, or the reason why it does not."""
 
     url: str = ""
     error: str = ""
 
 
 class Begin(NamedTuple):
-    """A flight begins: its ``scene``, and what is wished at first."""
+    """Start of a flight: its ``scene``, and the initial view commands."""
 
     scene: Scene
     wishes: Wishes
 
 
 class Landed(NamedTuple):
-    """It is over, and left a run in ``directory``."""
+    """End of the flight, which left a run in ``directory``."""
 
     directory: str
 
 
 class Live:
-    """The ``Source`` at one end of ``line``; after the flight, the run that it left."""
+    """``Source`` at one end of ``line``; after the flight it plays the run that the flight left."""
 
     def __init__(self, line: Line, load: Callable[[Path], Player]) -> None:
         self._line, self._load = line, load
@@ -44,26 +44,26 @@ class Live:
 
     @property
     def span(self) -> tuple[float, float] | None:
-        """Known once it is over."""
+        """Time span of the run; None during the flight."""
         return None if self._player is None else self._player.span
 
     @property
     def begin(self) -> Wishes:
-        """As the flight says; afterwards as a run is played."""
+        """Initial view commands of the flight; afterwards those of the run."""
         return self._begin if self._player is None else self._player.begin
 
     @property
     def hint(self) -> str:
-        """Whose end this is."""
+        """Sentence shown to the user; empty during the flight."""
         return "" if self._player is None else self._player.hint
 
     def poll(self, wall: float) -> Sequence[Scene | Moment]:
-        """What has come. If it was a lot, the line has dropped some; what is left is shown."""
+        """Return the received data. If too much was sent, the channel has dropped some; the rest is shown."""
         if self._player is not None:
             return self._player.poll(wall)
         found: list[Scene | Moment] = []
         for data in self._line.receive():
-            # From the process that started this one, over a socket that nobody else has.
+            # Received from the process that started this one, over a socket that no other process has.
             told = pickle.loads(data)
             if isinstance(told, Begin):
                 self._begin = told.wishes
@@ -76,7 +76,7 @@ class Live:
         return found
 
     def wish(self, wishes: Wishes, sought: float | None) -> None:
-        """Passed on; who does not fly a simulation heeds nothing."""
+        """Pass the view commands on; a flight that is not simulated ignores them."""
         if self._player is not None:
             self._player.wish(wishes, sought)
         else:

@@ -1,7 +1,8 @@
-"""Who may speak to the view: its own page, in no other name than the place that it is served at.
+"""Access check of the view: requests are accepted from its own page only, under the host it is served at.
 
-Any page that a browser has open may connect to any port of the machine that the browser runs on, and viser
-asks nobody where they come from. A page says in Origin who it is; the browser in Host for whom it takes us.
+A page in a browser may connect to any port of the machine that the browser runs on, and viser does not check
+the origin of a request. The header Origin names the page; the header Host names the server that the browser
+addressed.
 """
 
 from __future__ import annotations
@@ -25,8 +26,11 @@ Door = Callable[[ServerConnection, Request], Response | None]
 
 
 def admits(host: str | None, origins: list[str], names: tuple[str, ...] = ("localhost",)) -> bool:
-    """Whether a request is answered: to us by a number or by one of ``names``, so that nobody's name server
-    has led the browser here, and from no page but our own, if from one at all."""
+    """Return whether a request is accepted.
+
+    The host must be an IP address or one of ``names``, so that no foreign name server has redirected the
+    browser here. Every origin, if there is any, must be this server's own page.
+    """
     if host is None:
         return False
     try:
@@ -43,8 +47,10 @@ def admits(host: str | None, origins: list[str], names: tuple[str, ...] = ("loca
 
 @contextmanager
 def guarded(host: str) -> Iterator[None]:
-    """Servers of websockets that begin meanwhile, at ``host``, let in only whom ``admits`` allows. They have
-    an option for that, which viser does not pass on."""
+    """Restrict websocket servers started in this context, at ``host``, to requests that ``admits`` accepts.
+
+    The websocket servers have an option for that, which viser does not pass on.
+    """
     serve: Any = served.serve
     names = ("localhost", host.lower())
 
@@ -56,7 +62,7 @@ def guarded(host: str) -> Iterator[None]:
             if len(hosts) == 1 and admits(hosts[0], headers.get_all("Origin"), names):
                 answer = process_request(connection, request)
                 if answer is not None:
-                    # Nor may its page stand in a frame of another, where a click is not meant for it.
+                    # The page must not be shown in a frame of another page, where a click could be abused.
                     answer.headers["Content-Security-Policy"] = "frame-ancestors 'none'"
                 return answer
             return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), _ELSEWHERE)

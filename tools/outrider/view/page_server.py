@@ -1,4 +1,4 @@
-"""The page: a server on this machine, with what a source gives."""
+"""Page server: serves the page on this machine, with the data of a source."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from outrider.view.renderer import Stage
 from outrider.view.source import Source
 
 PICTURE = 1.0 / 30.0
-"""s between two pictures at least."""
+"""Shortest time (s) between two pictures."""
 _SAY = 0.3
-"""s after which wishes are said again."""
+"""Period (s) at which view commands are repeated."""
 
 
 class Server(viser.ViserServer):
-    """Viser's, which calls nobody outside."""
+    """Viser's server, without connections to other machines."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """There is none."""
+        """Return None: there is no share URL."""
         return None
 
 
 class Theatre:
-    """Serves at ``host`` and ``port``, or at the next port that is free. ``url`` leads there."""
+    """Page at ``host`` and ``port``, or at the next free port. ``url`` is its address."""
 
     def __init__(self, host: str, port: int) -> None:
         with warnings.catch_warnings():
@@ -44,7 +44,7 @@ class Theatre:
         self._panel: Panel | None = None
 
     def run(self, source: Source, over: Callable[[], bool]) -> None:
-        """Until it is over."""
+        """Show ``source`` and pass view commands to it until ``over`` returns true."""
         said, last_wishes = 0.0, None
         while not over():
             wall = time.monotonic()
@@ -62,7 +62,7 @@ class Theatre:
             time.sleep(max(PICTURE - (time.monotonic() - wall), 0.005))
 
     def show(self, source: Source, wall: float) -> None:
-        """What is new at ``wall`` (s)."""
+        """Show the new data of ``source`` at the wall time ``wall`` (s)."""
         moments: list[Moment] = []
         for one in source.poll(wall):
             if isinstance(one, Scene):
@@ -88,5 +88,5 @@ class Theatre:
         self._panel = Panel(self.server, self._stage, source.begin, source.span, source.hint)
 
     def stop(self) -> None:
-        """Nobody is served any more."""
+        """Stop the server."""
         self.server.stop()

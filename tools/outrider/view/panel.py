@@ -1,4 +1,4 @@
-"""What stands beside the scene: the table, the plot, what is shown, and what may be changed."""
+"""Panel beside the scene: the table, the plot, the visible layers, and the settings that may be changed."""
 
 from __future__ import annotations
 
@@ -19,15 +19,18 @@ from outrider.view.renderer import Stage
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4", "8", "as fast as it can")
 TABLE_EVERY, PLOT_EVERY = 0.2, 0.5
-"""s of wall time."""
+"""Update periods of the table and of the plot (s of wall time)."""
 POINTS = 600
-"""Of the plot; when there are twice as many, every other one goes."""
+"""Points of the plot; at twice as many, every other one is removed."""
 _MOST_ROWS = 64
 
 
 class Panel:
-    """For ``stage`` on ``server``. ``wishes`` is what somebody has set; ``sought`` is taken by who plays a
-    run: the time (s) that was chosen. ``begin``: what is wished at first."""
+    """Panel for ``stage`` on ``server``.
+
+    ``begin`` holds the initial view commands and ``wishes`` the current ones. ``sought`` is the time (s)
+    chosen at the slider; the loop that plays a run takes it.
+    """
 
     def __init__(
         self,
@@ -74,8 +77,11 @@ class Panel:
             gui.add_markdown(hint)
 
     def watch(self, watched: bool) -> None:
-        """Whether any browser shows the page: a flight goes at the pace of time for who watches it, and as at
-        first when nobody is left who could let it go on."""
+        """Report whether any browser shows the page.
+
+        A flight runs in real time while it is watched. When no browser is left that could resume it, it
+        returns to its initial speed.
+        """
         if self._speed is None or watched == self._watched:
             return
         self._watched = watched
@@ -86,7 +92,7 @@ class Panel:
             self.wishes = self.wishes._replace(speed=self._begin.speed, paused=False)
 
     def see(self, moment: Moment) -> None:
-        """One more point of the plot. A time before the last begins anew."""
+        """Add a point to the plot. A time before the last one clears the plot."""
         if self._series and moment.time < self._series[-1][0]:
             self._series.clear()
             self._thin = 0
@@ -96,8 +102,10 @@ class Panel:
             self._series = deque(list(self._series)[::2])
 
     def show(self, moment: Moment, wall: float, playing: float | None = None) -> None:
-        """The table and the plot of ``moment``, if it is time (s on the ``wall``). ``playing``: where the
-        slider is to stand."""
+        """Show the table and the plot of ``moment``, if they are due at ``wall`` (s).
+
+        ``playing`` is the position of the slider, or None.
+        """
         if wall >= self._next_table:
             self._next_table = wall + TABLE_EVERY
             self._last = moment
@@ -112,7 +120,7 @@ class Panel:
             self._plot.data = (time, distance, np.full(len(time), np.nan if d_min is None else d_min))
 
     def head(self) -> None:
-        """The line above all, by what was shown last and is wished now."""
+        """Update the headline from the last snapshot shown and the current view commands."""
         if self._last is not None:
             self._head.content = self._headline(self._last)
 
@@ -192,7 +200,7 @@ class Panel:
     _target_height = 0.0
 
     def notice(self, moment: Moment) -> None:
-        """How high the target is: a click moves it on its level."""
+        """Store the height of the target: a click moves the target at this height."""
         if np.isfinite(moment.target).all():
             self._target_height = float(moment.target[2])
 
@@ -220,7 +228,7 @@ class Panel:
 def struck(
     origin: tuple[float, float, float], direction: tuple[float, float, float], height: float
 ) -> np.ndarray | None:
-    """Where (3,) a ray meets the level of ``height``; None if it does not."""
+    """Return the point (3,) where a ray meets the horizontal plane at ``height``; None if it does not."""
     begin, along = np.array(origin), np.array(direction)
     if abs(along[2]) < 1e-6 or (share := (height - begin[2]) / along[2]) <= 0.0:
         return None
@@ -229,7 +237,7 @@ def struck(
 
 
 def table(scene: Scene, moment: Moment) -> str:
-    """HTML: a row for each vehicle."""
+    """Return the HTML table with a row for each vehicle."""
     rows = []
     for k, (system, state) in enumerate(zip(scene.systems, moment.states, strict=True)):
         if k == _MOST_ROWS:

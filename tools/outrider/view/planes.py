@@ -1,4 +1,4 @@
-"""The planes that keep committed plans apart, worked out from the plans as the companions do."""
+"""Planes that separate committed plans, computed from the plans in the same way as in the companions."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from companion.avoidance.certified.separating_planes import nearest
 from outrider.scene.snapshot import Array, Single
 
 NEAR = 8.0
-"""m: vehicles further from each other than that have no need of a plane in the picture."""
+"""Largest distance (m) of two vehicles with a plane in the picture."""
 MOST = 16
-"""Planes in a picture: of more of them nobody sees anything."""
+"""Largest number of planes in a picture; more would be unreadable."""
 
 
 class Plane(NamedTuple):
-    """Middles (n, 3), unit normals (n, 3), and how far (n,) apart the hulls are; n ≤ MOST, tightest first."""
+    """Middles (n, 3), unit normals (n, 3) and gaps (n,) of the hulls, m; n ≤ MOST, tightest first."""
 
     middle: Array
     normal: Array
@@ -24,14 +24,17 @@ class Plane(NamedTuple):
 
 
 def between(plan: Single, step_s: float) -> Plane:
-    """For each pair of ``plan`` (K, KNOTS, 6), where its segments come nearest to each other."""
+    """Return the plane of each pair of ``plan`` (K, KNOTS, 6) at the segment where the pair is closest.
+
+    ``step_s`` is the duration of a segment (s). Pairs that start NEAR or more apart have no plane.
+    """
     knots = plan.astype(np.float64)
     place, velocity = knots[..., :3], knots[..., 3:]
     # The control points of a segment with constant acceleration, (K, n, 3, 3).
     controls = np.stack(
         [place[:, :-1], place[:, :-1] + 0.5 * step_s * velocity[:, :-1], place[:, 1:]], axis=2
     )
-    # The last knot is repeated: there the curve stays.
+    # The last knot is repeated: the curve stays there.
     still = np.isclose(place[:, :-1], place[:, 1:]).all(axis=2)
     controls[still] = place[:, :-1][still][:, None]
     one, other = np.triu_indices(len(plan), 1)
@@ -51,7 +54,7 @@ def between(plan: Single, step_s: float) -> Plane:
 
 
 def facing(normal: Array) -> Array:
-    """Quaternions (n, 4), w x y z, that turn z to ``normal`` (n, 3)."""
+    """Return the quaternions (n, 4), w x y z, that rotate the z axis to ``normal`` (n, 3)."""
     # Half-way between both: 1 + n·z and z × n.
     result = np.stack([1.0 + normal[:, 2], -normal[:, 1], normal[:, 0], 0.0 * normal[:, 0]], axis=1)
     length = np.linalg.norm(result, axis=1)

@@ -1,4 +1,4 @@
-"""A run directory, played: to and fro, at any speed."""
+"""Player of a run directory: forward or to any time, at any speed."""
 
 from __future__ import annotations
 
@@ -22,18 +22,20 @@ from outrider.yaml_files.yaml_file import load as load_yaml
 from sitl.vehicle.config import VehicleConfig
 
 PAST, PAST_EVERY = 20.0, 0.2
-"""s before a time that was chosen, of which the trails are drawn anew, and how often."""
+"""Time (s) before a chosen time for which the trails are drawn again, and its step."""
 FAST = 16.0
-"""Times real time, where somebody wishes as fast as it can."""
+"""Speed, in multiples of real time, if the user chose the fastest."""
 _STEP = 0.1
-"""s"""
+"""Duration of a single step (s)."""
 
 Watch = Callable[[str, float], None]
 
 
 class Player:
-    """The ``Source`` that plays a run; it begins by itself. ``span`` (s after the goal event): from its first
-    sample to its last."""
+    """``Source`` that plays a run; it starts by itself.
+
+    ``span`` is the time of the first and of the last sample (s after the goal event).
+    """
 
     def __init__(
         self, scene: Scene, motion: Motion, records: Sequence[Record], plan_times: Plans | None
@@ -44,14 +46,14 @@ class Player:
         self.hint = ""
         self._spent = [_of(plan_times, system) for system in scene.systems]
         self._wishes = self.begin
-        # Before that they only take off.
+        # Before that the vehicles only take off.
         self._at = min(max(self.span[0], -1.0), self.span[1])
         self._wall: float | None = None
         self._told: float | None = None
         self._sought = True
 
     def poll(self, wall: float) -> Sequence[Scene | Moment]:
-        """The scene at first; then a moment whenever time has gone on."""
+        """Return the scene at first, then a snapshot whenever time has advanced."""
         found: list[Scene | Moment] = []
         if self._wall is None:
             found.append(self.scene)
@@ -71,7 +73,7 @@ class Player:
         return found
 
     def wish(self, wishes: Wishes, sought: float | None) -> None:
-        """Pause, steps and speed."""
+        """Apply pause, steps and speed, and jump to the time ``sought``."""
         if wishes.paused and wishes.steps > self._wishes.steps:
             self._at = min(self._at + _STEP * (wishes.steps - self._wishes.steps), self.span[1])
         self._wishes = wishes
@@ -80,7 +82,10 @@ class Player:
             self._sought = True
 
     def moment(self, time: float) -> Moment:
-        """At ``time`` (s after the goal event): the sample before it, and what the logs say."""
+        """Return the snapshot at ``time`` (s after the goal event).
+
+        It has the last sample before that time and the data of the logs.
+        """
         motion = self._motion
         row = max(int(np.searchsorted(motion.time_s, time, side="right")) - 1, 0)
         now = int(motion.time[row])
@@ -96,7 +101,7 @@ class Player:
         )
 
     def _attitude(self, row: int, k: int, now: int) -> np.ndarray:
-        """As the autopilot told; without, upright and turned as it truly was."""
+        """Return the attitude reported by the autopilot, or an upright attitude with the true yaw."""
         told = self._records[k].attitude(now)
         if told is not None:
             return told
@@ -110,7 +115,10 @@ class Player:
 
 
 def load(directory: Path, watch: Watch = lambda _what, _share: None) -> Player:
-    """The run in ``directory``. InputError if it is none, or was stopped before its motion was written."""
+    """Load the run in ``directory``.
+
+    Raises InputError if the directory holds no run, or a run that was stopped before its motion was written.
+    """
     run = read(directory, "tlog:{}")
     if run.scenario is None or run.motion is None or not len(run.motion.time_s):
         wrong = "holds no flight.npz: it was stopped; allowed: a run that came to its end, or tlog:PATH"
@@ -138,7 +146,7 @@ def _span(scenario: Scenario) -> float:
 
 
 def _of(plans: Plans | None, system: int) -> tuple[np.ndarray, np.ndarray]:
-    """When (s), and how long (ms), ``system`` planned."""
+    """Return the times (s) and the durations (ms) of the plans of ``system``."""
     if plans is None:
         return np.empty(0), np.empty(0)
     own = plans.system == system

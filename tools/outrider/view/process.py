@@ -1,4 +1,4 @@
-"""The view as a process of its own: ``python -m outrider.view.process DESCRIPTOR HOST PORT``."""
+"""View as a process of its own: ``python -m outrider.view.process DESCRIPTOR HOST PORT``."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from outrider.scene.datagram_channel import Line
 from outrider.view.live import Live, Ready
 
 _GENTLE = 10
-"""Nice: whoever flies goes first."""
+"""Nice value: flying processes have priority."""
 
 
 def main(descriptor: int, host: str, port: int) -> None:
-    """Serve until the process that started this one is gone."""
+    """Serve until the process that started this one ends.
+
+    ``descriptor`` is the file descriptor of the channel's socket.
+    """
     parent = os.getppid()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(OSError):
@@ -33,7 +36,7 @@ def main(descriptor: int, host: str, port: int) -> None:
         return
     line.send(pickle.dumps(Ready(theatre.url)))
     theatre.run(Live(line, load), lambda: os.getppid() != parent)
-    # Threads of the server may still talk to browsers: nobody waits for them.
+    # Threads of the server may still be sending to browsers: do not wait for them.
     os._exit(0)
 
 

@@ -1,5 +1,4 @@
-"""What the logs of a run say beside where its vehicles were: plans, attitudes, modes, and who was heard
-when."""
+"""Reader of a run's logs: plans, attitudes, modes, and the times at which other vehicles were received."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ from outrider.runs import names
 from outrider.scene.snapshot import NO_PLAN, Array, Single, euler_attitude, padded
 
 FRESH = 1_000_000
-"""µs for which a plan is shown after its epoch."""
+"""Time (µs) for which a plan is shown after its epoch, and an attitude after its message."""
 _DECODED = {0, 30, 33, 385}
 """HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, TUNNEL."""
 _SWARM, _AUTOPILOT = names.LINK_NUMBERS["swarm"], names.LINK_NUMBERS["autopilot"]
@@ -31,9 +30,12 @@ _OFTEN = 4096
 
 
 class Record(NamedTuple):
-    """Of one vehicle, by its own clock (Unix µs, rising): ``epochs`` and ``plans`` (KNOTS, 6); ``leant``
-    and the attitudes (4,), FLU in ENU, and ``beaten`` and its heartbeats, that its autopilot told; when each
-    other was ``heard``."""
+    """Log data of one vehicle, by its own clock (Unix µs, rising).
+
+    ``epochs`` belong to ``plans`` (KNOTS, 6), ``leant`` to the attitudes (4,), FLU in ENU, and ``beaten`` to
+    the heartbeats; attitudes and heartbeats are those of its autopilot. ``heard`` has the times of the
+    positions received from each other vehicle.
+    """
 
     epochs: list[int]
     plans: list[Single]
@@ -44,20 +46,22 @@ class Record(NamedTuple):
     heard: dict[int, list[int]]
 
     def plan(self, now: int) -> Single:
-        """Flown at ``now`` (µs); NaN if there is none that is fresh, and where the autopilot said that it is
-        disarmed."""
+        """Return the plan flown at ``now`` (µs).
+
+        It is NaN if no plan is recent, and while the autopilot reports to be disarmed.
+        """
         index = bisect_right(self.epochs, now) - 1
         beat = self._beat(now)
         idle = beat is not None and not is_armed(beat)
         return NO_PLAN if idle or index < 0 or now - self.epochs[index] > FRESH else self.plans[index]
 
     def mode(self, now: int) -> str:
-        """The autopilot's at ``now`` (µs), as it told it; empty where that is not known."""
+        """Return the mode that the autopilot reported at ``now`` (µs); empty if that is not known."""
         beat = self._beat(now)
         return "" if beat is None else told_mode(beat)
 
     def attitude(self, now: int) -> Array | None:
-        """Told at ``now`` (µs), or shortly before."""
+        """Return the attitude reported at ``now`` (µs) or shortly before; None if there is none."""
         index = bisect_right(self.leant, now) - 1
         return None if index < 0 or now - self.leant[index] > FRESH else self.attitudes[index]
 
@@ -66,14 +70,16 @@ class Record(NamedTuple):
         return None if index < 0 or now - self.beaten[index] > HEARTBEAT_LOST else self.beats[index]
 
     def age(self, now: int) -> float:
-        """s, of what was heard of the other unheard of for longest; NaN if nobody was yet."""
+        """Return the largest time (s) since the last position of another vehicle; NaN before the first."""
         last = [times[index - 1] for times in self.heard.values() if (index := bisect_right(times, now))]
         return 1e-6 * (now - min(last)) if last else float("nan")
 
 
 def record(path: Path, owner: int, at: Callable[[int], None] = lambda _bytes: None) -> Record:
-    """Of the vehicle ``owner`` in the log at ``path``; ``at`` hears how many bytes have been read. What is
-    not there, or damaged, is left out."""
+    """Read the data of the vehicle ``owner`` from the log at ``path``.
+
+    ``at`` is called with the number of bytes read. Missing or damaged records are omitted.
+    """
     codec = Codec(lambda identifier, _system, _component: identifier in _DECODED)
     found = Record([], [], [], [], [], [], {})
     size = 0

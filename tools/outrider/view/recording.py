@@ -1,4 +1,4 @@
-"""A run as one HTML file that plays in any browser, without a network."""
+"""Recording of a run as one HTML file that plays in any browser without a network."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from outrider.view.player import Player
 from outrider.view.renderer import Stage
 
 EVERY = 0.1
-"""s between two pictures."""
+"""Time (s) between two pictures."""
 
 
 def html(player: Player, watch: Callable[[str, float], None]) -> str:
-    """The whole of what ``player`` has, at its own speed. The table and the plot are not in it."""
+    """Return the HTML of the whole run of ``player``, at its own speed, without the table and the plot."""
     theatre = Theatre("127.0.0.1", 0)
     try:
         stage = Stage(theatre.server, player.scene)

@@ -1,4 +1,4 @@
-"""The scene in the browser: made once, then told what has moved."""
+"""Renderer of the scene in the browser: the scene is built once, then only the moving parts are updated."""
 
 from __future__ import annotations
 
@@ -17,18 +17,17 @@ from outrider.view.trails import Trails
 
 WORLD = "/world"
 AZIMUTH, ELEVATION, FIELD = -1.15, 0.5, np.radians(40.0)
-"""From where one looks at first, as in the report, and how wide."""
+"""Initial view direction, as in the report, and field of view (rad)."""
 _AWAY = (0.0, 0.0, -1e4)
 _LARGER, _SHARE = 3.0, 0.09
-"""Vehicles are drawn no more than so much larger than they are, and as large as this share of what is
-seen."""
+"""Limits of a vehicle's drawn size: at most this multiple of its span, and at most this share of the view."""
 _TARGET = rgb("#17202a")
 _UNTURNED = (1.0, 0.0, 0.0, 0.0)
 _NO_LINE = np.zeros((1, 2, 3))
 
 
 class Layers(NamedTuple):
-    """What can be shown or not."""
+    """Visibility of the layers."""
 
     trails: bool = True
     plans: bool = True
@@ -39,7 +38,10 @@ class Layers(NamedTuple):
 
 
 class Stage:
-    """``scene`` on ``server``. All is under one frame, which follows the vehicles if the scene says so."""
+    """``scene`` on ``server``.
+
+    All bodies are below one frame, which follows the vehicles if the scene requests that.
+    """
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self._stage, self.scene = server.scene, scene
@@ -100,12 +102,12 @@ class Stage:
 
     @property
     def focus(self) -> Array:
-        """What (3,) lies in the middle, fleet-local ENU."""
+        """Point (3,) in the middle of the picture, fleet-local ENU."""
         return self._focus.copy()
 
     @property
     def layers(self) -> Layers:
-        """What is shown."""
+        """Visible layers."""
         return self._layers
 
     @layers.setter
@@ -120,7 +122,7 @@ class Stage:
             label.visible = layers.labels
 
     def show(self, moment: Moment, past: tuple[Moment, ...] = ()) -> None:
-        """What is to be seen now; ``past``: what was before, for the trails."""
+        """Show a snapshot; ``past`` holds earlier snapshots for the trails."""
         for one in (*past, moment):
             self._trails.see(one.time, one.position)
         there = np.asarray(np.isfinite(moment.position).all(axis=1))
@@ -159,14 +161,14 @@ class Stage:
         self._planes.batched_positions, self._planes.batched_wxyzs = _pool(found)
 
     def _follow(self, middle: Single) -> None:
-        """Go along, a little each time: nobody wants a picture that shakes."""
+        """Move the focus a part of the way to ``middle`` (3,), so that the picture does not shake."""
         self._focus = self._focus + 0.15 * (middle - self._focus)
         self._world.position = -self._focus
 
     def _many(
         self, name: str, mesh: shapes.Mesh, paint: NDArray[np.uint8], scale: float, **more: object
     ) -> viser.BatchedMeshHandle:
-        """One for each vehicle."""
+        """Add one mesh for each vehicle."""
         count = len(self.scene.systems)
         return self._stage.add_batched_meshes_simple(
             f"{WORLD}/{name}",
@@ -197,7 +199,7 @@ class Stage:
         )
 
     def _stand(self) -> None:
-        """What never moves: goals and obstacles."""
+        """Add what never moves: goals and obstacles."""
         scene = self.scene
         for k, goal in enumerate(scene.goals):
             mark = shapes.annulus(0.35 * self.size, 0.06 * self.size)
@@ -214,7 +216,7 @@ class Stage:
             handle.position = solid.at
 
     def _solid(self, name: str, solid: Solid) -> viser.FrameHandle:
-        """A frame with the shape in it, and around it where no vehicle's centre may be."""
+        """Add a frame with the obstacle's shape, and the shell that no vehicle's centre may enter."""
         frame = self._stage.add_frame(f"{WORLD}/{name}", show_axes=False)
         shells: tuple[tuple[str, float, RGB, float | None], ...] = (
             ("itself", solid.radius, SOLID, None),
@@ -231,7 +233,7 @@ class Stage:
         return frame
 
     def _around_the_target(self) -> viser.FrameHandle:
-        """The target, its shell, and the surfaces about it, in a frame that goes along with it."""
+        """Add the target, its shell and the formation surfaces, in a frame that moves with the target."""
         stage, scene, name = self._stage, self.scene, f"{WORLD}/target"
         frame = stage.add_frame(name, show_axes=False, visible=False)
         stage.add_icosphere(f"{name}/itself", 0.3 * self.size, color=_TARGET, cast_shadow=False)
@@ -269,12 +271,12 @@ class Stage:
 
 
 def _drawn(scene: Scene) -> float:
-    """How large (m) a vehicle is drawn."""
+    """Return the size (m) at which a vehicle is drawn."""
     return float(min(max(scene.span, _SHARE * scene.reach), _LARGER * scene.span))
 
 
 def _pool(found: Plane) -> tuple[Single, Single]:
-    """Places (MOST, 3) and attitudes (MOST, 4); those that are not needed are far away."""
+    """Return positions (MOST, 3) and attitudes (MOST, 4) of the planes; unused planes are far away."""
     place = np.tile(np.array(_AWAY, np.float32), (MOST, 1))
     turned = np.tile(np.array(_UNTURNED, np.float32), (MOST, 1))
     count = len(found.middle)

@@ -1,4 +1,4 @@
-"""Meshes of a metre's size: vertices (V, 3) and faces (F, 3)."""
+"""Meshes of about one metre: vertices (V, 3) and faces (F, 3)."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _ROTORS = 6
 
 
 class Mesh(NamedTuple):
-    """Vertices (V, 3) and the corners (F, 3) of triangles, seen from outside counter-clockwise."""
+    """Vertices (V, 3) and vertex indices (F, 3) of triangles, counter-clockwise seen from outside."""
 
     vertices: Array
     faces: NDArray[np.int64]
 
 
 def joined(*meshes: Mesh) -> Mesh:
-    """All of them as one."""
+    """Join meshes into one."""
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
     faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]
     return Mesh(np.vstack([mesh.vertices for mesh in meshes]), np.vstack(faces))
@@ -29,7 +29,7 @@ def joined(*meshes: Mesh) -> Mesh:
 def prism(
     corners: int, radius: float, height: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)
 ) -> Mesh:
-    """Upright, about ``at``."""
+    """Return an upright prism with its centre at ``at``."""
     turn = 2.0 * pi * np.arange(corners) / corners
     circle = radius * np.stack([np.cos(turn), np.sin(turn), np.zeros(corners)], axis=1)
     up = np.array([0.0, 0.0, 0.5 * height])
@@ -48,7 +48,7 @@ def prism(
 
 
 def bar(begin: Array, end: Array, width: float) -> Mesh:
-    """A level beam between two places."""
+    """Return a horizontal beam between two positions."""
     along = (end - begin) / np.linalg.norm(end - begin)
     side = 0.5 * width * np.cross((0.0, 0.0, 1.0), along)
     up = np.array([0.0, 0.0, 0.5 * width])
@@ -61,7 +61,7 @@ def bar(begin: Array, end: Array, width: float) -> Mesh:
 
 
 def cone(length: float, radius: float, at: float) -> Mesh:
-    """Along x, with its base at x = ``at``."""
+    """Return a cone along x with its base at x = ``at``."""
     count = 16
     turn = 2.0 * pi * np.arange(count) / count
     base = np.stack([np.full(count, at), radius * np.cos(turn), radius * np.sin(turn)], axis=1)
@@ -77,13 +77,13 @@ def cone(length: float, radius: float, at: float) -> Mesh:
 
 
 def rotors() -> Mesh:
-    """Six discs, from tip to tip a metre; z is up."""
+    """Return six discs, 1 m from tip to tip; z is up."""
     turn = pi * (np.arange(_ROTORS) + 0.5) / 3.0
     return joined(*(prism(20, 0.16, 0.035, (0.34 * np.cos(a), 0.34 * np.sin(a), 0.05)) for a in turn))
 
 
 def frame() -> Mesh:
-    """What carries them, and a nose along x."""
+    """Return the arms and the body that carry the rotors, and a nose along x."""
     turn = pi * (np.arange(_ROTORS) + 0.5) / 3.0
     ends = 0.34 * np.stack([np.cos(turn), np.sin(turn), np.zeros(_ROTORS)], axis=1)
     arms = (bar(np.zeros(3), end, 0.04) for end in ends)
@@ -91,7 +91,7 @@ def frame() -> Mesh:
 
 
 def annulus(radius: float, width: float) -> Mesh:
-    """A flat ring; both sides are to be drawn."""
+    """Return a flat ring; both sides must be drawn."""
     count = 64
     turn = 2.0 * pi * np.arange(count) / count
     circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(count)], axis=1)
@@ -107,7 +107,7 @@ def annulus(radius: float, width: float) -> Mesh:
 
 
 def ball(radius: float) -> Mesh:
-    """Of latitudes and longitudes."""
+    """Return a sphere divided by latitude and longitude."""
     rows, columns = 12, 24
     polar = pi * np.arange(rows + 1) / rows
     turn = 2.0 * pi * np.arange(columns) / columns
@@ -129,7 +129,7 @@ def ball(radius: float) -> Mesh:
 
 
 def tile() -> Mesh:
-    """A disc of a metre's diameter whose normal is z; both sides are to be drawn."""
+    """Return a disc of 1 m diameter whose normal is z; both sides must be drawn."""
     count = 32
     turn = 2.0 * pi * np.arange(count) / count
     vertices = np.vstack([np.zeros(3), 0.5 * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)])

@@ -1,4 +1,4 @@
-"""Where moments come from."""
+"""Interface of the sources of scenes and snapshots."""
 
 from __future__ import annotations
 
@@ -11,27 +11,33 @@ from outrider.scene.view_commands import Wishes
 
 
 class Source(Protocol):
-    """A flight, a run or links."""
+    """Source of a picture: a flight, a run or links."""
 
     @property
     def span(self) -> tuple[float, float] | None:
-        """From when to when (s) there is something, if that is known."""
+        """First and last time (s) of the data, or None if that is not known."""
         ...
 
     @property
     def begin(self) -> Wishes:
-        """What is wished at first."""
+        """Initial view commands."""
         ...
 
     @property
     def hint(self) -> str:
-        """A sentence for whoever looks on."""
+        """Sentence shown to the user."""
         ...
 
     def poll(self, wall: float) -> Sequence[Scene | Moment]:
-        """What is new at ``wall`` (s): a scene before its moments, and these in the order of time."""
+        """Return new data at the wall time ``wall`` (s).
+
+        A scene precedes its snapshots; snapshots are in order of time.
+        """
         ...
 
     def wish(self, wishes: Wishes, sought: float | None) -> None:
-        """What is wished; called again and again. ``sought``: a time (s) that somebody has just chosen."""
+        """Apply view commands. It is called repeatedly.
+
+        ``sought`` is a time (s) that a user has just chosen, or None.
+        """
         ...

@@ -1,4 +1,4 @@
-"""Where vehicles have been: line segments in chunks, so that only the youngest is told anew."""
+"""Trails of vehicles: line segments in chunks, so that only the newest chunk is sent again."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     import viser
 
 EVERY = 0.1
-"""s between two points of a trail."""
+"""Time (s) between two points of a trail."""
 CHUNK = 40
-"""Points of a chunk."""
+"""Number of points of a chunk."""
 LENGTH = 25.0
-"""s for which a trail stays, or a little more."""
+"""Time (s) for which a trail is shown; chunks make it slightly longer."""
 GAP = 1.0
-"""s without a moment, after which nothing is joined."""
+"""Time (s) without a snapshot after which the trail is interrupted."""
 
 
 class Trails:
-    """Under ``name`` on ``stage``, with a colour (K, 3) for each vehicle."""
+    """Trails below ``name`` on ``stage``, with a colour (K, 3) for each vehicle."""
 
     def __init__(self, stage: viser.SceneApi, name: str, colours: NDArray[np.uint8], width: float) -> None:
         self._stage, self._name, self._width = stage, name, width
@@ -36,7 +36,10 @@ class Trails:
         self.visible = True
 
     def see(self, time: float, places: Single) -> None:
-        """Vehicles are at ``places`` (K, 3) at ``time`` (s). A time before the last begins anew."""
+        """Add the positions ``places`` (K, 3) at ``time`` (s).
+
+        The trails are cleared if ``time`` is before the last, or more than GAP after it.
+        """
         if self._last is not None and not 0.0 <= time - self._last <= GAP:
             self.clear()
         if self._last is not None and time - self._last < EVERY:
@@ -58,14 +61,14 @@ class Trails:
             self._chunks.popleft()[1].remove()
 
     def clear(self) -> None:
-        """Forget all."""
+        """Remove all trails."""
         while self._chunks:
             self._chunks.popleft()[1].remove()
         self._points.clear()
         self._last = None
 
     def show(self, visible: bool) -> None:
-        """Or hide them."""
+        """Show or hide the trails."""
         self.visible = visible
         for _, handle in self._chunks:
             handle.visible = visible

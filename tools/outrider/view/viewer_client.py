@@ -1,4 +1,7 @@
-"""Starts the process of the view, and speaks with it; whatever becomes of that process, a flight goes on."""
+"""Client of the view process: starts it and exchanges messages with it.
+
+A flight continues if the view process fails.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +19,14 @@ from outrider.scene.view_commands import Wishes
 from outrider.view.live import Begin, Landed, Ready
 
 _PATIENCE = 60.0
-"""s that it has to start."""
+"""Time (s) that the process has to start."""
 
 
 class Attendant:
-    """A view at ``host``, ``port`` or the next that is free. ``url`` leads there; ``line`` is this end.
+    """View process that serves at ``host`` and ``port``, or at the next free port.
 
-    InputError if nothing can be served there, ModuleNotFoundError without the extra ``view``.
+    ``url`` is the address of the page; ``line`` is this process's end of the channel. Raises InputError if
+    the page cannot be served there, ModuleNotFoundError without the extra ``view``.
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = 8080) -> None:
@@ -30,7 +34,7 @@ class Attendant:
         ours, theirs = pair()
         self.line = Line(ours)
         command = [sys.executable, "-m", "outrider.view.process", str(theirs.fileno()), host, str(port)]
-        # In a session of its own, so that Ctrl-C is the flight's alone.
+        # The session is its own, so that Ctrl-C reaches only the flight.
         self.process = subprocess.Popen(
             command,
             pass_fds=(theirs.fileno(),),
@@ -47,22 +51,22 @@ class Attendant:
         self.url = ready.url
 
     def begin(self, scene: Scene, wishes: Wishes) -> None:
-        """A flight of ``scene`` begins."""
+        """Report that a flight of ``scene`` begins."""
         self.line.send(pickle.dumps(Begin(scene, wishes)))
 
     def landed(self, directory: Path) -> None:
-        """It is over; the run is shown from now on."""
+        """Report that the flight has ended; the view then shows the run in ``directory``."""
         self.line.send(pickle.dumps(Landed(str(directory.resolve()))))
 
     def wait(self) -> None:
-        """Until the view ends, or Ctrl-C."""
+        """Wait until the view ends or Ctrl-C is pressed."""
         try:
             self.process.wait()
         except KeyboardInterrupt:
             return
 
     def close(self) -> None:
-        """End it."""
+        """End the process, and close the channel."""
         self.process.terminate()
         try:
             self.process.wait(2.0)

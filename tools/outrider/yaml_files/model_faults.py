@@ -1,4 +1,4 @@
-"""What pydantic found wrong with a tree, put where it stands in the text and in the words of the file."""
+"""Translation of pydantic's errors into faults with a place in the text, in the words of the file."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ _KEY = "[key]"
 
 
 class _Place(NamedTuple):
-    """Where a location leads. ``path`` names it as the file does; ``parent`` is the schema of what it is part
-    of. It is reported at ``at``, its key is at ``holder_at``; ``absent`` is what the tree lacks."""
+    """The place to which an error's location leads.
+
+    ``path`` names it as the file does; ``parent`` is the schema of what contains it. The fault is reported at
+    ``at``, its key is at ``holder_at``; ``absent`` is the key or index that the tree lacks.
+    """
 
     path: tuple[str | int, ...]
     tree: Tree
@@ -31,12 +34,12 @@ class _Place(NamedTuple):
 
     @property
     def name(self) -> str:
-        """``vehicles[2].speed``"""
+        """Name such as ``vehicles[2].speed``."""
         return _name(self.path)
 
 
 class _Union(NamedTuple):
-    """The outermost undecided union that a location passes: which member it names, and how deep that is."""
+    """The outermost undecided union on a location: the member that the location names, and its depth."""
 
     label: str
     place: _Place
@@ -44,7 +47,7 @@ class _Union(NamedTuple):
 
 
 class _OfUnion(NamedTuple):
-    """An error behind such a union, and where it is."""
+    """An error inside such a union, and its place."""
 
     union: _Union
     place: _Place
@@ -52,7 +55,7 @@ class _OfUnion(NamedTuple):
 
     @property
     def of_whole(self) -> bool:
-        """Whether the value is not even like this member."""
+        """Whether the value does not even resemble this member."""
         return len(self.error["loc"]) <= self.union.depth + 1 and self.error["type"] not in _OF_A_RULE
 
 
@@ -66,7 +69,10 @@ def _within(path: tuple[str | int, ...]) -> str:
 
 
 def model_flaws(tree: Tree, schema: Schema, errors: Iterable[ErrorDetails]) -> list[Flaw]:
-    """One flaw for each error; the errors of a union are one. What is broken already is passed over."""
+    """Return one flaw for each error; the errors of a union give one flaw.
+
+    Places that are broken already are skipped.
+    """
     placed = [(_locate(tree, schema, error["loc"]), error) for error in errors]
     flaws = []
     unions: dict[tuple[str | int, ...], list[_OfUnion]] = {}
@@ -83,7 +89,10 @@ def model_flaws(tree: Tree, schema: Schema, errors: Iterable[ErrorDetails]) -> l
 
 
 def _locate(tree: Tree, schema: Schema, location: Sequence[str | int]) -> _Place:
-    """Follow a location through tree and schema. It names the members of unions too: those are no keys."""
+    """Follow a location through tree and schema.
+
+    The location also names the members of unions; those are no keys.
+    """
     place = _Place((), tree, schema, schema, tree.at, tree.at)
     for depth, part in enumerate(location):
         if place.schema.choices:
@@ -118,7 +127,7 @@ def _step(place: _Place, part: str | int) -> _Place:
 
 
 def _union_flaws(found: list[_OfUnion]) -> list[Flaw]:
-    """The errors of the member that the value is most like; if it is like none, what all of them allow."""
+    """Return the errors of the union member that the value resembles; if none, what all members allow."""
     groups: dict[str, list[_OfUnion]] = {}
     for one in found:
         groups.setdefault(one.union.label, []).append(one)
@@ -154,7 +163,7 @@ def _flaw(place: _Place, error: ErrorDetails) -> Flaw:
 
 
 def _tag_flaw(place: _Place) -> Flaw:
-    """A union that a key decides, whose key is missing or says a word that is none."""
+    """Return the flaw of a tagged union whose key is missing or has an invalid value."""
     key, tags = str(place.schema.tag_key), list(place.schema.tags)
     entry = place.tree.entries.get(key) if isinstance(place.tree, Mapping) else None
     allowed = listing([repr(tag) for tag in tags])
@@ -168,7 +177,7 @@ def _tag_flaw(place: _Place) -> Flaw:
 
 
 def _hint(place: _Place) -> str:
-    """What a scalar of the wrong kind may have been meant to be."""
+    """Return a suggestion for a scalar of the wrong type."""
     tree, schema = place.tree, place.schema
     if not isinstance(tree, Scalar):
         return ""

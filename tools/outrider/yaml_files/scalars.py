@@ -1,5 +1,7 @@
-"""What a plain YAML scalar means: what the core schema of YAML 1.2 says. What YAML 1.1 reads differently
-(``on``, ``010``, ``1:30``, ``1_000``) is text, so that it never becomes a number by stealth.
+"""Meaning of a plain YAML scalar by the core schema of YAML 1.2.
+
+Text that YAML 1.1 reads differently (``on``, ``010``, ``1:30``, ``1_000``) stays text, so that it never
+becomes a number unnoticed.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ class ScalarError(ValueError):
 
 
 def resolve(text: str) -> Value:
-    """The value of a plain scalar. Raises ScalarError for NaN, infinities, and integers beyond 64 bits."""
+    """Return the value of a plain scalar; raise ScalarError for NaN, infinities, integers beyond 64 bits."""
     if text in _NULLS:
         return None
     if text in _BOOLEANS:
@@ -53,7 +55,7 @@ def _integer(text: str, base: int) -> int:
 
 
 def number_hint(text: str) -> str:
-    """What somebody who wrote this text for a number may have meant, or nothing."""
+    """Return a suggestion for a text that stands in place of a number, or an empty string."""
     if _SEXAGESIMAL.fullmatch(text):
         return "; base 60 is not read, write one number"
     cleaned = text.strip().replace("_", "").replace(",", ".")
@@ -66,6 +68,6 @@ def number_hint(text: str) -> str:
 
 
 def boolean_hint(text: str) -> str:
-    """The same for a text where true or false should stand."""
+    """Return a suggestion for a text that stands in place of true or false, or an empty string."""
     meant = _YAML_1_1_BOOLEANS.get(text.casefold())
     return "" if meant is None else f"; did you mean {meant}?"

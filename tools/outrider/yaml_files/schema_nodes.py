@@ -1,4 +1,4 @@
-"""Reading a JSON Schema as pydantic writes it: from node to node as an error's location goes, or in words."""
+"""Reader of a JSON Schema from pydantic: navigation along an error's location, and description in words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Node = Mapping[str, Any]
 """One schema: JSON, hence untyped."""
 
 MOST_WORDS = 24
-"""So many alternatives or keys are listed."""
+"""Largest number of alternatives or keys that are listed."""
 
 
 class Schema(NamedTuple):
@@ -21,7 +21,7 @@ class Schema(NamedTuple):
 
     @property
     def resolved(self) -> Schema:
-        """With references followed, and an optional value's schema in place of "that or null"."""
+        """The schema with references followed, and "value or null" replaced by the value's schema."""
         node = self.node
         while True:
             if "$ref" in node:
@@ -35,34 +35,37 @@ class Schema(NamedTuple):
 
     @property
     def choices(self) -> list[Schema]:
-        """The members of a union, null left out; empty if this is none."""
+        """The members of a union without null; empty if this is no union."""
         members = _not_null(self.resolved.node)
         return [Schema(self.root, member).resolved for member in members]
 
     @property
     def tags(self) -> dict[str, Schema]:
-        """Of a union that a key decides: the member for each word."""
+        """The member for each word of a tagged union."""
         found = self.resolved.node.get("discriminator", {}).get("mapping", {})
         return {tag: Schema(self.root, {"$ref": target}).resolved for tag, target in found.items()}
 
     @property
     def tag_key(self) -> str | None:
-        """The key that decides such a union."""
+        """The key that decides a tagged union."""
         found = self.resolved.node.get("discriminator", {}).get("propertyName")
         return None if found is None else str(found)
 
     @property
     def keys(self) -> list[str]:
-        """What a mapping may hold; of a union, of all its members."""
+        """The keys that a mapping may hold; for a union, those of all its members."""
         members = self.choices or [self.resolved]
         return list(dict.fromkeys(key for member in members for key in member.node.get("properties", ())))
 
     def chosen(self, label: str) -> Schema:
-        """The member of a union that a location names by tag, title or type; if none fits, all their keys."""
+        """Return the member of a union that a location names by tag, title or type.
+
+        If none fits, return a schema with the keys of all members.
+        """
         if label in self.tags:
             return self.tags[label]
         for member in self.choices:
-            # A label is a name, or names inside what wraps them: ``function-after[_order(), Gust]``.
+            # A label is a name, or names inside their wrappers: ``function-after[_order(), Gust]``.
             name = _PYDANTIC_NAMES.get(member.node.get("type", "")) or member.node.get("title")
             if name and re.search(rf"(?:^|[ -]){re.escape(name)}(?:$|[\[\]])", label):
                 return member
@@ -70,7 +73,7 @@ class Schema(NamedTuple):
         return Schema(self.root, {"properties": everything})
 
     def child(self, key: str | int) -> Schema:
-        """What stands under a key or index; an empty schema if the schema does not say."""
+        """Return the schema under a key or index; an empty one if the schema does not define it."""
         node = self.resolved.node
         if isinstance(key, int):
             ahead = node.get("prefixItems", ())
@@ -83,17 +86,17 @@ class Schema(NamedTuple):
 
     @property
     def words(self) -> list[str]:
-        """The texts allowed here if they can be listed, else nothing."""
+        """The allowed texts if they can be listed, else an empty list."""
         allowed = [word for member in (self.choices or [self.resolved]) for word in _listed(member.node)]
         return [word for word in allowed if isinstance(word, str)]
 
     @property
     def types(self) -> set[str]:
-        """The JSON types allowed here."""
+        """The allowed JSON types."""
         return {str(member.node.get("type", "")) for member in (self.choices or [self.resolved])}
 
     def describe(self) -> str:
-        """What is allowed here, in words; empty if the schema does not say."""
+        """Describe in words what is allowed; empty if the schema does not say."""
         null = " or null" if any(member.get("type") == "null" for member in _members(self.node)) else ""
         return self._describe() + null
 
@@ -145,7 +148,7 @@ _PYDANTIC_NAMES = {"number": "float", "integer": "int", "string": "str", "boolea
 
 
 def listing(words: list[str]) -> str:
-    """Words with commas, the rest of a long list counted."""
+    """Join words with commas; count the rest of a long list."""
     rest = len(words) - MOST_WORDS
     return ", ".join(words[:MOST_WORDS]) + (f", … ({rest} more)" if rest > 0 else "")
 

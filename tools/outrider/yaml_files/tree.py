@@ -1,7 +1,9 @@
-"""YAML text to a tree of values that know where they stand. No text can construct an object, recurse deeply
-or blow up: tags are refused, depth is bounded, and every alias is charged for what it stands for.
+"""Parser from YAML text to a tree of values with their positions.
 
-Faults are collected, and a value that cannot be used becomes ``Broken``, so that the rest is still checked.
+No text can construct an object, recurse deeply or consume excessive memory: tags are refused, depth is
+bounded, and every alias is charged with the size of its value.
+
+Faults are collected. A value that cannot be used becomes ``Broken``, so that the rest is still checked.
 """
 
 from __future__ import annotations
@@ -14,20 +16,26 @@ from outrider.yaml_files.scalars import ScalarError, Value, resolve
 
 MOST_DEPTH = 32
 MOST_WEIGHT = 1_600_000
-"""Of all values, aliases expanded: 32 for each and its characters, hence at most 50,000 values."""
+"""Limit of the weight of all values, with aliases expanded.
+
+A value weighs 32 plus its characters, hence there are at most 50,000 values.
+"""
 
 _WEIGHT_OF_NODE = 32
 
 
 class Flaw(NamedTuple):
-    """Something wrong, ``at`` so many characters from the start of the text."""
+    """A fault, ``at`` this number of characters from the start of the text."""
 
     at: int
     what: str
 
 
 class Scalar(NamedTuple):
-    """``text`` as written (unquoted), what it means, and whether it was plain: neither quoted nor a block."""
+    """A scalar.
+
+    ``text`` as written (unquoted), its ``value``, and whether it was ``plain``: neither quoted nor a block.
+    """
 
     at: int
     value: Value
@@ -43,21 +51,21 @@ class Items(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A key's place, and what it holds."""
+    """The position of a key, and its value."""
 
     at: int
     tree: Tree
 
 
 class Mapping(NamedTuple):
-    """A mapping; keys are words, written as text whatever they look like."""
+    """A mapping; keys are words, stored as text whatever they look like."""
 
     at: int
     entries: dict[str, Entry]
 
 
 class Broken(NamedTuple):
-    """A value that has its fault already."""
+    """A value whose fault is reported already."""
 
     at: int
 
@@ -67,14 +75,17 @@ Plain = None | bool | int | float | str | list["Plain"] | dict[str, "Plain"]
 
 
 class Parsed(NamedTuple):
-    """``tree`` is None if the text is empty or its syntax is broken; then ``flaws`` may say more."""
+    """Result of parsing.
+
+    ``tree`` is None if the text is empty or its syntax is broken; then ``flaws`` may say more.
+    """
 
     tree: Tree | None
     flaws: list[Flaw]
 
 
 class _Sized(NamedTuple):
-    """A finished tree, what it weighs, and how many levels it has."""
+    """A finished tree, its weight, and its number of levels."""
 
     tree: Tree
     weight: int
@@ -88,7 +99,7 @@ class _Stop(Exception):  # noqa: N818 — not an error of ours: it ends the read
 
 
 def parse(text: str) -> Parsed:
-    """The one document of ``text``."""
+    """Parse ``text``, which holds one document."""
     reading = _Reading()
     try:
         tree = reading.document(text)
@@ -98,7 +109,7 @@ def parse(text: str) -> Parsed:
 
 
 def plain(tree: Tree) -> Plain:
-    """The values alone, as JSON has them; null for what is broken."""
+    """Return the values alone, as in JSON; null for what is broken."""
     match tree:
         case Scalar():
             return tree.value
@@ -140,7 +151,7 @@ class _Reading:
         except yaml.MarkedYAMLError as error:
             raise _Stop(_syntax_flaw(error)) from None
         except (ValueError, OverflowError):
-            # The library turns an escape such as "\UFFFFFFFF" into a character without looking.
+            # The library turns an escape such as "\UFFFFFFFF" into a character without a check.
             raise _Stop(Flaw(self._loader.index, "a number or character code that does not exist")) from None
         return event
 
@@ -222,7 +233,7 @@ class _Reading:
         return Mapping(at, entries), height
 
     def _key(self, tree: Tree, at: int, entries: dict[str, Entry]) -> str | None:
-        """The key, or None if it cannot be one and the fault is noted."""
+        """Return the key, or None if it is invalid; its fault is then recorded."""
         if isinstance(tree, Broken):
             return None
         if not isinstance(tree, Scalar) or (tree.plain and tree.value is None):
@@ -241,8 +252,10 @@ def _start(event: yaml.Event) -> int:
 
 
 def _joined(text: str) -> str:
-    """``text`` with surrogate pairs put together, as JSON escapes what lies beyond U+FFFF; UnicodeDecodeError
-    for half a pair."""
+    """Return ``text`` with surrogate pairs joined; JSON escapes characters beyond U+FFFF as such pairs.
+
+    Raises UnicodeDecodeError for half a pair.
+    """
     return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le")
 
 

@@ -1,7 +1,7 @@
-"""A YAML file to a typed, checked, frozen value: bytes → text → tree → model.
+"""Loader from a YAML file to a typed, checked, frozen value: bytes → text → tree → model.
 
-Whatever is wrong with a file is said at once, one line for each fault: its place, what is allowed, and the
-nearest valid word. Types are strict: text never becomes a number, nor a number text.
+All faults of a file are reported at once, one line each: place, what is allowed, and the nearest valid word.
+Types are strict: text never becomes a number, nor a number text.
 """
 
 from __future__ import annotations
@@ -24,20 +24,21 @@ Model = TypeVar("Model", bound=BaseModel)
 
 MOST_BYTES = 1 << 20
 MOST_FAULTS = 100
-"""So many are shown; the rest is counted."""
+"""Largest number of faults that are shown; the rest is counted."""
 MOST_WORDING = 1000
-"""Characters about one fault, which may quote what it found."""
+"""Largest number of characters about one fault, which may quote the file."""
 
 
 def load(path: Path, model: type[Model]) -> Model:
-    """The file at ``path`` as a ``model``. Raises InputError with every fault of the file."""
+    """Load the file at ``path`` as a ``model``; raise InputError with every fault of the file."""
     return read(_bytes_of(path), str(path), model)
 
 
 def read(data: bytes, name: str, model: type[Model]) -> Model:
-    """The same for bytes that are at hand; ``name`` is what faults are reported under.
+    """Read ``data`` as a ``model``; faults are reported under ``name``.
 
-    ``model`` has a JSON Schema, and forbids extra keys if unknown keys shall be faults.
+    ``model`` must have a JSON Schema, and must forbid extra keys if unknown keys shall be faults. Raises
+    InputError with every fault.
     """
     text = _decode(data, name)
     schema = _schema(model)
@@ -47,7 +48,7 @@ def read(data: bytes, name: str, model: type[Model]) -> Model:
     if not isinstance(tree, Mapping):
         wrong = Flaw(0, "is empty") if tree is None else Flaw(tree.at, "is no mapping")
         raise _input_error(text, name, [*flaws, Flaw(wrong.at, f"{wrong.what}; needed: {schema.describe()}")])
-    # JSON has lists, but neither tuples nor enumerations: strict mode accepts them from there only.
+    # JSON has lists, but neither tuples nor enumerations: strict mode accepts them only from JSON.
     document = json.dumps(plain(tree), allow_nan=False)
     try:
         value = model.model_validate_json(document, strict=True)
@@ -61,7 +62,7 @@ def read(data: bytes, name: str, model: type[Model]) -> Model:
 
 @lru_cache(maxsize=32)
 def _schema(model: type[BaseModel]) -> Schema:
-    """Making it takes ten times as long as reading a file by it."""
+    """Return the schema of ``model``; making it takes ten times as long as reading a file with it."""
     written = model.model_json_schema()
     return Schema(written, written)
 
@@ -89,7 +90,7 @@ def _decode(data: bytes, name: str) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        # Positions of the BOM-less codec count from behind the mark.
+        # The codec without BOM counts positions from behind the mark.
         data = data.removeprefix(b"\xef\xbb\xbf")
         before = data[: error.start].decode(errors="replace")
         wrong = f"byte 0x{data[error.start]:02x} is not UTF-8; allowed: text in UTF-8"
@@ -97,7 +98,7 @@ def _decode(data: bytes, name: str) -> str:
 
 
 def _input_error(text: str, name: str, flaws: list[Flaw]) -> InputError:
-    """Every flaw once, in the order of the file, each at its line and column."""
+    """Return an error with every flaw once, in the order of the file, each at its line and column."""
     starts = [0, *(at + 1 for at, character in enumerate(text) if character == "\n")]
     end = len(text.rstrip())
     faults = []
