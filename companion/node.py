@@ -51,7 +51,8 @@ class Companion:
 
     Links: ``autopilot``, ``swarm``, ``target``, ``ground``. ``stopwatch`` (ns) only measures how long
     planning takes; nothing depends on it. ``signing`` is the companion's own instance for all links; the
-    index of a link in ``LINKS`` is its link id. Without ``signing`` the companion accepts unsigned messages.
+    index of a link in ``LINKS`` is its link id. Without ``signing`` the companion accepts signed and unsigned
+    messages alike.
     """
 
     pilots: ClassVar[type[Pilot]] = Pilot

@@ -98,7 +98,7 @@ class World:
         self.moves = 0
         """Number of times that the autopilot's origin has moved in flight."""
         self.displaced = 0.0
-        """Distance (m) by which the last such move moved the vehicle itself in the fleet frame; it should not."""
+        """Displacement (m) of the vehicle in the fleet frame by the last such move; it should be 0."""
         self.doubt = 0.0
         """Distance (m) by which the own position may be wrong, beyond the usual error."""
         self.stamp = 0

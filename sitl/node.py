@@ -304,7 +304,7 @@ class Autopilot:
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
             told = self._telemetry.collect(self._now, self._gauges.read(self._now))
-            # If there are many answers, the datagrams sent first are more likely to fit the link.
+            # If there are many answers, the messages sent first are more likely to fit the link.
             messages = told + messages if len(messages) > _ANSWERS else messages + told
         if not messages:
             return []

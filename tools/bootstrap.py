@@ -1,4 +1,4 @@
-"""Make the environment in ``.venv`` from locked versions: with uv if available, else with venv and pip.
+"""Set-up of the environment in ``.venv`` from locked versions: with uv if available, else venv and pip.
 
 `make` runs this with whatever python3 the machine has. The syntax is that of Python 3.6, so that an older
 version than required can still report what is missing.

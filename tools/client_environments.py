@@ -1,4 +1,4 @@
-"""Make the environments of the client software that tests/clients flies.
+"""Set-up of the environments of the client software that tests/clients flies.
 
 Each file of tests/clients/requirements gets an environment of its own in .venv/clients, because MAVSDK's two
 APIs share one name and MAVProxy requires particular versions.

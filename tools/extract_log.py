@@ -1,10 +1,10 @@
-"""Extract some messages of a tlog, every record byte for byte as it was.
+"""Extraction of some messages from a tlog, every record byte for byte as it was.
 
     .venv/bin/python tools/extract_log.py INPUT OUTPUT --message GLOBAL_POSITION_INT --start 475 --duration 70
     .venv/bin/python tools/extract_log.py INPUT OUTPUT --message HEARTBEAT --message ATTITUDE/10 --system 1 2
 
 ``NAME/10`` keeps the first and every tenth after it. ``--start`` and ``--duration`` are s of receive time
-from the log's first record on; without them it is the whole log. A README beside the result describes what
+from the log's first record on; without them it is the whole log. A README next to the result describes what
 was extracted. An OUTPUT that ends in .gz is compressed.
 """
 

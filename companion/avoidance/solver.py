@@ -1,8 +1,9 @@
-"""PIQP: set up once, then only vectors are updated. One dense QP of n variables, used for each axis in turn.
+"""PIQP solver: set up once, then only vectors are updated.
 
-Settled by measurement: no preconditioner (with scaling on, a wrong update can return SOLVED and be wrong),
-the duality gap is checked, infinite bounds are real infinities, shapes are validated here because PIQP does
-not raise on them, and results are copied because the next solve overwrites them.
+One dense QP of n variables is used for each axis in turn. Settled by measurement: there is no preconditioner
+(with scaling on, a wrong update can return SOLVED with a wrong result), the duality gap is checked, infinite
+bounds are real infinities, shapes are validated here because PIQP does not raise on them, and results are
+copied because the next solve overwrites them.
 """
 
 from __future__ import annotations
@@ -17,13 +18,16 @@ from companion.values.horizon import Array
 
 
 class QpSolver:
-    """min ½ xᵀPx + cᵀx  subject to  h_l ≤ Gx ≤ h_u,  x_l ≤ x ≤ x_u,  with constant P (n, n) and G (m, n) or
-    none."""
+    """Solver of min ½ xᵀPx + cᵀx subject to h_l ≤ Gx ≤ h_u, x_l ≤ x ≤ x_u.
+
+    P (n, n) and G (m, n), if there is one, are constant.
+    """
 
     def __init__(self, P: Array, G: Array | None = None, max_iter: int = 60) -> None:
         self.size = len(P)
         self.rows = 0 if G is None else len(G)
-        # At the default gap, 1e-8, the last inputs are off by up to 2e-3 m/s²: this costs one iteration more.
+        # At the default gap, 1e-8, the last inputs are wrong by up to 2e-3 m/s²; this gap costs one more
+        # iteration.
         self._solver = _quiet(max_iter, 1e-8, (1e-10, 1e-12))
         wide, tall = np.full(self.size, 1.0), np.full(self.rows, 1.0)
         P = np.asfortranarray(P)
@@ -37,13 +41,15 @@ class QpSolver:
     def solve(
         self, c: Array, x_l: Array, x_u: Array, h_l: Array | None = None, h_u: Array | None = None
     ) -> Array:
-        """The minimiser (n,), a copy. ShapeError on sizes or NaN, SolverError when PIQP does not say
-        SOLVED."""
+        """Return the minimiser (n,), a copy.
+
+        Raises ShapeError on wrong sizes or NaN, SolverError when PIQP does not report SOLVED.
+        """
         if len(c) != self.size or len(x_l) != self.size or len(x_u) != self.size:
             raise ShapeError(
                 f"c, x_l, x_u must have {self.size} entries, not {len(c)}, {len(x_l)}, {len(x_u)}"
             )
-        # A NaN bound would count as absent and the answer as SOLVED; the product finds one in a single pass.
+        # PIQP would treat a NaN bound as absent and report SOLVED; the product finds a NaN in a single pass.
         check = float(c @ (x_u - x_l))
         if self.rows:
             if h_l is None or h_u is None or len(h_l) != self.rows or len(h_u) != self.rows:
@@ -59,7 +65,7 @@ class QpSolver:
 
 
 class Optimum(NamedTuple):
-    """The minimiser (n,) and the multipliers (m,) ≥ 0 of the rows, copies."""
+    """Minimiser (n,) and multipliers (m,) ≥ 0 of the rows, copies."""
 
     x: Array
     multipliers: Array
@@ -68,9 +74,12 @@ class Optimum(NamedTuple):
 def solve_once(
     P: Array, c: Array, A: Array, b: Array, G: Array, low: Array, x_l: Array, x_u: Array
 ) -> Optimum:
-    """min ½ xᵀPx + cᵀx  subject to  Ax = b, Gx ≥ low, x_l ≤ x ≤ x_u: a QP whose rows (m, n), maybe none, are
-    others each time. SolverError when PIQP does not say SOLVED."""
-    # Mostly 20 iterations are enough; where there is hardly an interior it takes many.
+    """Solve min ½ xᵀPx + cᵀx subject to Ax = b, Gx ≥ low, x_l ≤ x ≤ x_u.
+
+    This is for a QP whose rows (m, n), possibly none, differ each time. Raises SolverError when PIQP does not
+    report SOLVED.
+    """
+    # 20 iterations are mostly enough; where there is hardly an interior it takes many.
     solver = _quiet(250, 1e-8, (1e-9, 1e-9))
     rows = (np.asfortranarray(G), low, np.full(len(low), np.inf)) if len(low) else (None, None, None)
     solver.setup(P, c, A, b, *rows, x_l, x_u)
@@ -79,7 +88,7 @@ def solve_once(
 
 
 def _quiet(max_iter: int, eps: float, gap: tuple[float, float]) -> Any:
-    """A dense solver with tolerances ``eps`` and of the duality ``gap``, absolute and relative."""
+    """Return a dense solver with tolerances ``eps`` and, of the duality gap, ``gap`` (absolute, relative)."""
     solver = piqp.DenseSolver()
     settings = solver.settings
     settings.verbose = False
@@ -92,7 +101,7 @@ def _quiet(max_iter: int, eps: float, gap: tuple[float, float]) -> Any:
 
 
 def _solved(solver: Any) -> Any:
-    """The result of a solver that is set up."""
+    """Return the result of a solver that is set up; raises SolverError unless it reports SOLVED."""
     status = solver.solve()
     result = solver.result
     if status != piqp.PIQP_SOLVED:

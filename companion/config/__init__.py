@@ -1,6 +1,7 @@
-"""Settings of a companion: frozen, checked at load, passed explicitly. SI units, fleet-local ENU, µs.
+"""Settings of a companion: takes a configuration, gives checked values in SI units, ENU and µs.
 
-A module for each part, aggregated by ``CompanionConfig``. Defaults are the paper's where it states a number.
+Settings are frozen, checked at load and passed explicitly; positions are fleet-local ENU. Each part has a
+module, and ``CompanionConfig`` aggregates them. Defaults are the paper's where it states a number.
 """
 
 from companion.config.companion import CompanionConfig

@@ -12,7 +12,7 @@ Weight = Annotated[float, Field(ge=0.0, le=1e4)]
 
 
 class StallConfig(Settings):
-    """When a plan is pushed back and gets nowhere, the goal is turned aside."""
+    """Turn of the goal to the side when a plan is pushed back and makes no progress."""
 
     bend: Positive = Field(0.8, description="rad, the largest turn at first")
     bend_more: Positive = Field(3.1, description="rad, the largest turn ever")
@@ -63,7 +63,7 @@ class CertifiedConfig(Settings):
 
     @property
     def knots(self) -> int:
-        """Knots of an epoch."""
+        """Number of knots in an epoch."""
         return self.epoch_us // self.dt_us
 
     @model_validator(mode="after")

@@ -1,8 +1,7 @@
-"""The companion's settings: frozen, checked at load, passed explicitly. SI units, fleet-local ENU, times in
-µs.
+"""Settings of a companion: frozen, checked at load, passed explicitly.
 
-Defaults are the paper's where it gives a number; where it is silent, the value that we settled on stands
-here. A scenario file may say otherwise.
+SI units, fleet-local ENU, times in µs. Defaults are the paper's where it gives a number; otherwise they are
+the values settled on here. A scenario file may override them.
 """
 
 from __future__ import annotations
@@ -57,14 +56,14 @@ __all__ = [
 
 
 class OwnSurface(Settings):
-    """The surface of one vehicle."""
+    """Surface of one vehicle."""
 
     vehicle: int = Field(ge=1, le=255, description="system id")
     surface: SurfaceConfig
 
 
 class CompanionConfig(Settings):
-    """Everything one companion needs beside its links."""
+    """All settings of one companion, except its links."""
 
     task: Literal["escort", "goto"] = "escort"
     methods: tuple[MethodName, ...] = ("tangential",)
@@ -129,7 +128,7 @@ class CompanionConfig(Settings):
     voice: VoiceConfig = VoiceConfig()
 
     def surface_of(self, system: int) -> Surface:
-        """Where the vehicle of that system id is to be around the target."""
+        """Return the surface of the vehicle with the id ``system``."""
         return next((own.surface for own in self.surfaces if own.vehicle == system), self.surface)
 
     @model_validator(mode="after")

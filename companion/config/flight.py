@@ -11,7 +11,7 @@ from companion.values.settings import Positive, Settings
 
 
 class GuardConfig(Settings):
-    """Age limits of what a plan stands on, µs."""
+    """Age limits (µs) of a plan's inputs, and limits beyond which the companion reacts."""
 
     own_stale_us: Micros = 500_000
     hold_us: Micros = Field(500_000, description="a plan is held for so long after the last good one")
@@ -79,7 +79,7 @@ class GuardConfig(Settings):
 
 
 class RatesConfig(Settings):
-    """Periods of what the companion does, µs."""
+    """Periods of the companion's activities, µs."""
 
     replan_us: Micros = 10_000
     setpoint_us: Micros = 20_000
@@ -88,7 +88,7 @@ class RatesConfig(Settings):
 
 
 class TrackingConfig(Settings):
-    """What is done about the difference between set-points and vehicle."""
+    """Treatment of the difference between set-points and vehicle."""
 
     compensate: bool = Field(
         False, description="add to the set-point's acceleration what drag and wind take from the vehicle"
@@ -106,13 +106,16 @@ class TrackingConfig(Settings):
 
     @property
     def largest(self) -> float:
-        """The largest compensation, m/s²."""
+        """Largest compensation, m/s²."""
         return self.most if self.compensate else 0.0
 
 
 class VoiceConfig(Settings):
-    """What is told to the ground, and by which link. The autopilot's link is mostly the narrowest, and
-    whether it passes on what it hears is up to its own settings: so not unless asked."""
+    """Messages to the ground, and the links that carry them.
+
+    The autopilot's link is usually the narrowest, and whether the autopilot forwards what it receives depends
+    on its own settings: so it carries none unless configured.
+    """
 
     texts: bool = Field(False, description="events as STATUSTEXT")
     values: bool = Field(

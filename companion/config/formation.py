@@ -1,4 +1,4 @@
-"""Settings: how vehicles share a surface around a target."""
+"""Settings of how vehicles share a surface around a target."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from companion.values.settings import Settings
 
 
 class Nearest(Settings):
-    """Each vehicle goes to the point of its surface that is nearest to it."""
+    """Formation in which each vehicle goes to the point of its surface nearest to it."""
 
     kind: Literal["nearest"] = "nearest"
 
 
 class Spread(Settings):
-    """The vehicles spread evenly around the target."""
+    """Formation in which the vehicles spread evenly around the target."""
 
     kind: Literal["spread"]
     turn: float = Field(

@@ -1,4 +1,4 @@
-"""Settings: obstacles that every companion knows."""
+"""Settings of obstacles that every companion knows."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Size = Annotated[float, Field(gt=0.0, le=1000.0)]
 
 
 class Sphere(Settings):
-    """A ball."""
+    """Ball."""
 
     kind: Literal["sphere"]
     at: tuple[_Coordinate, _Coordinate, _Coordinate] = Field(description="centre, m, fleet-local ENU")
@@ -25,7 +25,7 @@ class Sphere(Settings):
 
 
 class Post(Settings):
-    """A vertical cylinder from below up to ``height``."""
+    """Vertical cylinder from below up to ``height``."""
 
     kind: Literal["post"]
     at: tuple[_Coordinate, _Coordinate] = Field(description="axis, m east and north of the fleet origin")
@@ -41,14 +41,14 @@ class _Moving(Settings):
 
 
 class MovingSphere(_Moving):
-    """A ball; where it says that it is, is its centre."""
+    """Moving ball; its reported position is its centre."""
 
     kind: Literal["sphere"]
     radius: Size = Field(description="m")
 
 
 class MovingPost(_Moving):
-    """A vertical cylinder from below up to ``height``; where it says that it is, is its axis."""
+    """Moving vertical cylinder from below up to ``height``; its reported position is on its axis."""
 
     kind: Literal["post"]
     radius: Size = Field(description="m")
@@ -59,7 +59,7 @@ Moving = Annotated[MovingSphere | MovingPost, Field(discriminator="kind")]
 
 
 class ProximityConfig(Settings):
-    """What is made of OBSTACLE_DISTANCE."""
+    """Processing of OBSTACLE_DISTANCE."""
 
     age_us: _Age = Field(1_000_000, description="a return is forgotten after so long")
     delay_us: int = Field(
@@ -80,7 +80,7 @@ _Address = Annotated[int, Field(ge=0, lt=_ADDRESSES)]
 
 
 class TrafficConfig(Settings):
-    """What is made of ADSB_VEHICLE."""
+    """Processing of ADSB_VEHICLE."""
 
     radius: Positive = Field(30.0, description="m of room about it, in which no vehicle is to be")
     height_error: float = Field(50.0, ge=0.0, le=1000.0, description="m, how wrong its height may be")

@@ -26,15 +26,17 @@ Bounds = tuple[
 
 
 class HorizonConfig(Settings):
-    """N steps of dt; N + 1 inputs u(0)…u(N)."""
+    """Horizon of N steps of dt, with N + 1 inputs u(0)…u(N)."""
 
     steps: int = Field(15, ge=2, le=15, description="N; at most 15, so that a plan fits one TUNNEL message")
     dt_us: WireStep = Field(100_000, description="prediction step, µs; not the replan period")
 
 
 class CostConfig(Settings):
-    """Ω_t and Ω_i. Only their ratios matter. Not given in the paper: settled by
-    flying the swap and the escort."""
+    """Weights Ω_t and Ω_i, of which only the ratios matter.
+
+    The paper gives no values: these are settled by flying the swap and the escort.
+    """
 
     omega_t_position: Positive = 100.0
     omega_t_velocity: Positive = 40.0
@@ -42,8 +44,11 @@ class CostConfig(Settings):
 
 
 class LimitsConfig(Settings):
-    """What the planner may ask for. ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it. The box is where
-    vehicles may be: plans stay inside by k·σ of the own place (``field.margin``)."""
+    """Limits of plans.
+
+    ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it. The box is where vehicles may be: plans stay
+    inside by k·σ of the own position (``field.margin``).
+    """
 
     u_max: Bounds = (2.0, 2.0, 2.0)
     v_max: Bounds = (5.0, 5.0, 5.0)
@@ -65,8 +70,10 @@ class LimitsConfig(Settings):
         return self
 
     def within(self, margin: float) -> LimitsConfig:
-        """The same with a box that is smaller by ``margin`` (m) on each side, or half as large where there is
-        no room for that."""
+        """Return the limits with a box that is smaller by ``margin`` (m) on each side.
+
+        Where there is no room for that, the box is half as large.
+        """
         sides = tuple(zip(self.box_min, self.box_max, strict=True))
         off = tuple(min(margin, (high - low) / 4.0) for low, high in sides)
         return self.model_copy(
@@ -78,7 +85,7 @@ class LimitsConfig(Settings):
 
 
 class Potential(Settings):
-    """What F_hyp of eq. (8) needs."""
+    """Parameters of F_hyp in eq. (9)."""
 
     gain: Positive
     d_min: Positive
@@ -92,7 +99,7 @@ class Potential(Settings):
 
 
 class FieldConfig(Potential):
-    """The repulsive field, eq. (8)."""
+    """Repulsive field, eq. (9)."""
 
     gain: Positive = Field(10.0, description="K; the paper gives none")
     d_min: Positive = Field(0.5, description="m, between centres: the field is clamped there")
@@ -123,13 +130,15 @@ class FieldConfig(Potential):
     )
 
     def margin(self, estimates: int) -> float:
-        """By how much (m) d_min and d_safe grow where a distance is known from so many estimates: k·σ·√n,
-        n = 2 between vehicles, 1 to what stands."""
+        """Return by how much (m) d_min and d_safe grow where a distance is known from so many ``estimates``.
+
+        It is k·σ·√n, with n = 2 between vehicles and 1 to what stands still.
+        """
         return self.margin_sigmas * self.position_sigma * math.sqrt(estimates)
 
 
 class TangentialConfig(Settings):
-    """The tangential band, Sec. III-C.3."""
+    """Tangential band, Sec. III-D.3."""
 
     k_tang: Positive = 2.0
     d_band: Positive = Field(1.0, description="m beyond d_safe; more than v_max·dt + u_max·dt²/2")
@@ -144,14 +153,17 @@ class TangentialConfig(Settings):
 
 
 class SwivelConfig(Settings):
-    """The swivelling destination, Sec. III-C.1."""
+    """Swivelling destination, Sec. III-D.1."""
 
     k_s: Positive = Field(0.08, description="rad per m of ‖∇J‖/Ω_t; the paper has 0.05 of its own gradient")
     arrived: Positive = Field(0.3, description="‖∇J‖ below which the vehicle is there and its sense is free")
 
 
 class ApproachAngleConfig(Potential):
-    """The field of approach angles, Sec. III-C.2. Its distances are squares of angles, rad²."""
+    """Field of approach angles, Sec. III-D.2.
+
+    Its distances are squares of angles, rad².
+    """
 
     gain: Positive = Field(2.0, description="K of the angles")
     d_min: Positive = Field(0.01, description="rad²: the field is clamped there")
@@ -162,7 +174,7 @@ class ApproachAngleConfig(Potential):
 
 
 class HeadingConfig(Settings):
-    """What yaw may be asked of the vehicle, and how eagerly."""
+    """Limits of the yaw that is asked of the vehicle, and the weight of its effort."""
 
     rate_max: Positive = Field(3.0, description="rad/s")
     acceleration_max: Positive = Field(
@@ -173,4 +185,7 @@ class HeadingConfig(Settings):
 
 
 FADING = 1.0
-"""m over which the force fades out beyond ``reach``, behind, and towards the target, which has no bearing."""
+"""Distance (m) over which a force fades out: beyond ``reach``, behind, and near the target.
+
+At the target there is no bearing.
+"""

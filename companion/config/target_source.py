@@ -1,7 +1,7 @@
-"""Settings: what tells where the target is. One kind counts, so that two that tell of the same target never
-pull one track to and fro.
+"""Settings of the source of the target's position.
 
-All come by the target link, which may be a log; what the own vehicle's camera tracks comes by the autopilot's
+Only one kind counts, so that two sources of the same target never pull one track to and fro. All kinds arrive
+on the target link, which may be a log; what the own vehicle's camera tracks arrives on the autopilot's link,
 too. All go through the same track, with its gates: ``CompanionConfig.target``.
 """
 
@@ -29,7 +29,7 @@ class GlobalPositionSource(_Sender):
 
 
 class FollowTargetSource(_Sender):
-    """FOLLOW_TARGET, as phones and ground stations send it; its velocity is used where it has one."""
+    """FOLLOW_TARGET, as sent by phones and ground stations; its velocity is used where it has one."""
 
     kind: Literal["follow_target"]
 
@@ -44,7 +44,7 @@ class CameraSource(Settings):
 
 
 class FixedSource(Settings):
-    """A place that stays where it is; nobody tells."""
+    """Place that stays where it is, without messages."""
 
     kind: Literal["fixed"]
     at: tuple[_Coordinate, _Coordinate, _Coordinate] = Field(description="m, fleet-local ENU")
@@ -56,13 +56,15 @@ TargetSource = Annotated[
 
 
 def message_of(source: TargetSource) -> int | None:
-    """The id of the message that counts."""
+    """Return the id of the MAVLink message that is used; None for a fixed place."""
     return {"global_position": 33, "follow_target": 144, "camera": 276}.get(source.kind)
 
 
 def speaker_of(source: TargetSource, system: int, target: int) -> int | None:
-    """The system id that is believed for the companion of ``system`` with a ``target`` of that id; None:
-    any."""
+    """Return the system id whose messages count for the companion of ``system``; None for any.
+
+    ``target`` is the system id of its target.
+    """
     if isinstance(source, CameraSource):
         return system if source.system is None else source.system
     return None if isinstance(source, _Sender) and source.anyone else target

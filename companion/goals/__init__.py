@@ -1,1 +1,1 @@
-"""Goals of a vehicle: takes the world view and the phase of the flight, gives the aim and the yaw of a plan."""
+"""Goals of a vehicle: takes the world view and the phase of the flight, gives the aim and yaw of a plan."""

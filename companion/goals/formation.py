@@ -38,9 +38,10 @@ def even_turn(own: Array, others: Array) -> float:
 
 
 def outside(offset: Array, turn: float) -> Array:
-    """Return a destination ``offset`` (3,) from the target moved outward for a vehicle with ``turn`` (rad) to go.
+    """Return the destination ``offset`` (3,) from the target, moved outward.
 
-    Further out, the vehicle's way round does not lead through the places of the others.
+    This is for a vehicle that still has to go round by ``turn`` (rad): further out, its way does not lead
+    through the places of the others.
     """
     out = min(max(abs(turn) - _ROUND, 0.0), 1.0) * _OUTSIDE
     size = float(np.hypot(offset[0], offset[1]))

@@ -31,7 +31,7 @@ _NOBODY.flags.writeable = False
 
 
 class Flight(Protocol):
-    """The state of the flight, as far as goals depend on it."""
+    """State of the flight, as far as goals depend on it."""
 
     @property
     def phase(self) -> Phase:
@@ -164,9 +164,9 @@ class Goals:
         return Aim(end + offset, velocity, target.position, end, surface)
 
     def _turn(self, offset: Array, mates: Array) -> float:
-        """Return the angle (rad) by which to go round, from ``offset`` (3,) to the place among ``mates`` (M, 3).
+        """Return the angle (rad) by which to go round, from ``offset`` (3,) from the target, m.
 
-        Both are offsets from the target, m.
+        It leads towards the vehicle's place among ``mates`` (M, 3), also offsets from the target.
         """
         formation = self._config.formation
         if not isinstance(formation, Spread) or not len(mates):
@@ -185,10 +185,10 @@ class Goals:
         return self._held
 
     def _way_back(self, now: int, measured: Motion) -> Array:
-        """Return the place (3,) above the start, at the height of the order to return plus the vehicle's lane.
+        """Return the place (3,), m, to return to: above the start.
 
-        It is clipped to the box. The pilot receives a report when the vehicle is there, or when it is beside
-        the place and comes no nearer.
+        Its height is the one at the order to return plus the vehicle's lane. It is clipped to the box. The
+        pilot receives a report when the vehicle is there, or when it is beside the place and comes no nearer.
         """
         start = self._pilot.start
         if start is None:

@@ -59,7 +59,7 @@ class Settling:
         return int(np.argmin(distance))
 
     def _waits(self, now: int, positions: Array) -> bool:
-        """Return whether an obstacle at ``positions`` (N + 1, 3) passes, and has not been waited for too long."""
+        """Return whether an obstacle at ``positions`` (N + 1, 3) passes and may still be waited for."""
         way = positions[-1, :2] - positions[0, :2]
         if float(np.hypot(way[0], way[1])) < _PASSES:
             self._waiting_since = None

@@ -45,7 +45,7 @@ class Parametric(Settings):
         return self
 
     def nearest(self, offset: Array) -> Array:
-        """Return the nearest points by search: on a grid, and then on finer and finer grids around its best point."""
+        """Return the nearest points by search: on a grid, then on finer and finer grids around the best."""
         flat = offset.reshape(-1, 3)
         return np.array([self._nearest(one) for one in flat]).reshape(offset.shape)
 

@@ -29,7 +29,10 @@ class Sphere(Settings):
         return self
 
     def nearest(self, offset: Array) -> Array:
-        """Return the points in the direction from the centre; where they are below ``lowest``, those on its circle."""
+        """Return the points in the direction from the centre.
+
+        Where that point is below ``lowest``, it is the one on the circle at that height.
+        """
         away = offset - (0.0, 0.0, self.height)
         distance = np.linalg.norm(away, axis=-1, keepdims=True)
         # From the centre all points are equally near; straight up is free of other vehicles.

@@ -146,9 +146,9 @@ class HorizonTable:
         self._fresh.clear()
 
     def positions(self, senders: Sequence[int], start: int, oldest: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Return positions (M, steps, 3), m, of ``senders`` at ``start + n·dt``, and which of them are valid (M,).
+        """Return positions (M, steps, 3), m, of ``senders`` at ``start + n·dt``, and a mask (M,).
 
-        A position is valid if its horizon was not made before ``oldest`` (µs); the other rows mean nothing.
+        The mask is true for horizons made at ``oldest`` (µs) or later; the other rows mean nothing.
         """
         rows = self._rows_of(senders)
         if not self._rows:
@@ -158,7 +158,7 @@ class HorizonTable:
         return self._sampled(rows, (start - epochs)[:, None] + self._ahead), known
 
     def at(self, senders: Sequence[int], times: NDArray[np.int64]) -> Located:
-        """Return the positions of ``senders`` (M,) by their plans, each at its own one of ``times`` (M,), µs."""
+        """Return the positions of ``senders`` (M,) by their plans, each at its own of ``times`` (M,), µs."""
         rows = self._rows_of(senders)
         if not self._rows:
             none = np.full(len(senders), _NEVER)
@@ -168,10 +168,11 @@ class HorizonTable:
         return Located(positions, np.where(rows >= 0, after, _NEVER), self._dts[rows])
 
     def accelerations(self, senders: Sequence[int], times: NDArray[np.int64]) -> Array:
-        """Return the planned accelerations (M, 3), m/s², of ``senders``, each at its own one of ``times`` (M,), µs.
+        """Return the planned accelerations (M, 3), m/s², of ``senders`` (M,).
 
-        They are zero after the plan and without one. Before the plan they are those of its beginning: a plan
-        comes with the state that it begins at, and that state may be dated slightly earlier.
+        Each is taken at its own of ``times`` (M,), µs. They are zero after the plan and without one. Before
+        the plan they are those of its beginning: a plan comes with the state that it begins at, and that
+        state may be dated slightly earlier.
         """
         rows = self._rows_of(senders)
         if not self._rows:

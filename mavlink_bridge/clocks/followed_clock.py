@@ -27,7 +27,7 @@ _PIECE: Final = 250_000
 _MEMORY: Final = 24
 """Number of pieces that are kept: six seconds."""
 _ENOUGH: Final = 4
-"""Number of pieces from which a rate can be estimated."""
+"""Least number of pieces for an estimate of the rate."""
 _STEP: Final = 500_000
 """Deviation from the line (µs of wall time) that shows that the clock was set, stopped or restarted."""
 _STALL: Final = 50_000

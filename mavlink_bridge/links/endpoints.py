@@ -47,7 +47,7 @@ def _address(host: str, port: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class UdpIn:
-    """Bind to ``host``, ``port`` (0: a free one of the system's choice).
+    """UDP socket bound to ``host``, ``port`` (0: a free one of the system's choice).
 
     ``peer``: host and port of a peer that is sent everything before it has sent anything itself, as
     autopilots do with a ground station.
@@ -64,7 +64,7 @@ class UdpIn:
 
 @dataclass(frozen=True, slots=True)
 class UdpOut:
-    """Send to ``host``, ``port``, and receive only from there."""
+    """UDP socket that sends to ``host``, ``port``, and receives only from there."""
 
     host: str
     port: int
@@ -88,7 +88,7 @@ class Multicast:
 
 @dataclass(frozen=True, slots=True)
 class TcpOut:
-    """Connect to ``host``, ``port``; again when the connection breaks."""
+    """TCP client of ``host``, ``port``, which reconnects when the connection breaks."""
 
     host: str
     port: int
@@ -99,7 +99,7 @@ class TcpOut:
 
 @dataclass(frozen=True, slots=True)
 class TcpIn:
-    """Listen on ``host``, ``port`` (0: a free one of the system's choice)."""
+    """TCP server on ``host``, ``port`` (0: a free one of the system's choice)."""
 
     host: str
     port: int

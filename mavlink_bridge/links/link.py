@@ -16,7 +16,10 @@ WAITING = 4096
 
 
 class LinkCounters(NamedTuple):
-    """``received`` and ``sent`` datagrams; ``dropped``: datagrams to send that no peer could take."""
+    """Counters of a link.
+
+    ``received`` and ``sent`` datagrams; ``dropped``: datagrams to send that no peer could take.
+    """
 
     received: int
     sent: int
@@ -34,7 +37,7 @@ class Link(Protocol):
 
     @property
     def counters(self) -> LinkCounters:
-        """Counts since the link was opened."""
+        """Counters since the link was opened."""
         ...
 
     def fileno(self) -> int | None:

@@ -102,7 +102,7 @@ class UdpListener(_Udp):
     not answered: otherwise a sender with many ports could take the stream away from all others.
 
     This matches pymavlink and differs from mavlink-router's server mode, which answers the last peer only:
-    with two peers (an autopilot's two ports, a ground station beside a script) each would then see half of
+    with two peers (an autopilot's two ports, a ground station and a script) each would then receive half of
     the stream. The endpoint's own peer, if it has one, is always sent everything.
     """
 

@@ -106,7 +106,7 @@ class _Queue:
             self.overruns += 1
 
     def handful(self) -> list[Datagram]:
-        """Remove and return the oldest datagram and all that fit beside it."""
+        """Remove and return the oldest datagram, and further ones within the limits."""
         found: list[Datagram] = []
         room = HANDFUL
         while self._waiting and len(found) < FINGERS and (len(self._waiting[0].data) <= room or not found):

@@ -126,8 +126,8 @@ class LockStep:
     def freeze(self, name: str) -> None:
         """Suspend node ``name``: it is not stepped, and what arrives for it waits in its buffer.
 
-        When the buffer is full, the newest datagrams are dropped. The node's clock continues. Raises
-        ScheduleError for an unknown name.
+        When the buffer is full, new datagrams are dropped. The node's clock continues. Raises ScheduleError
+        for an unknown name.
         """
         self._index_of(name)
         self._hanging.setdefault(name, self._buffer)

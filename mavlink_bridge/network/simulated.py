@@ -202,8 +202,8 @@ class Ether:
     def cut(self, channel: str | None, members: Iterable[str], until: int | None = None) -> None:
         """Block all traffic between ``members`` and the others on ``channel`` (None: on any channel).
 
-        The cut lasts from now on until before ``until`` (µs, time of sending; None: until healed). What is
-        under way arrives. Raises BridgeError for a channel or a member that does not exist.
+        The cut lasts from now on until before ``until`` (µs, time of sending; None: until healed). Datagrams
+        under way still arrive. Raises BridgeError for a channel or a member that does not exist.
         """
         inside = frozenset(members)
         if channel is not None and channel not in self._names:

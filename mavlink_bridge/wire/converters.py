@@ -29,9 +29,9 @@ from mavlink_bridge.wire.fields.units import Fields, unchanged
 class Converter(NamedTuple):
     """Conversion of one message to its payload and back.
 
-    ``decode`` builds a message from the fields in wire order, or returns None if they are absurd; ``encode``
-    is the reverse. ``finite``: a NaN or infinity anywhere is an error (state messages); otherwise it has a
-    meaning and is kept (commands). ``size_v1``: payload bytes without extension fields.
+    ``decode`` builds a message from the fields in wire order, or returns None if a field is invalid;
+    ``encode`` is the reverse. ``finite``: a NaN or infinity anywhere is an error (state messages); otherwise
+    it has a meaning and is kept (commands). ``size_v1``: payload bytes without extension fields.
     """
 
     message: type[m.Message]

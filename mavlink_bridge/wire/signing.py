@@ -65,9 +65,9 @@ class Signing:
     def present(self, unix: int) -> None:
         """Set the current time to ``unix`` (µs).
 
-        A node that does not know the time may count from any instant before 2015. From the first call on, a
-        new stream is refused if it is older than that call: its frames may have been recorded for replay
-        after a restart.
+        A node without the time of day may count from any instant before 2015. From the first call on, a new
+        stream is refused if it is older than that call: its frames may have been recorded for replay after a
+        restart.
         """
         stamp = (unix - EPOCH) // UNIT
         if stamp > self.newest:

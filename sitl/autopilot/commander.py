@@ -127,7 +127,7 @@ class Commander:
     def fail_safe(self, mode: Mode, now: int) -> None:
         """Change to ``mode`` as a failsafe.
 
-        Ignored on the ground, and while a mode at least as severe is active. Without a position it lands
+        Ignored while disarmed, on the ground, or in a mode at least as severe. Without a position it lands
         instead.
         """
         if not self.armed or self.landed or _GRAVITY.get(mode, 0) <= _GRAVITY.get(self.mode, 0):

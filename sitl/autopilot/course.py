@@ -130,8 +130,8 @@ class Level(NamedTuple):
 
         Height and heading are kept; otherwise the vehicle flies level in terms of its estimate, and so drifts
         with the air. Without an error to correct, the controller would cancel only drag and the force that it
-        has learnt. The resulting acceleration of the vehicle must not turn the thrust: jerk and snap cancel
-        the controller's response to an acceleration that was not requested.
+        has estimated; the acceleration offsets both. The resulting motion of the vehicle must not turn the
+        thrust: jerk and snap cancel the controller's response to an acceleration that was not requested.
         """
         shifted = believed(reference, off)
         position, velocity = shifted.position.copy(), shifted.velocity.copy()

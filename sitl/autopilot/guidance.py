@@ -1,7 +1,8 @@
 """Guidance: the current activity as a reference to track (stand, take off, follow set-points, hold, land).
 
 All values are in the vehicle's own local NED. Every motion passes the shaper, so that none begins with a
-step, and then, if the configuration says so, a model of a firmware's response.
+step, and then, if so configured, a model of a firmware's response. With such a response, set-points that give
+a position on all axes bypass the shaper, because the firmware's own position controller takes them unshaped.
 """
 
 from __future__ import annotations
@@ -147,7 +148,7 @@ class Guidance:
         self._begin(Activity.TRACK, setpoint)
         if self._chased:
             return
-        # A trajectory takes effect at once, not at the end of the next step.
+        # A trajectory that the shaper passes through takes effect at once, not at the end of the next step.
         self._shaper.advance(self.wanted(now), self._limits[Activity.TRACK], 0.0)
 
     def hasten(self, speed: float) -> None:

@@ -1,0 +1,1 @@
+"""Settings of an emulated autopilot: they take plain values and give checked, frozen models."""

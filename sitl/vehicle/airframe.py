@@ -61,7 +61,7 @@ class Airframe(NamedTuple):
     weightless: float  # N, ‖A‖ below which A has no direction
     min_lift: float  # N, all rotors
     max_lift: float  # N, all rotors
-    force_learnt: float  # part of a force not yet learnt that the observer learns in a step
+    force_learnt: float  # share of the remaining force error that the observer corrects in a step
     moment_learnt: float
     max_disturbance_force: float  # N
     max_disturbance_moment: FloatArray  # (3,) N m

@@ -1,4 +1,4 @@
-"""Allocation: the wrench that the controller wants → the speed of each rotor, within what rotors can do."""
+"""Allocation: the controller's wrench → the speed of each rotor, within the rotors' limits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def effectiveness(rotor_x: FloatArray, rotor_y: FloatArray, rotor_spin: FloatArray, k_m: float) -> FloatArray:
-    """The (4, n) matrix from rotor thrusts (N) to total thrust (N) and moments about FRD (N m).
+    """Return the (4, n) matrix from rotor thrusts (N) to total thrust (N) and moments about FRD (N m).
 
     Arms (n,) in metres; spin (n,) is +1 for a rotor that turns counter-clockwise seen from above, whose drag
     torque turns the body clockwise, to positive yaw. ``k_m`` is drag torque over thrust (m).
@@ -26,7 +26,10 @@ def effectiveness(rotor_x: FloatArray, rotor_y: FloatArray, rotor_spin: FloatArr
 
 @kernel
 def _collective_range(rotor_thrusts: FloatArray, airframe: Airframe) -> tuple[float, float]:
-    """The total thrusts (N) that keep every rotor within its limits when added to the given thrusts."""
+    """Return the limits of the total thrust (N) that can be added to the given thrusts.
+
+    Within them every rotor stays within its own limits.
+    """
     low, high = -math.inf, math.inf
     for i in range(airframe.rotor_x.size):
         thrust, rotors = at(rotor_thrusts, i), airframe.rotor_share[i]
@@ -37,7 +40,7 @@ def _collective_range(rotor_thrusts: FloatArray, airframe: Airframe) -> tuple[fl
 
 @kernel
 def _feasible_tilting(tilting: FloatArray, airframe: Airframe) -> float:
-    """The largest part (0…1) of roll and pitch that leaves some total thrust within all limits."""
+    """Return the largest part (0…1) of roll and pitch that leaves some total thrust within all limits."""
     part = 1.0
     for i in range(airframe.rotor_x.size):
         for j in range(airframe.rotor_x.size):
@@ -50,7 +53,7 @@ def _feasible_tilting(tilting: FloatArray, airframe: Airframe) -> float:
 
 @kernel
 def _feasible_turning(rotor_thrusts: FloatArray, yaw_moment: float, airframe: Airframe) -> float:
-    """The largest part (0…1) of a yaw moment (N m) for which the rotors have room."""
+    """Return the largest part (0…1) of a yaw moment (N m) that the rotors can still produce."""
     part, excess = 1.0, 0.0
     for i in range(airframe.rotor_x.size):
         turning = airframe.mixer[i, 3] * yaw_moment
@@ -68,9 +71,9 @@ def _feasible_turning(rotor_thrusts: FloatArray, yaw_moment: float, airframe: Ai
 def allocate(thrust: float, moment: Vector, airframe: Airframe, commanded: FloatArray) -> None:
     """Write the rotor speeds (n,) (rad/s) that give ``thrust`` (N, along −b3) and ``moment`` (N m, body).
 
-    The least-squares solution by the pseudo-inverse. When a rotor would leave its limits, yaw gives way
-    first, then the total thrust, and roll and pitch, which hold the vehicle up, only when no total thrust can
-    carry them.
+    This is the least-squares solution by the pseudo-inverse. If a rotor would exceed its limits, yaw is
+    reduced first, then the total thrust. Roll and pitch, which hold the vehicle up, are reduced only if no
+    total thrust is within all limits.
     """
     n = airframe.rotor_x.size
     for i in range(n):
@@ -88,6 +91,6 @@ def allocate(thrust: float, moment: Vector, airframe: Airframe, commanded: Float
     yaw_moment = _feasible_turning(commanded, moment[2], airframe) * moment[2]
     for i in range(n):
         wanted = at(commanded, i) + airframe.mixer[i, 3] * yaw_moment
-        # Rounding may leave a limit by the last bit.
+        # Rounding may exceed a limit by the last bit.
         wanted = greatest(airframe.min_thrust, least(airframe.max_thrust, wanted))
         put(commanded, i, math.sqrt(wanted * airframe.speed_squared))

@@ -1,4 +1,4 @@
-"""The rigid body: Newton and Euler in a flat NED frame, and the split integrator.
+"""Rigid body: Newton and Euler in a flat NED frame, and the split integrator.
 
 Body axes forward, right, down; Hamilton quaternions (w, x, y, z) that take body coordinates to NED; SI.
 """
@@ -24,7 +24,7 @@ Motion = tuple[Vector, Vector, Quaternion, Vector]
 
 @kernel
 def body_axes(q: Quaternion) -> Axes:
-    """The columns of R(q): the body axes in NED."""
+    """Return the columns of R(q): the body axes in NED."""
     w, x, y, z = q
     return (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
@@ -35,7 +35,7 @@ def body_axes(q: Quaternion) -> Axes:
 
 @kernel
 def turned(q: Quaternion, rotation: Vector) -> Quaternion:
-    """q ⊗ exp(rotation / 2): the attitude after a turn about a fixed body axis, rotation vector in rad."""
+    """Return q ⊗ exp(rotation / 2): the attitude after a turn (rad) about a fixed body axis."""
     half = times(0.5, rotation)
     square = dot(half, half)
     c, s = small_cosine_sinc(square)
@@ -56,7 +56,7 @@ def turned(q: Quaternion, rotation: Vector) -> Quaternion:
 
 @kernel
 def normalised(q: Quaternion) -> Quaternion:
-    """q / ‖q‖ for a q that is off by rounding only: one Newton step, without a root."""
+    """Return q / ‖q‖ for a q with rounding errors only: one Newton step, without a root."""
     w, x, y, z = q
     s = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
     return (s * w, s * x, s * y, s * z)
@@ -64,7 +64,7 @@ def normalised(q: Quaternion) -> Quaternion:
 
 @kernel
 def angular_acceleration(rates: Vector, moment: Vector, airframe: Airframe) -> Vector:
-    """J⁻¹(M − Ω×JΩ), Euler's equation: the gyroscopic torque is normal to Ω and does no work."""
+    """Return J⁻¹(M − Ω×JΩ), Euler's equation: the gyroscopic torque is normal to Ω and does no work."""
     J = (airframe.inertia[0], airframe.inertia[1], airframe.inertia[2])
     torque = plus(moment, -1.0, cross(rates, scaled(J, rates)))
     return (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
@@ -72,10 +72,10 @@ def angular_acceleration(rates: Vector, moment: Vector, airframe: Airframe) -> V
 
 @kernel
 def free_flight(motion: Motion, force_body: Vector, moment: Vector, airframe: Airframe) -> Motion:
-    """One physics step under a force (N, body) and a moment (N m, body) that are held, and gravity.
+    """Advance one physics step under constant force (N, body) and moment (N m, body), and gravity.
 
-    The split step, second order: the body rate at the middle of the step, then the exact quaternion
-    exponential of that rate, then the force turned by the attitude of the middle.
+    The split step is of second order: the body rate at the middle of the step, then the exact quaternion
+    exponential of that rate, then the force rotated by the attitude at the middle.
     """
     position, velocity, attitude, rates = motion
     h = airframe.step

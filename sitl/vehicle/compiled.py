@@ -1,8 +1,8 @@
-"""How ``sitl`` compiles its arithmetic: double precision, no fast-math, no reassociation.
+"""Compilation of ``sitl``'s arithmetic: double precision, no fast-math, no reassociation.
 
-A *kernel* is inlined by the function that calls it, for one vehicle or for a block of them (``lanes``).
-Numba's cache on disk watches only the file of the function that it stores, so an *entry* carries a digest of
-every source that its kernels come from: edit one and it is compiled anew.
+A *kernel* is inlined into its caller, for one vehicle or for a block of vehicles (``simd``). Numba's cache on
+disk monitors only the file of the stored function, so an *entry* carries a digest of every source that its
+kernels come from: an edit of one of them forces a new compilation.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ def kernel(function: _F) -> _F:
 
 
 def entry(function: _F) -> _F:
-    """Compile ``function`` at its first call and keep the machine code on disk, where there is room."""
+    """Compile ``function`` at its first call; keep the machine code on disk if numba finds a directory."""
     try:
         return cast(_F, numba.njit(error_model="numpy", cache=True)(function))
-    except RuntimeError:  # numba found no directory for its cache: a read-only image without a home
+    except RuntimeError:  # numba found no directory for its cache, as in a read-only image without a home
         return cast(_F, numba.njit(error_model="numpy")(function))
 
 
 def sources_digest(*names: str) -> int:
-    """A number that changes with the text of these files of the package, for an ``entry``'s closure."""
+    """Return a number that changes with the text of these files, for the closure of an ``entry``."""
     digest = hashlib.sha256()
     for name in names:
         digest.update((Path(__file__).parent / name).read_bytes())

@@ -148,7 +148,7 @@ def desired_force(
 
     A = −k_x e_x − k_v e_v − m g e3 + m ẍ_d + D ẋ_d − d with the known disturbance d (N, NED), and f = −(A − D
     ẋ_d)·b3. D is the cancelled drag: −D v⊥ is −D v and a force along b3, so that the first turns A and the
-    second goes into f. The derivatives use the measured acceleration instead of the paper's modelled one,
+    second is part of f. The derivatives use the measured acceleration instead of the paper's modelled one,
     which would be permanently wrong in a steady wind, and the jerk of the model.
     """
     m, k_x, k_v, D = airframe.mass, airframe.k_x, airframe.k_v, airframe.cancelled_drag

@@ -59,7 +59,7 @@ class VehicleState(NamedTuple):
     body_rates: FloatArray  # (3,) rad/s, FRD
     rotor_speeds: FloatArray  # (n,) rad/s
     acceleration: FloatArray  # (3,) m/s², NED, mean of the last physics step; 0 at rest
-    learnt_force: FloatArray = _ZERO  # (3,) N, NED, learnt disturbance that the controller counters
+    learnt_force: FloatArray = _ZERO  # (3,) N, NED, estimate of wind and faults, which is countered
 
 
 class NotFiniteError(ValueError):

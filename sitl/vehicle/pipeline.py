@@ -1,14 +1,15 @@
-"""Many steps of a vehicle with its controller, or of a block of vehicles side by side (``lanes``):
+"""Compiled simulation steps of a vehicle with its controller, or of a block of vehicles (``simd``).
 
 reference → controller → allocation → rotors → body → ground → observer → position.
 
 Rows are float64. A *state* row has STATE_SIZE + 2 n columns: position 0:3, velocity 3:6 (m, m/s, NED),
 attitude 6:10 (w, x, y, z, body to NED), body rates 10:13 (rad/s, FRD), acceleration 13:16 (m/s², NED) and
-angular acceleration 16:19 (rad/s², FRD), both means of the last step, 19 is 1 when it stands on the ground,
-the disturbance that the controller has learnt, force 20:23 (N, NED) and moment 23:26 (N m, FRD), then the n
-motor speeds (rad/s) and what each of the n rotors has left of its motor's speed (0…1). A *command* row has
+angular acceleration 16:19 (rad/s², FRD), both means of the last step, ground contact 19 (1 if it stands on
+the ground), the estimated disturbance, force 20:23 (N, NED) and moment 23:26 (N m, FRD),
+then the n motor speeds (rad/s) and the n remaining fractions of the motors' speeds (0…1). A *command* row has
 COMMAND_SIZE columns: mode 0, the reference's position, velocity, acceleration, jerk, snap 1:16 (NED), yaw,
-yaw rate and yaw acceleration 16:19, wind 19:22 (m/s, NED, where the air goes), z of the ground 22 (m, NED).
+yaw rate and yaw acceleration 16:19, wind 19:22 (m/s, NED, direction of the air's motion), z of the ground 22
+(m, NED).
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ STOPPED, IDLE, FLYING = 0.0, 1.0, 2.0
 
 @kernel
 def extrapolated(row: FloatArray, t: float) -> Trajectory:
-    """The reference of a command row ``t`` seconds on: its Taylor polynomial with all its derivatives."""
+    """Return the reference of a command row after ``t`` seconds: Taylor polynomial and derivatives."""
     x, v, a = three_at(row, 1), three_at(row, 4), three_at(row, 7)
     j, s = three_at(row, 10), three_at(row, 13)
     return (
@@ -59,7 +60,7 @@ def command_motors(
     airframe: Airframe,
     commanded: FloatArray,
 ) -> None:
-    """Write the rotor speeds (n,) (rad/s) that are asked of the motors ``t`` seconds into a command."""
+    """Write the commanded motor speeds (n,) (rad/s) ``t`` seconds into a command."""
     mode = at(command, 0)
     if some(mode >= FLYING):
         position, velocity, attitude, rates = motion
@@ -96,10 +97,10 @@ def physics_step(
     commanded: FloatArray,
     airframe: Airframe,
 ) -> tuple[Motion, Vector, Vector, Disturbance, float]:
-    """One step with the motors held at ``commanded``; moves the motor ``speeds`` in place.
+    """Advance one step with the motors held at ``commanded``; update the motor ``speeds`` in place.
 
     The rotors' wrench is that of the middle of the step: rotor speeds are exact there, body rates and the
-    velocity through the air are carried there by the accelerations of the last step.
+    velocity through the air are extrapolated with the accelerations of the last step.
     """
     half_step(speeds, commanded, airframe)
     wind = three_at(command, 19)
@@ -136,8 +137,7 @@ def advance(
     commanded: FloatArray,
     track: FloatArray,
 ) -> None:
-    """Carry a state row, or a block, through all ``steps``; ``track`` (3 steps,) gets the position after
-    each."""
+    """Advance a state row, or a block, by ``steps`` steps; ``track`` (3 steps,) receives the positions."""
     attitude = (at(state, 6), at(state, 7), at(state, 8), at(state, 9))
     motion = (three_at(state, 0), three_at(state, 3), attitude, three_at(state, 10))
     acceleration, angular_acceleration = three_at(state, 13), three_at(state, 16)

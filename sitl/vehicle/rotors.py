@@ -1,4 +1,4 @@
-"""Rotors: the lag of the motors, and the wrench of turning rotors in moving air (the RotorS model)."""
+"""Rotors: the lag of the motors, and the wrench of rotors in moving air (the RotorS model)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _AT_REST = 1e-3
 def half_step(speeds: FloatArray, commanded: FloatArray, airframe: Airframe) -> None:
     """Move the motor speeds (n,) (rad/s), in place, by half a physics step towards the commanded ones.
 
-    First-order lag, solved exactly for a held command; spinning up and down have their own time constants. A
-    motor that is told to stop ends at zero instead of creeping through denormal numbers.
+    First-order lag, solved exactly for a held command, with separate time constants for spinning up and down.
+    A motor commanded to stop ends at zero instead of decaying through denormal numbers.
     """
     for i in range(airframe.rotor_x.size):
         wanted = at(commanded, i)
@@ -33,14 +33,13 @@ def half_step(speeds: FloatArray, commanded: FloatArray, airframe: Airframe) -> 
 def wrench(
     speeds: FloatArray, left: FloatArray, air_velocity: Vector, rates: Vector, airframe: Airframe
 ) -> tuple[Vector, Vector, float, Vector]:
-    """Force (N) and moment (N m) on the body, both in body axes, of rotors whose motors turn at ``speeds``
-    (n,) rad/s; and the thrust (N) and the moment (N m, body) that they would have if no rotor had failed and
-    there were no air to slow them.
+    """Return the rotors' force (N) and moment (N m), then thrust and moment without faults and drag.
 
-    ``left`` (n,) is what each rotor has left of its motor's speed (0…1). ``air_velocity`` is that of the
-    centre of mass relative to the air (m/s, body), ``rates`` are the body rates. Each rotor gives a thrust
-    k_f ω² along −b3, its drag torque, a rotor drag −c|ω|v⊥ at the hub and a rolling moment −c_r|ω|v⊥, where
-    v⊥ is the hub's velocity through the air in the plane of the rotor.
+    All are those on the body, in body axes, for motors that turn at ``speeds`` (n,) rad/s. ``left`` (n,) is
+    the remaining fraction of each rotor's speed (0…1). ``air_velocity`` is that of the centre of mass
+    relative to the air (m/s, body), ``rates`` are the body rates. Each rotor gives a thrust k_f ω² along −b3,
+    its drag torque, a rotor drag −c|ω|v⊥ at the hub and a rolling moment −c_r|ω|v⊥, where v⊥ is the hub's
+    velocity through the air in the plane of the rotor.
     """
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     sound, sound_moment = 0.0, (0.0, 0.0, 0.0)

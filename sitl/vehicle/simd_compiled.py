@@ -3,7 +3,7 @@
 Every lowering is one instruction of LLVM on the whole vector, or a load or a store. Importing this module
 registers it with numba; its names are private.
 """
-# numba has no types, and hands over more than a lowering needs:
+# numba has no types, and passes more arguments than a lowering needs:
 # mypy: allow-untyped-calls, allow-untyped-decorators, allow-subclassing-any
 # ruff: noqa: ARG001
 

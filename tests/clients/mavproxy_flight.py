@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from mavproxy_console import PATIENCE, MavProxy
+from tests.clients.mavproxy_console import PATIENCE, MavProxy
 
 HEIGHT: Final = 5.0
 GOAL: Final = (47.397790, 8.545640, 7.0)

@@ -13,8 +13,9 @@ from contextlib import ExitStack
 from typing import Any
 
 import pytest
-from client_rig import Client, Flight, available, python
-from sitl_process import Sitl, free_port
+
+from tests.clients.client_rig import Client, Flight, available, python
+from tests.clients.sitl_process import Sitl, free_port
 
 pytestmark = pytest.mark.slow
 

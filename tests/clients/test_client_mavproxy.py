@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
-from client_rig import python
-from mavproxy_console import MavProxy
-from mavproxy_flight import GOAL, HEIGHT, MavProxyFlight, MavProxySwarm
-from sitl_process import Sitl
+
+from tests.clients.client_rig import python
+from tests.clients.mavproxy_console import MavProxy
+from tests.clients.mavproxy_flight import GOAL, HEIGHT, MavProxyFlight, MavProxySwarm
+from tests.clients.sitl_process import Sitl
 
 pytestmark = pytest.mark.slow
 

@@ -7,8 +7,9 @@ from contextlib import ExitStack
 from itertools import product
 
 import pytest
-from client_rig import Client, Flight, python
-from sitl_process import Sitl, free_port
+
+from tests.clients.client_rig import Client, Flight, python
+from tests.clients.sitl_process import Sitl, free_port
 
 pytestmark = pytest.mark.slow
 

@@ -1,4 +1,4 @@
-"""docs/paper.md has a row for every equation and figure of the paper, and names symbols that exist and say so."""
+"""docs/paper.md has a row for every equation and figure, and names symbols whose docstrings agree."""
 
 from __future__ import annotations
 

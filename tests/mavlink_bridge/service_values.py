@@ -6,7 +6,10 @@ import math
 from typing import Any
 
 from hypothesis import strategies as st
-from wire_values import (
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.key import Key
+from tests.mavlink_bridge.wire_values import (
     boot,
     f32,
     latitude,
@@ -23,9 +26,6 @@ from wire_values import (
     vector,
     yaw,
 )
-
-from mavlink_bridge import messages as m
-from mavlink_bridge.key import Key
 
 four = st.tuples(f32, f32, f32, f32)
 name = st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=16)

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from said import Ended, Run
 
 from outrider.__main__ import main
 from outrider.terminal import progress_lines
+from tests.outrider.said import Ended, Run
 
 
 @pytest.fixture(autouse=True)

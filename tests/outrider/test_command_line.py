@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from said import Ended, Run
-from shipped import LOGS, SCENARIOS
 
 from outrider.errors import InputError, OutriderError
 from outrider.simulation.flight import Flight
 from outrider.swarm import command as swarm
+from tests.outrider.said import Ended, Run
+from tests.outrider.shipped import LOGS, SCENARIOS
 
 ANTIPODAL, ESCORT = SCENARIOS["antipodal-8"].read_text(), SCENARIOS["escort"].read_text()
 

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from shipped import FIREFLY, scenario
 
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import OutriderError
@@ -16,6 +15,7 @@ from outrider.interruption import Came, insisted, interruptible, noted
 from outrider.simulation.conductor import Stage
 from outrider.simulation.preparation import Prepared
 from outrider.swarm.command import fly
+from tests.outrider.shipped import FIREFLY, scenario
 
 
 @pytest.mark.usefixtures("ctrl_c")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from said import Run
 
 from mavlink_bridge.key import read_key
 from outrider.errors import InputError
 from outrider.key_files import key_of
+from tests.outrider.said import Run
 
 
 def test_a_key_is_made_once_and_never_shown(run: Run, tmp_path: Path) -> None:

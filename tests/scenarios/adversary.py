@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
-from single_vehicle import BOOT, SITE, SYSTEM, TICK, SingleVehicle
 
 from companion.values.horizon import Array
 from companion.values.phase import Phase
@@ -16,6 +15,7 @@ from mavlink_bridge.messages import GlobalPosition, SetpointLocal, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from outrider.resources import find
+from tests.scenarios.single_vehicle import BOOT, SITE, SYSTEM, TICK, SingleVehicle
 
 Place = Callable[[float, Array, np.random.Generator], Array]
 """Where it says that it is (3,), m ENU: after so many seconds, and of a victim at a place (3,)."""

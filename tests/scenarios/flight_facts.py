@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from lockstep_flights import Flown
 
 from mavlink_bridge.messages import Message
 from mavlink_bridge.tlog.log import read_tlog
@@ -16,6 +15,7 @@ from mavlink_bridge.wire.codec import Codec
 from outrider.runs.ground_truth import Samples
 from outrider.runs.names import LINK_NUMBERS
 from outrider.simulation.conductor import SLOW, Stage
+from tests.scenarios.lockstep_flights import Flown
 
 
 class Heard(NamedTuple):

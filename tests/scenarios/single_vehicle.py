@@ -8,7 +8,6 @@ from itertools import count
 from typing import Any, TypeVar
 
 import numpy as np
-from lockstep_flights import FIREFLY
 
 from companion.config import CompanionConfig
 from companion.node import Companion
@@ -28,6 +27,7 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
+from tests.scenarios.lockstep_flights import FIREFLY
 
 SITE = FleetFrame(47.397742, 8.545594, 488.0)
 SYSTEM, TARGET, TICK = 11, 100, 10_000

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from adversary import ADVERSARIES, Pressed, descending, press, shipped
-from single_vehicle import SingleVehicle
+
+from tests.scenarios.adversary import ADVERSARIES, Pressed, descending, press, shipped
+from tests.scenarios.single_vehicle import SingleVehicle
 
 PLAIN: dict[str, Any] = {"rates": {"replan_us": 50_000}}
 SETTINGS: dict[str, dict[str, Any]] = {

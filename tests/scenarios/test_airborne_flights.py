@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flight_facts import check_told, clock, log
-from lockstep_flights import Flown, check, fly, scenario, setpoints
 
 from companion.flight.command_protocol import DO_SET_MODE
 from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
@@ -21,6 +19,8 @@ from outrider.runs.names import LINK_NUMBERS
 from outrider.runs.summary import exit_status
 from outrider.simulation.flight import EPOCH
 from sitl.autopilot.firmware import Mode
+from tests.scenarios.flight_facts import check_told, clock, log
+from tests.scenarios.lockstep_flights import Flown, check, fly, scenario, setpoints
 
 PAIR: dict[str, Any] = {
     "vehicles": 2,

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flight_facts import check_told, clock
-from lockstep_flights import fly, scenario
 
 from mavlink_bridge.messages import GlobalPosition, Tunnel
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.runs.summary import exit_status
 from outrider.simulation.bystander import Bystander
+from tests.scenarios.flight_facts import check_told, clock
+from tests.scenarios.lockstep_flights import fly, scenario
 
 SHORT = {"airborne": True, "cap_s": 8.0, "sensors": "truth"}
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from single_vehicle import SITE, SYSTEM, SingleVehicle
 
 from companion.config import CompanionConfig
 from companion.obstacles.neighbours import Neighbours
 from mavlink_bridge.messages import GlobalPosition, Source, StatusText, Tunnel
 from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE, unpack
+from tests.scenarios.single_vehicle import SITE, SYSTEM, SingleVehicle
 
 
 def told(vehicle):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lockstep_flights import Flown, check, fly, scenario, setpoints
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega
 
@@ -14,6 +13,7 @@ from mavlink_bridge.wire.codec import Codec
 from outrider.runs.names import LINK_NUMBERS
 from outrider.scenarios.scenario import TARGET_SYSTEM
 from outrider.simulation.flight import EPOCH
+from tests.scenarios.lockstep_flights import Flown, check, fly, scenario, setpoints
 
 OPERATOR = 255
 LINKS = {number: name for name, number in LINK_NUMBERS.items()}

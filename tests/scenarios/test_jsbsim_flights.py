@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from lockstep_flights import scenario
 
 from outrider.resources import find
 from outrider.simulation.preparation import Prepared, measure
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
+from tests.scenarios.lockstep_flights import scenario
 
 pytestmark = pytest.mark.slow
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lockstep_flights import fly, scenario
 
 from outrider.simulation import conductor
 from outrider.simulation.conductor import Stage
 from outrider.simulation.flight import Flight
 from outrider.simulation.operator import Operator
+from tests.scenarios.lockstep_flights import fly, scenario
 
 
 def test_who_hovers_above_a_landed_vehicle_lands_beside_it(

@@ -8,7 +8,6 @@ from struct import pack
 
 import numpy as np
 import pytest
-from single_vehicle import LAND, OPERATOR, SITE, SYSTEM, TAKEOFF, TARGET, SingleVehicle
 
 from companion.dry_run import DryRun
 from companion.flight.readiness import OPERATORS_GO
@@ -28,6 +27,7 @@ from outrider.resources import find
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.supervision.supervised_node import Cockpit
 from outrider.yaml_files.yaml_file import load
+from tests.scenarios.single_vehicle import LAND, OPERATOR, SITE, SYSTEM, TAKEOFF, TARGET, SingleVehicle
 
 FLAVOURS = ("ardupilot", "px4")
 REPOSITION = 192

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lockstep_flights import Flown, check, fly, scenario
 
 from outrider.runs.figures import draw
 from outrider.runs.summary import exit_status
 from outrider.simulation import conductor
+from tests.scenarios.lockstep_flights import Flown, check, fly, scenario
 
 POOR = {"loss": 0.2, "delay_ms": 100.0, "jitter_ms": 50.0, "duplication": 0.1, "reordering": 0.1}
 

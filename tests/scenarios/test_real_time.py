@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lockstep_flights import FIREFLY, scenario, setpoints
 
 from mavlink_bridge.messages import GlobalPosition, Tunnel
 from mavlink_bridge.tlog.log import read_tlog
@@ -27,6 +26,7 @@ from outrider.scene.datagram_channel import Line, pair
 from outrider.scene.snapshot import Moment
 from outrider.scene.view_commands import Wishes, encoded
 from outrider.simulation.conductor import Stage
+from tests.scenarios.lockstep_flights import FIREFLY, scenario, setpoints
 
 LOGS = config_root() / "logs"
 SMALL: dict[str, Any] = {

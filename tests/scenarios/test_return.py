@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from single_vehicle import LAND, RETURN, SingleVehicle
-from test_slow_clock import go_to
 
 from companion.values.phase import Phase
+from tests.scenarios.single_vehicle import LAND, RETURN, SingleVehicle
+from tests.scenarios.test_slow_clock import go_to
 
 
 def far_off(flavour, **settings):

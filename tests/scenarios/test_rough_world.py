@@ -15,8 +15,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flight_facts import arrived, check_told, clock, figure, log, spoke
-from lockstep_flights import Flown, fly, scenario
 
 from companion.values.phase import Phase
 from mavlink_bridge.messages import SetpointLocal, StatusText, Tunnel
@@ -24,6 +22,8 @@ from outrider.runs.names import LINK_NUMBERS
 from outrider.runs.summary import exit_status
 from outrider.simulation.conductor import NEAR
 from sitl.autopilot.firmware import Mode
+from tests.scenarios.flight_facts import arrived, check_told, clock, figure, log, spoke
+from tests.scenarios.lockstep_flights import Flown, fly, scenario
 
 STRUCK = 12
 K = 1

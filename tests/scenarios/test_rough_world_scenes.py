@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flight_facts import arrived, check_told, clock, log
-from lockstep_flights import FIREFLY, Flown, check, fly, scenario
 
 from companion.obstacles.static import FixedObstacles
 from mavlink_bridge.messages import GlobalPosition
 from outrider.runs.formation_error import standoff
 from outrider.runs.names import LINK_NUMBERS
 from outrider.runs.summary import exit_status
+from tests.scenarios.flight_facts import arrived, check_told, clock, log
+from tests.scenarios.lockstep_flights import FIREFLY, Flown, check, fly, scenario
 
 BLOCKED: dict[str, Any] = {
     "vehicles": 3,

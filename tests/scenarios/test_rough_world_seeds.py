@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flight_facts import check_told, clock
-from lockstep_flights import Flown, fly, scenario
 
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.runs.summary import WALL_FIELDS
+from tests.scenarios.flight_facts import check_told, clock
+from tests.scenarios.lockstep_flights import Flown, fly, scenario
 
 CHANGES: dict[str, Any] = {
     "vehicles": 3,

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flight_facts import arrived, check_told, clock, figure
-from lockstep_flights import fly, scenario
 
 from outrider.runs.summary import exit_status
 from outrider.simulation.conductor import NEAR
 from sitl.estimation.profiles import PROFILES
+from tests.scenarios.flight_facts import arrived, check_told, clock, figure
+from tests.scenarios.lockstep_flights import fly, scenario
 
 LANES = {
     "vehicles": 2,

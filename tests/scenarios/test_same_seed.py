@@ -4,9 +4,9 @@ another."""
 from __future__ import annotations
 
 import pytest
-from lockstep_flights import Flown, check, fly, scenario
 
 from outrider.runs.summary import WALL_FIELDS, Value
+from tests.scenarios.lockstep_flights import Flown, check, fly, scenario
 
 OF = scenario(
     "antipodal-8",

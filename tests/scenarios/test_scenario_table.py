@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lockstep_flights import check, fly, scenario
+
+from tests.scenarios.lockstep_flights import check, fly, scenario
 
 
 @dataclass(frozen=True)

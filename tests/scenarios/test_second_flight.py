@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from single_vehicle import LAND, MODE, OPERATOR, SYSTEM, SingleVehicle
 
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandLong, SetpointLocal, SysStatus
 from sitl.autopilot.firmware import Mode
+from tests.scenarios.single_vehicle import LAND, MODE, OPERATOR, SYSTEM, SingleVehicle
 
 PREARM = 0x10000000
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from single_vehicle import OPERATOR, RETURN, SITE, SYSTEM, SingleVehicle
 
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandInt, GlobalPosition, Timesync
+from tests.scenarios.single_vehicle import OPERATOR, RETURN, SITE, SYSTEM, SingleVehicle
 
 
 def uneven(rate, stall, every):

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lockstep_flights import fly, setpoints
 
 from outrider.resources import find
 from outrider.scenarios.fly_config import FlyConfig
@@ -15,6 +14,7 @@ from outrider.scenarios.options import Options, apply
 from outrider.scenarios.scenario import Scenario
 from outrider.testing.scenes import merged
 from outrider.yaml_files.yaml_file import load
+from tests.scenarios.lockstep_flights import fly, setpoints
 
 SORTIE = load(find("scenarios", "sortie"), Scenario)
 

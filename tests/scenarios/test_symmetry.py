@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lockstep_flights import FIREFLY, scenario
 from numpy.typing import NDArray
 
 from outrider.resources import config_root
 from outrider.runs.ground_truth import Samples
 from outrider.simulation.flight import Flight
+from tests.scenarios.lockstep_flights import FIREFLY, scenario
 
 Array = NDArray[np.float64]
 

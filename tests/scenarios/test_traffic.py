@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flight_facts import check_told, clock, spoke
-from lockstep_flights import fly, scenario
 
 from outrider.runs.figures import draw
 from outrider.runs.summary import exit_status
+from tests.scenarios.flight_facts import check_told, clock, spoke
+from tests.scenarios.lockstep_flights import fly, scenario
 
 
 @pytest.mark.parametrize(

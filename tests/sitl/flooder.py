@@ -13,7 +13,7 @@ import sys
 import time
 from itertools import cycle
 
-from hostile import RATE, crowd, garbage
+from tests.sitl.hostile import RATE, crowd, garbage
 
 HOST = "127.0.0.1"
 _TURN = 0.02

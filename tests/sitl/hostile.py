@@ -8,7 +8,6 @@ from itertools import cycle
 from random import Random
 from typing import Any
 
-from autopilot_rig import LINK, Rig
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge import messages as m
@@ -17,6 +16,7 @@ from mavlink_bridge.messages import CommandLong, Message, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_TYPE
+from tests.sitl.autopilot_rig import LINK, Rig
 
 RATE = 10_000
 """Messages per second."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from autopilot_rig import SITE
-from outside_client import Client
 from pymavlink.dialects.v20 import all as dialect
+
+from tests.sitl.autopilot_rig import SITE
+from tests.sitl.outside_client import Client
 
 WAYPOINT, LOITER_UNLIM, LOITER_TIME, RTL, LAND, TAKEOFF, DELAY = 16, 17, 19, 20, 21, 22, 93
 JUMP, SPEED = 177, 178

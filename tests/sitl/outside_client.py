@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from autopilot_rig import Rig
 from pymavlink.dialects.v20 import all as dialect
+
+from tests.sitl.autopilot_rig import Rig
 
 ME = (255, 190)
 

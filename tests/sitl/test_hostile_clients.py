@@ -12,12 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from autopilot_rig import FLAVOURS, Rig
-from hostile import ASKED, STRANGER, command, crowd, flood, garbage, heard, orders
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mission_client import LAND, TAKEOFF, at, count, item, upload
-from outside_client import Client
 from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge import messages as m
@@ -26,6 +22,10 @@ from mavlink_bridge.messages import CommandAck, CommandLong, Source
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.packing import LONGEST
 from mavlink_bridge.wire.signing import Refusal, Signing
+from tests.sitl.autopilot_rig import FLAVOURS, Rig
+from tests.sitl.hostile import ASKED, STRANGER, command, crowd, flood, garbage, heard, orders
+from tests.sitl.mission_client import LAND, TAKEOFF, at, count, item, upload
+from tests.sitl.outside_client import Client
 
 ME = Source(255, 190)
 ASK = Codec().encode(CommandLong(ME, 11, 1, 520, 0, (0.0,) * 7))

@@ -17,8 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from autopilot_rig import LINK, Rig
-from hostile import command
 
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.key import Key
@@ -30,6 +28,8 @@ from mavlink_bridge.loops.realtime import RealTime
 from mavlink_bridge.messages import CommandAck, LocalPosition, Source
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
+from tests.sitl.autopilot_rig import LINK, Rig
+from tests.sitl.hostile import command
 
 HOST = "127.0.0.1"
 HERE = Path(__file__).parent

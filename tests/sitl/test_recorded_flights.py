@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from autopilot_rig import FIREFLY
 
 from benchmarks.figure_eight import FIRST, FULL, PVY, SECOND, Part, distances, settings, trajectory, turns
 from benchmarks.recorded_flights import RecordedFlight, Told, fly, read_flight
@@ -19,6 +18,7 @@ from benchmarks.swarm_responses import Deviations, Followed, closest, follow
 from mavlink_bridge.messages import CommandLong, SetpointLocal
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from outrider.errors import InputError
+from tests.sitl.autopilot_rig import FIREFLY
 
 FLIGHTS = Path(__file__).parents[1] / "data" / "flights"
 LOGS = ("copter-full", "copter-pvy", "px4-pvay")

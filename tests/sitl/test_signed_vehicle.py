@@ -6,8 +6,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from autopilot_rig import ARM, FLAVOURS, SET_MODE, TAKEOFF, Rig, setpoint
-from outside_client import Client
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as dialect
 
@@ -15,6 +13,8 @@ from mavlink_bridge.key import Key
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import EPOCH, UNIT, Refusal, Signing
 from sitl.autopilot.saved import Saved
+from tests.sitl.autopilot_rig import ARM, FLAVOURS, SET_MODE, TAKEOFF, Rig, setpoint
+from tests.sitl.outside_client import Client
 
 KEY, OTHER = Key.of_passphrase("correct horse"), Key.of_passphrase("battery staple")
 BOOT = 1_780_000_000_000_000

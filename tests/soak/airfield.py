@@ -9,7 +9,20 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from air_nodes import (
+
+from companion.config import CompanionConfig
+from companion.node import Companion
+from mavlink_bridge.clocks.node_clock import NodeClock
+from mavlink_bridge.key import Key
+from mavlink_bridge.loops.lockstep import LockStep, Scheduled
+from mavlink_bridge.messages import SetpointLocal
+from mavlink_bridge.network.simulated import Channel, Ether, Faults
+from mavlink_bridge.wire.signing import Signing
+from sitl.config.autopilot import AutopilotConfig
+from sitl.environment.weather import WeatherConfig
+from sitl.estimation.profiles import PROFILES
+from sitl.node import Autopilot
+from tests.soak.air_nodes import (
     EPOCH,
     FENCE,
     FIREFLY,
@@ -27,19 +40,6 @@ from air_nodes import (
     Tower,
     Wanderer,
 )
-
-from companion.config import CompanionConfig
-from companion.node import Companion
-from mavlink_bridge.clocks.node_clock import NodeClock
-from mavlink_bridge.key import Key
-from mavlink_bridge.loops.lockstep import LockStep, Scheduled
-from mavlink_bridge.messages import SetpointLocal
-from mavlink_bridge.network.simulated import Channel, Ether, Faults
-from mavlink_bridge.wire.signing import Signing
-from sitl.config.autopilot import AutopilotConfig
-from sitl.environment.weather import WeatherConfig
-from sitl.estimation.profiles import PROFILES
-from sitl.node import Autopilot
 
 CONFIG = CompanionConfig.model_validate(
     {

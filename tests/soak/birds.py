@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from fly_process import FLEET, HOST
-from switch import Switch
-from test_sitl_command import free_base
 
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, SysStatus
 from mavlink_bridge.wire.codec import Codec
+from tests.outrider.fly.process import FLEET, HOST
+from tests.outrider.sitl_server.test_command import free_base
+from tests.soak.switch import Switch
 
 PACE: Final = 0.9
 """By its rate a clock is known for a simulation's, which stands now and then on a busy machine. At 1 it is

@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from campaigns import Mutants, bounded_memory
+
+from tests.soak.campaigns import Mutants, bounded_memory
 
 IN_CI, IN_SOAK, PIECE = 300, 10_000, 500
 

@@ -9,8 +9,6 @@ from random import Random
 from struct import pack as stamp
 from typing import NamedTuple
 
-from recorded_logs import PIECES
-
 from mavlink_bridge import messages as m
 from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
@@ -39,6 +37,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_TYPE, TABLE
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
 from outrider.resources import config_root
+from tests.mavlink_bridge.recorded_logs import PIECES
 
 AUTOPILOT, COMPANION, NEIGHBOUR = Source(11, 1), Source(11, 195), Source(12, 195)
 TARGET, GROUND = Source(1, 1), Source(255, 190)

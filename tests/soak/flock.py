@@ -9,9 +9,9 @@ from pathlib import Path
 from random import Random
 from typing import Final
 
-from birds import Bird
-from switch import Switch
-from trouble import Trouble
+from tests.soak.birds import Bird
+from tests.soak.switch import Switch
+from tests.soak.trouble import Trouble
 
 PATIENCE: Final = 300.0
 """s until a test gives up; what is waited for comes within seconds, on a machine that has nothing else to

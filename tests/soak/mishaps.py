@@ -9,8 +9,6 @@ from random import Random
 from typing import Any, NamedTuple
 
 import numpy as np
-from air_nodes import FENCE, GROUND, Edit
-from airfield import Airfield, Craft
 
 from companion.errors import SolverError
 from mavlink_bridge.messages import (
@@ -28,6 +26,8 @@ from mavlink_bridge.messages import (
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_TYPE
 from mavlink_bridge.wire.framing import frame_v2, leading_frames
+from tests.soak.air_nodes import FENCE, GROUND, Edit
+from tests.soak.airfield import Airfield, Craft
 
 _MODES = {"ardupilot": {"hold": 17, "land": 9, "return": 6}, "px4": {"hold": 4 << 16 | 3 << 24}}
 _MODES["px4"] |= {"land": 4 << 16 | 6 << 24, "return": 4 << 16 | 5 << 24}

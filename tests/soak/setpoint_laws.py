@@ -9,11 +9,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from airfield import CONFIG, Craft
 
 from companion.estimation.tracks import State
 from companion.values.phase import Phase
 from mavlink_bridge.messages import SetpointLocal
+from tests.soak.airfield import CONFIG, Craft
 
 _SINGLE = 1e-4
 _CORRECTED = 0.3

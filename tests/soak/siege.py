@@ -16,11 +16,6 @@ from functools import cache
 from random import Random
 
 import numpy as np
-from air_nodes import EPOCH, FIRST, FLEET, RADIUS, SECOND
-from airfield import CONFIG, Airfield, Craft
-from corpora import absurd_plan, frames, messages
-from damage import WIRE_EDITS, absurd, damaged, framed
-from recorded_logs import PIECES, SHIPPED, WHOLE
 
 from companion.flight.readiness import OPERATORS_GO
 from companion.values.components import COMPONENT
@@ -44,6 +39,11 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_ID
 from mavlink_bridge.wire.framing import leading_frames
 from mavlink_bridge.wire.signing import Signing
+from tests.mavlink_bridge.recorded_logs import PIECES, SHIPPED, WHOLE
+from tests.soak.air_nodes import EPOCH, FIRST, FLEET, RADIUS, SECOND
+from tests.soak.airfield import CONFIG, Airfield, Craft
+from tests.soak.corpora import absurd_plan, frames, messages
+from tests.soak.damage import WIRE_EDITS, absurd, damaged, framed
 
 KEY, OTHER = Key.of_passphrase("correct horse"), Key.of_passphrase("battery staple")
 BOUT, PEACE = 60.0, 40.0

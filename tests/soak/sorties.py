@@ -17,15 +17,15 @@ from random import Random
 from typing import Any, NamedTuple
 
 import numpy as np
-from air_nodes import EPOCH, RADIUS, SECOND
-from airfield import CONFIG, Airfield, Craft
-from mishaps import MISHAPS, NO_PLAN, OLD, UNHEARD, Mishap, Scene
-from setpoint_laws import SetpointLaws
 
 from companion.flight.guard import Holding
 from companion.flight.readiness import OPERATORS_GO
 from companion.values.phase import STEERED, Phase
 from mavlink_bridge.messages import SetpointLocal
+from tests.soak.air_nodes import EPOCH, RADIUS, SECOND
+from tests.soak.airfield import CONFIG, Airfield, Craft
+from tests.soak.mishaps import MISHAPS, NO_PLAN, OLD, UNHEARD, Mishap, Scene
+from tests.soak.setpoint_laws import SetpointLaws
 
 LOOK = 100_000
 D_MIN = 0.5

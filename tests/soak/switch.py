@@ -10,10 +10,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from fly_process import FLEET, HOST
 
 from outrider.simulation.beacon import Beacon
 from outrider.simulation.paths import Motion
+from tests.outrider.fly.process import FLEET, HOST
 
 
 class Switch:

@@ -16,10 +16,9 @@ from random import Random
 from struct import pack
 from typing import Final
 
-from birds import Bird
-from fly_process import GUIDED, HELD
-
 from mavlink_bridge.messages import CommandLong, ParamSet, SetMode, Source
+from tests.outrider.fly.process import GUIDED, HELD
+from tests.soak.birds import Bird
 
 GROUND: Final = Source(255, 190)
 INJECT, GPS_UNIT, OFF, OK = 420, 4, 1, 0

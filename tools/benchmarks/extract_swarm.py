@@ -1,13 +1,13 @@
-"""Cut a recorded flight of several vehicles down to what their responses are measured with.
+"""Extract of a recorded flight of several vehicles: the data that their responses are measured with.
 
     .venv/bin/python tools/benchmarks/extract_swarm.py FOLDER OUTPUT.npz
 
-FOLDER holds `vehicle-N.tlog.gz`, what each companion received and sent; `configuration-*.yaml`, where the
-fleet's `origin` is read; and `truth.npz` with `T0` (s, wall clock) and rows `tN` (s, wall clock; east, north,
-up, m; their velocities, m/s) of each vehicle's simulator.
+FOLDER holds `vehicle-N.tlog.gz`, the messages that each companion received and sent; `configuration-*.yaml`,
+with the fleet's `origin`; and `truth.npz` with `T0` (s, wall clock) and rows `tN` (s, wall clock; east,
+north, up, m; their velocities, m/s) of each vehicle's simulator.
 
-Every set-point is kept. Of the estimates (LOCAL_POSITION_NED) every second one is kept, of the truth every
-row, from a second before the first set-point to a second after the last. All is rounded to 1/4096 of its
+Every set-point is kept. Every second estimate (LOCAL_POSITION_NED) and every row of the truth are kept, from
+one second before the first set-point to one second after the last. All values are rounded to 1/4096 of their
 unit; the truth is known to a centimetre.
 """
 
@@ -36,16 +36,19 @@ _FLAVOURS: Final[dict[int, FlavourName]] = {3: "ardupilot", 12: "px4"}
 _HEARD: Final = frozenset((0, 32, 49, 84))
 """HEARTBEAT, LOCAL_POSITION_NED, GPS_GLOBAL_ORIGIN, SET_POSITION_TARGET_LOCAL_NED."""
 _EITHER_SIDE: Final = 50
-"""Messages before and after each among which the one with the least delay is sought."""
+"""Number of messages before and after each among which the least delayed one is searched."""
 _EVERY: Final = 2
 _MARGIN: Final = 1.0
-"""s."""
+"""Time (s) before the first and after the last set-point."""
 _PARTS: Final = 4096.0
 
 
 def measured_at(arrived: Array, boot: Array) -> Array:
-    """When (n,), s on the receiver's clock, each message was made that ``arrived`` (n,) stamped with its
-    vehicle's ``boot`` time (n,), s: some are hardly delayed, and none arrives before it is made."""
+    """Return the times (n,), s on the receiver's clock, at which messages were created.
+
+    ``arrived`` (n,) are their times of arrival and ``boot`` (n,) the vehicle's time stamps, s. Some messages
+    are hardly delayed, and none arrives before it is created.
+    """
     offsets = arrived - boot
     count = len(offsets)
     least = [offsets[max(0, i - _EITHER_SIDE) : min(count, i + _EITHER_SIDE)].min() for i in range(count)]
@@ -53,7 +56,7 @@ def measured_at(arrived: Array, boot: Array) -> Array:
 
 
 def extracted(folder: Path) -> list[SwarmVehicle]:
-    """The vehicles of a recorded flight. Raises LogError and InputError."""
+    """Return the vehicles of a recorded flight. Raises LogError and InputError."""
     frame = _frame(folder)
     logs = sorted(folder.glob("vehicle-*.tlog.gz"))
     if not logs:
@@ -75,7 +78,7 @@ def extracted(folder: Path) -> list[SwarmVehicle]:
 
 
 def main() -> int:
-    """The command line; the exit status is 2 if the flight cannot be read."""
+    """Run the command line; return 2 if the flight cannot be read."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -103,7 +106,7 @@ def _frame(folder: Path) -> FleetFrame:
 
 
 def _truth(rows: Array, begin: float) -> Array:
-    """NED, each time once."""
+    """Convert to NED, with each time once."""
     _, first = np.unique(rows[:, 0], return_index=True)
     rows = rows[first]
     return np.column_stack((rows[:, 0] - begin, enu_to_ned(rows[:, 1:4]), enu_to_ned(rows[:, 4:7])))
@@ -141,7 +144,7 @@ def _vehicle(log: Path, system: int, frame: FleetFrame, begin: float, truth: Arr
 
 
 def _fleet(rows: Array, local: LocalFrame) -> Array:
-    """Rows of time, position and free vectors in a vehicle's own NED, in that of the fleet."""
+    """Convert rows of time, position and free vectors from a vehicle's own NED to that of the fleet."""
     parts = [rows[:, :1], enu_to_ned(local.position_to_fleet(rows[:, 1:4]))]
     parts += [enu_to_ned(local.velocity_to_fleet(rows[:, at : at + 3])) for at in range(4, rows.shape[1], 3)]
     return np.hstack(parts)

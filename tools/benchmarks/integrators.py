@@ -1,7 +1,7 @@
-"""Double integrators that fly to their goals by the velocities that an avoidance gives them.
+"""Double integrators that fly to their goals with the velocities of an avoidance method.
 
-It is told the true positions and velocities of all, at every step and without delay: no radio, no sensor and
-no vehicle of ours does as well.
+The method receives the true positions and velocities of all at every step and without delay, which is better
+than with the project's radio, sensors and vehicles.
 """
 
 from __future__ import annotations
@@ -15,20 +15,23 @@ from outrider.scenarios.starts import Array
 from outrider.simulation.conductor import HOLD, NEAR, SLOW
 
 STEP = 0.01
-"""s between two choices of a velocity: as often as a companion plans."""
+"""Time (s) between two choices of a velocity: the period of a companion's plans."""
 A_MAX, V_MAX = 2.0, 5.0
-"""m/s² and m/s, of the norm: the paper's limits of an axis."""
+"""Limits of acceleration (m/s²) and speed (m/s), of the norm: the paper's limits of an axis."""
 _STRAIGHT = 1.0
-"""m from its goal, within which nobody is turned aside any more."""
+"""Distance (m) from the goal within which the preferred velocity is not turned."""
 
 _TOUCH = 1e-3
-"""m by which a pair may be nearer than d_min: ORCA aims at touching, and reckons in single precision."""
+"""Tolerance (m) below d_min: ORCA aims at touching, and computes in single precision."""
 
 
 class Manner(NamedTuple):
-    """How each would fly if it were alone. ``braking``: m/s² before the goal, less than `A_MAX` if some shall
-    be left to give way; ``gain``: 1/s, speed for a metre of distance close to it; ``turned``: rad to the
-    right of the way there, so that those who meet pass each other on the same side."""
+    """Motion of a vehicle without neighbours.
+
+    ``braking``: m/s² before the goal, less than `A_MAX` to leave some for avoidance; ``gain``: 1/s, speed per
+    metre of distance close to the goal; ``turned``: rad to the right of the direct path, so that vehicles
+    that meet pass each other on the same side.
+    """
 
     braking: float
     gain: float
@@ -36,18 +39,24 @@ class Manner(NamedTuple):
 
 
 class Avoidance(Protocol):
-    """Who says how fast to fly where."""
+    """Interface of an avoidance method, which chooses velocities."""
 
     def velocities(self, positions: Array, velocities: Array, preferred: Array) -> Array:
-        """Velocities (K, 2), m/s, no faster than `V_MAX`, from where all are (K, 2), m, how they move, and
-        how each would move if it were alone."""
+        """Return velocities (K, 2), m/s, not faster than `V_MAX`.
+
+        The arguments are the positions (K, 2), m, the velocities (K, 2), m/s, and the preferred velocities,
+        with which each vehicle would move without neighbours.
+        """
         ...
 
 
 class Flown(NamedTuple):
-    """What came of a flight. ``converged_s``: since when all were at rest at their goals, None if never;
-    ``separation_m``: least of any pair; ``below_s``: how long some pair was nearer than ``d_min`` by
-    more than a touch."""
+    """Result of a flight.
+
+    ``converged_s``: time since which all vehicles were at rest at their goals, None if never;
+    ``separation_m``: least of any pair; ``below_s``: time for which some pair was closer than ``d_min`` by
+    more than the tolerance.
+    """
 
     converged_s: float | None
     separation_m: float
@@ -57,8 +66,10 @@ class Flown(NamedTuple):
 def fly(
     starts: Array, goals: Array, avoidance: Avoidance, manner: Manner, d_min: float, cap_s: float
 ) -> Flown:
-    """Fly from ``starts``, at rest, to ``goals`` (K, 2), m. It has converged by the rule of ``outrider``, and
-    ends with it or after ``cap_s``."""
+    """Fly from ``starts``, at rest, to ``goals`` (K, 2), m.
+
+    Convergence follows the rule of ``outrider``. The flight ends with it, or after ``cap_s``.
+    """
     position, velocity = starts.copy(), np.zeros_like(starts)
     pairs = np.triu_indices(len(starts), 1)
     least, below, arrived = math.inf, 0, None
@@ -81,10 +92,10 @@ def fly(
 
 
 def preferred(way: Array, manner: Manner) -> Array:
-    """Velocities (K, 2), m/s, with which each would come to rest at the end of its way (K, 2), m.
+    """Return velocities (K, 2), m/s, with which each would come to rest at the end of its ``way`` (K, 2), m.
 
-    v = √(2 b (d − d₀)) far away and k d near, which meet where d = 2 d₀ = b / k² with one slope: nobody
-    brakes harder than with b.
+    v = √(2 b (d − d₀)) far away and k d near, which meet where d = 2 d₀ = b / k² with one slope: the
+    deceleration never exceeds b.
     """
     distance = np.linalg.norm(way, axis=1)
     bend = manner.braking / manner.gain**2
@@ -97,14 +108,17 @@ def preferred(way: Array, manner: Manner) -> Array:
 
 
 def clipped(vectors: Array, most: float) -> Array:
-    """Vectors (K, 2), none longer than ``most``."""
+    """Return vectors (K, 2), none longer than ``most``."""
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors * np.minimum(1.0, most / np.maximum(lengths, 1e-12)))
 
 
 def nearest(before: Array, after: Array) -> float:
-    """The least distance, m, of pairs that lie ``before`` a step and ``after`` it by so much (P, 2), m, and
-    go straight in between: at 10 m/s of closing speed a step is 0.1 m."""
+    """Return the least distance, m, of pairs during a step.
+
+    ``before`` and ``after`` are the relative positions (P, 2), m, at its ends; in between they move straight.
+    At a closing speed of 10 m/s a step is 0.1 m.
+    """
     move = after - before
     square = np.maximum(np.einsum("ij,ij->i", move, move), 1e-18)
     share = np.clip(-np.einsum("ij,ij->i", before, move) / square, 0.0, 1.0)
@@ -112,7 +126,7 @@ def nearest(before: Array, after: Array) -> float:
 
 
 def at_rest(way: Array, velocity: Array) -> bool:
-    """Whether all are at their goals, and slow."""
+    """Return whether all are at their goals, and slow."""
     return bool(
         (np.linalg.norm(way, axis=1) < NEAR).all() and (np.linalg.norm(velocity, axis=1) < SLOW).all()
     )

@@ -1,12 +1,13 @@
-"""ORCA (pyrvo, the RVO2 library) on the scenes of `benchmarks.scenes`, by many settings.
+"""ORCA (pyrvo, the RVO2 library) on the scenes of `benchmarks.scenes`, with many settings.
 
     .venv/bin/pip install -e '.[peers]'          # or: uv sync --extra sitl --extra peers
     .venv/bin/python tools/benchmarks/orca.py [--seeds 10] [--top 5] [--json]
 
-ORCA (van den Berg, Guy, Lin and Manocha, Reciprocal n-Body Collision Avoidance, 2011) is for discs that take
-any velocity at once. Here they are double integrators with bounded acceleration that follow it as well as
-they can. It is planar, so the scenes are seen from above: what they say of heights is left out, and
-separation is horizontal. The best setting of a scene is named after it was flown: ours has one for all.
+ORCA (van den Berg, Guy, Lin and Manocha, Reciprocal n-Body Collision Avoidance, 2011) is made for discs that
+reach any velocity at once. Here double integrators with bounded acceleration follow its velocities as well as
+possible. It is planar, so the scenes are seen from above: their heights are ignored, and separation is
+horizontal. The best setting of a scene is selected after the flights; outrider has one setting for all
+scenes.
 """
 
 from __future__ import annotations
@@ -33,25 +34,25 @@ from outrider.scenarios.starts import Array
 
 ADVICE = "pyrvo is not installed, and this benchmark needs it: .venv/bin/pip install -e '.[peers]'"
 _SIGHT = 30.0
-"""m, to which neighbours count: the whole scene."""
+"""Distance (m) up to which neighbours count: the whole scene."""
 
 
 class Orca:
-    """An `Avoidance` for ``count`` discs."""
+    """`Avoidance` for ``count`` discs."""
 
     def __init__(self, count: int, radius: float, horizon: float) -> None:
-        import pyrvo  # An extra: whoever draws scenes or flies something else does without.
+        import pyrvo  # An extra, which only flights with ORCA need.
 
         self._discs = range(count)
         self._simulator = pyrvo.RVOSimulator()
         self._simulator.set_time_step(STEP)
-        # The second horizon is that of obstacles, of which there are none.
+        # The second horizon is that of obstacles; there are none.
         self._simulator.set_agent_defaults(_SIGHT, count, horizon, horizon, radius, V_MAX)
         for _ in self._discs:
             self._simulator.add_agent((0.0, 0.0))
 
     def velocities(self, positions: Array, velocities: Array, preferred: Array) -> Array:
-        """What ORCA chooses for each, told where all are."""
+        """Return the velocities that ORCA chooses for all vehicles."""
         simulator = self._simulator
         states = zip(positions.tolist(), velocities.tolist(), preferred.tolist(), strict=True)
         for disc, (position, velocity, wish) in enumerate(states):
@@ -64,7 +65,7 @@ class Orca:
 
 
 class Cell(NamedTuple):
-    """What is flown with seeds 1 to ``seeds``: the name of a scene, and a setting."""
+    """One task: the name of a scene and a setting, flown with seeds 1 to ``seeds``."""
 
     scene: str
     setting: Setting
@@ -72,7 +73,7 @@ class Cell(NamedTuple):
 
 
 def flown(cell: Cell) -> list[Flown]:
-    """A flight for each seed."""
+    """Return a flight for each seed. Raises InputError if the scene has no goals."""
     found = []
     for seed in range(1, cell.seeds + 1):
         scenario = SCENES[cell.scene](seed)
@@ -86,10 +87,10 @@ def flown(cell: Cell) -> list[Flown]:
 
 
 def measured(seeds: int, jobs: int) -> list[Row]:
-    """Every setting on every scene, with a line on standard error for every tenth that is done."""
+    """Fly every setting on every scene; report every tenth on standard error."""
     cells = [Cell(scene, setting, seeds) for scene, setting in product(SCENES, SETTINGS)]
     rows = []
-    # Ctrl-C reaches the workers too; it is for this process to end them.
+    # Ctrl-C reaches the workers too; this process ends them.
     pool = ProcessPoolExecutor(jobs, initializer=signal, initargs=(SIGINT, SIG_IGN))
     try:
         for cell, flights in zip(cells, pool.map(flown, cells), strict=True):
@@ -102,7 +103,7 @@ def measured(seeds: int, jobs: int) -> list[Row]:
 
 
 def main() -> int:
-    """The command line; the exit status is 2 without pyrvo, 3 if it is interrupted."""
+    """Run the command line; return 2 without pyrvo, 3 if it is interrupted."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

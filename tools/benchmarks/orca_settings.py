@@ -1,4 +1,4 @@
-"""What ORCA is flown by: each combination of a few values."""
+"""Settings for ORCA: each combination of a few values."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from benchmarks.integrators import Manner
 
 
 class Setting(NamedTuple):
-    """``radius_m`` of a disc, ``horizon_s`` for which it shall not collide, and the `Manner` of the velocity
-    that is preferred."""
+    """Setting of ORCA.
+
+    ``radius_m`` is the radius of a disc (m), ``horizon_s`` the time (s) for which it must not collide; the
+    rest is the `Manner` of the preferred velocity.
+    """
 
     radius_m: float
     horizon_s: float
@@ -21,14 +24,17 @@ class Setting(NamedTuple):
 
     @property
     def manner(self) -> Manner:
-        """How each would fly if it were alone."""
+        """Motion of a vehicle without neighbours."""
         return Manner(self.braking, self.gain, math.radians(self.turned_deg))
 
 
 RADII, HORIZONS, TURNS = (0.25, 0.3, 0.35, 0.5), (0.5, 1.0, 2.0), (0.0, 10.0, 20.0)
 STOPS = ((1.6, 2.0), (1.8, 3.0))
-"""Braking and gain: the first leaves more to give way with; who is alone is 0.2 s sooner there by the
-second."""
+"""Braking (m/s²) and gain (1/s).
+
+The first pair leaves more acceleration for avoidance; with the second a vehicle without neighbours arrives
+0.2 s sooner.
+"""
 SETTINGS = tuple(
     Setting(radius, horizon, turned, *stop)
     for radius, horizon, turned, stop in product(RADII, HORIZONS, TURNS, STOPS)

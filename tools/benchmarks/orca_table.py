@@ -1,4 +1,4 @@
-"""What came of each setting on each scene, and which was best."""
+"""Results of each setting on each scene, and the best settings."""
 
 from __future__ import annotations
 
@@ -19,9 +19,12 @@ _CAPTION = "r: radius, m · τ: horizon, s · turned right, ° · b: braking, m/
 
 
 class Row(NamedTuple):
-    """A setting on a scene. ``median_s``: None if half of the ``runs`` or more did not converge; ``worst_s``
-    of those that did; ``below``: runs in which a pair was nearer than d_min by more than 1 mm; ``below_s``:
-    how long, in all runs together."""
+    """Results of a setting on a scene.
+
+    ``median_s`` is None if half of the ``runs`` or more did not converge; ``worst_s`` is the longest time of
+    those that did; ``below`` counts runs in which a pair was closer than d_min by more than 1 mm; ``below_s``
+    is the time for which that was so, in all runs together.
+    """
 
     scene: str
     setting: Setting
@@ -34,12 +37,12 @@ class Row(NamedTuple):
     below_s: float
 
     def document(self) -> dict[str, Any]:
-        """Values of JSON."""
+        """Return the row as values of JSON."""
         return {**self._asdict(), "setting": self.setting._asdict()}
 
 
 def row_of(scene: str, setting: Setting, flights: Sequence[Flown]) -> Row:
-    """The flights of a setting, put together as the runs of a row of ``outrider paper`` are."""
+    """Combine the flights of a setting as ``outrider paper`` combines the runs of a row."""
     times = [inf if flight.converged_s is None else flight.converged_s for flight in flights]
     done = [time for time in times if time < inf]
     return Row(
@@ -56,19 +59,21 @@ def row_of(scene: str, setting: Setting, flights: Sequence[Flown]) -> Row:
 
 
 def ranked(rows: Sequence[Row]) -> list[Row]:
-    """The best first."""
+    """Return the rows, the best first."""
     return sorted(rows, key=lambda row: _merit([row]))
 
 
 def one_for_all(rows: Sequence[Row]) -> list[Row]:
-    """The rows of the setting that is best on all scenes together."""
+    """Return the rows of the setting that is best on all scenes together."""
     settings = dict.fromkeys(row.setting for row in rows)
     return min(([row for row in rows if row.setting == setting] for setting in settings), key=_merit)
 
 
 def show(rows: Sequence[Row], top: int | None) -> None:
-    """Write a table for each scene to standard output, with its ``top`` settings or all, and one of the
-    setting that is best on all scenes."""
+    """Write a table for each scene to standard output, with its ``top`` settings or all.
+
+    A last table shows the setting that is best on all scenes.
+    """
     console = Console()
     if not console.is_terminal:
         console.width = WIDTH
@@ -90,8 +95,10 @@ def _table(title: str, rows: Sequence[Row], first: str) -> Table:
 
 
 def _merit(rows: Sequence[Row]) -> tuple[int, float, float]:
-    """Less is better: what did not arrive or came too near counts first, then the time of the median, then of
-    the worst."""
+    """Return the merit of rows, less is better.
+
+    Runs that did not converge or violated d_min count first, then the median time, then the worst time.
+    """
     return (
         sum(row.runs - row.converged + row.below for row in rows),
         sum(inf if row.median_s is None else row.median_s for row in rows),

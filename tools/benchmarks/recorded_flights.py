@@ -1,10 +1,10 @@
-"""A flight of a real firmware out of its log, and the same messages flown by our emulated autopilot.
+"""Flight of a real firmware from its log, and the same messages flown by the emulated autopilot.
 
-log → what was sent, and what the vehicle told → our autopilot, which is sent the same → what it told
+log → messages sent to and by the vehicle → emulated autopilot, which receives the same → its messages
 
-Time is the vehicle's own, in s since the log's first record. When a message was sent is told by the stamps of
-the positions that were received around it: simulators do not keep pace with the clock on the wall (PX4's was
-1.1 % slow).
+Time is the vehicle's own, in s since the log's first record. The time stamps of the positions received around
+a message give the time at which it was sent, because simulators do not keep pace with the wall clock (PX4's
+was 1.1 % slow).
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from sitl.vehicle.config import VehicleConfig
 Array = npt.NDArray[np.float64]
 
 _AUTOPILOT: Final = 1
-"""MAV_COMP_ID_AUTOPILOT1: who flies. All others in a log send."""
+"""MAV_COMP_ID_AUTOPILOT1, the vehicle. Messages of all other sources in a log are sent to it."""
 _FLAVOURS: Final = {3: "ardupilot", 12: "px4"}
 """MAV_AUTOPILOT."""
 _SITE: Final = FleetFrame(47.397742, 8.545594, 488.0)
 _TICK: Final = 5_000
-"""µs between two steps of our autopilot."""
+"""Time (µs) between two steps of the emulated autopilot."""
 
 
 class Ack(NamedTuple):
@@ -55,7 +55,7 @@ class Ack(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A HEARTBEAT (0) with another mode than the one before; ``base_mode`` says whether it is armed, too."""
+    """HEARTBEAT (0) with another mode than the one before; ``base_mode`` includes whether it is armed."""
 
     time: float
     custom_mode: int
@@ -63,14 +63,14 @@ class Change(NamedTuple):
 
 
 class Landing(NamedTuple):
-    """An EXTENDED_SYS_STATE (245) whose ``landed_state`` is not that of the one before."""
+    """EXTENDED_SYS_STATE (245) whose ``landed_state`` differs from the one before."""
 
     time: float
     landed_state: int
 
 
 class Told(NamedTuple):
-    """What a vehicle told of a flight."""
+    """Data that a vehicle reported during a flight."""
 
     acks: list[Ack]
     modes: list[Change]
@@ -79,19 +79,19 @@ class Told(NamedTuple):
     headings: Array  # (n, 2) s, rad: time and yaw
 
     def position(self, times: Array) -> Array:
-        """Where it was (n, 3), m, at ``times`` (n,), s."""
+        """Return the positions (n, 3), m, at ``times`` (n,), s."""
         return np.column_stack([np.interp(times, self.track[:, 0], x) for x in self.track[:, 1:].T])
 
 
 class Sent(NamedTuple):
-    """A message that somebody sent to the vehicle."""
+    """Message sent to the vehicle."""
 
     time: float
     message: Message
 
 
 class RecordedFlight(NamedTuple):
-    """One vehicle's flight."""
+    """Flight of one vehicle."""
 
     system: int
     flavour: str
@@ -100,7 +100,7 @@ class RecordedFlight(NamedTuple):
 
 
 def read_flight(path: Path) -> RecordedFlight:
-    """The flight of the one vehicle in a log. Raises LogError and InputError."""
+    """Return the flight of the one vehicle in a log. Raises LogError and InputError."""
     codec = Codec()
     heard = [(record.time, message) for record in read_tlog(path) for message in codec.feed(record.frame)]
     beats = [m for _, m in heard if isinstance(m, Heartbeat) and m.source.component == _AUTOPILOT]
@@ -108,7 +108,7 @@ def read_flight(path: Path) -> RecordedFlight:
     if not beats or not places or beats[0].autopilot not in _FLAVOURS:
         raise InputError(f"{path}: holds no ArduPilot or PX4 that tells where it is")
     stamps, boot = np.array(places, dtype=np.float64).T
-    # At its ends the log goes on at the clock's own pace.
+    # Beyond its ends the time continues at the clock's own rate.
     stamps = np.array([stamps[0] - 1e9, *stamps, stamps[-1] + 1e9])
     boot = np.array([boot[0] - 1e9, *boot, boot[-1] + 1e9])
     begin = float(np.interp(heard[0][0], stamps, boot))
@@ -121,8 +121,10 @@ def read_flight(path: Path) -> RecordedFlight:
 
 
 def tell(heard: Iterable[tuple[float, Message]], begin: float = 0.0) -> Told:
-    """What a vehicle told by messages and the times when they came; its own stamps count from ``begin``
-    (µs)."""
+    """Collect the data that a vehicle reported, from its messages and their times of arrival (s).
+
+    The vehicle's own time stamps count from ``begin`` (µs).
+    """
     told = Told([], [], [], np.empty(0), np.empty(0))
     track, headings = [], []
     for time, message in heard:
@@ -144,8 +146,11 @@ def tell(heard: Iterable[tuple[float, Message]], begin: float = 0.0) -> Told:
 
 
 def fly(flight: RecordedFlight, vehicle: VehicleConfig, **settings: Any) -> Told:
-    """What our autopilot told when it was sent the same at the same times, in simulated time. ``settings`` of
-    ``AutopilotConfig`` beside those that the log says."""
+    """Return what the emulated autopilot reports when it receives the flight's messages.
+
+    The messages arrive at the same simulated times. ``settings`` are fields of ``AutopilotConfig`` in
+    addition to those from the log.
+    """
     config = AutopilotConfig(
         **{
             "system_id": flight.system,

@@ -1,7 +1,7 @@
-"""A flight of several real firmwares in one file: what each vehicle was sent, believed and did.
+"""File of a flight of several real firmwares: what each vehicle received, estimated and did.
 
-All of it is NED, m and s, in one frame whose zero is the fleet's origin, so that the vehicles can be compared
-with each other. Times count from the beginning of the recording, on the clock of the computer that recorded.
+All data are NED, m and s, in one frame with the fleet's origin as zero, so that the vehicles can be compared
+with each other. Times count from the start of the recording, on the clock of the recording computer.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ class SwarmVehicle(NamedTuple):
 
     system: int
     flavour: FlavourName
-    setpoints: Array  # (n, 10) s, m, m/s, m/s²: when it was sent, position, velocity, acceleration
-    estimate: Array  # (n, 7) s, m, m/s: time, position, velocity that the vehicle told
-    truth: Array  # (n, 7) s, m, m/s: time, position, velocity of the simulation that moved it
+    setpoints: Array  # (n, 10) s, m, m/s, m/s²: time of sending, position, velocity, acceleration
+    estimate: Array  # (n, 7) s, m, m/s: time, position, velocity reported by the vehicle
+    truth: Array  # (n, 7) s, m, m/s: time, position, velocity of its simulation
 
     def __str__(self) -> str:
         return f"{self.flavour} {self.system}"
 
 
 def write_swarm(path: Path, vehicles: Iterable[SwarmVehicle]) -> None:
-    """As float32 and by columns, which compress better."""
+    """Write vehicles as float32 and by columns, which compress better."""
     arrays: dict[str, npt.NDArray[np.generic]] = {}
     for vehicle in vehicles:
         arrays[f"{vehicle.system}_flavour"] = np.array(vehicle.flavour)
@@ -48,7 +48,7 @@ def write_swarm(path: Path, vehicles: Iterable[SwarmVehicle]) -> None:
 
 
 def read_swarm(path: Path) -> list[SwarmVehicle]:
-    """The vehicles in a file, by their system ids. Raises InputError."""
+    """Return the vehicles in a file, by their system ids. Raises InputError."""
     try:
         with path.open("rb") as raw, np.load(raw) as file:
             systems = sorted(int(name.partition("_")[0]) for name in file.files if name.endswith("_flavour"))
@@ -72,7 +72,7 @@ def read_swarm(path: Path) -> list[SwarmVehicle]:
 
 
 def at_times(rows: Array, times: Array) -> Array:
-    """Position and velocity (n, 6) at ``times`` (n,) between the rows (m, 7) of a motion."""
+    """Return position and velocity (n, 6) at ``times`` (n,), interpolated in the rows (m, 7) of a motion."""
     return np.column_stack([np.interp(times, rows[:, 0], column) for column in rows[:, 1:].T])
 
 

@@ -1,12 +1,12 @@
-"""How near our emulation of the firmwares' position controllers comes to recorded flights of the real ones.
+"""Comparison of the emulated position controllers with recorded flights of the real firmwares.
 
     .venv/bin/python tools/benchmarks/response.py [--logs tests/data/flights]
 
-First the whole autopilot flies every figure-eight, with `response: firmware` and with `exact`, sent what the
-recorded vehicle was sent. Then the response alone flies the set-points that each vehicle of the recorded
-swarms was sent by its own companion, and is compared with the true motion.
+First the whole autopilot flies every figure-eight, with `response: firmware` and with `exact`, and receives
+the messages that the recorded vehicle received. Then the response alone flies the set-points that each
+vehicle of the recorded swarms received from its companion, and is compared with the true motion.
 
-Only how late attitude and thrust follow was fitted, to the swarms (`angle_lag` and `thrust_lag` in
+Only the lags of attitude and thrust were fitted, to the swarms (`angle_lag` and `thrust_lag` in
 `sitl/autopilot/position_control/airframe.py`). Gains and limits are the firmware's defaults, mass and drag
 those of its simulator.
 """
@@ -45,11 +45,11 @@ LOGS: Final = Path(__file__).parents[2] / "tests" / "data" / "flights"
 PARTS: Final = (FULL, PVY, FIRST, SECOND)
 SWARMS: Final = ("arducopter-5", "mixed-3-2")
 WIDTH: Final = 110
-"""Of tables that go into a file."""
+"""Width of tables that go into a file."""
 
 
 def flown(flights: dict[str, RecordedFlight], vehicle: VehicleConfig) -> Table:
-    """Every figure-eight, flown by the whole autopilot with both responses."""
+    """Return the table of every figure-eight, flown by the whole autopilot with both responses."""
     table = Table(title="the whole autopilot on figure-eights: p50, p95 of how far it is off")
     for head in ("log", "firmware, m", "exact, m", "yaw, °"):
         table.add_column(head)
@@ -67,7 +67,7 @@ def flown(flights: dict[str, RecordedFlight], vehicle: VehicleConfig) -> Table:
 
 
 def followed(swarms: dict[str, list[SwarmVehicle]]) -> Table:
-    """Every vehicle of the recorded swarms, flown by the response alone."""
+    """Return the table of every vehicle of the recorded swarms, flown by the response alone."""
     table = Table(
         title="the response alone on the set-points of recorded swarms: how far it is off the truth, m"
     )
@@ -83,13 +83,13 @@ def followed(swarms: dict[str, list[SwarmVehicle]]) -> Table:
 
 
 def tell(what: str) -> None:
-    """Say on standard error what comes next."""
+    """Report the next step on standard error."""
     sys.stderr.write(f"{what}\n")
     sys.stderr.flush()
 
 
 def main() -> int:
-    """The command line; the exit status is 2 when a recording is not what it should be."""
+    """Run the command line; return 2 if a recording is invalid."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

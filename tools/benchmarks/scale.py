@@ -1,9 +1,9 @@
-"""What a vehicle more costs in lock-step: time of a plan, real-time factor on one core, memory.
+"""Cost of an additional vehicle in lock-step: time of a plan, real-time factor on one core, memory.
 
-``python -m benchmarks.scale [--far] [--seconds S] [VEHICLES…]``, by default 2 to 200 vehicles. Each swarm
-has a process of its own, is in the air from the beginning and flies for S seconds (10): ``antipodal``, which
-leads all of them through the middle, or ``--far``, where neighbours on the ring are 100 m apart and nobody is
-within earshot.
+``python -m benchmarks.scale [--far] [--seconds S] [VEHICLES…]``, by default 2 to 200 vehicles. Each swarm has
+a process of its own, starts in the air and flies for S seconds (10): ``antipodal``, in which all paths cross
+in the middle, or ``--far``, in which neighbours on the ring are 100 m apart and messages of none of them
+affect a plan.
 """
 
 from __future__ import annotations
@@ -29,13 +29,16 @@ from sitl.vehicle.config import VehicleConfig
 VEHICLES = (2, 8, 16, 32, 64, 128, 200)
 _REPLAN_US = 50_000
 _NEAR, _FAR = 4.0, 100.0
-"""m between neighbours on the ring."""
+"""Distance (m) between neighbours on the ring."""
 _SECONDS = 10.0
 
 
 class Cost(NamedTuple):
-    """Of one swarm: median plan (CPU ms), simulated seconds per CPU-second, CPU ms of one vehicle in a
-    simulated second, most memory (MiB), and the share of the neighbours' messages that were decoded."""
+    """Cost of one swarm.
+
+    It has the median plan (CPU ms), simulated seconds per CPU second, CPU ms of one vehicle in a simulated
+    second, the largest memory (MiB), and the share of the neighbours' messages that were decoded.
+    """
 
     vehicles: int
     plan_ms: float
@@ -50,7 +53,7 @@ class _EnoughError(Exception):
 
 
 def fly(vehicles: int, apart: float, seconds: float) -> Cost:
-    """One swarm for ``seconds``; for a process that does nothing else."""
+    """Fly one swarm for ``seconds``, in a process that does nothing else, and return its cost."""
     box = max(200.0, apart * vehicles)
     changes = {
         "vehicles": vehicles,
@@ -65,7 +68,7 @@ def fly(vehicles: int, apart: float, seconds: float) -> Cost:
     first: list[tuple[int, float]] = []
 
     def look(_flight: Flight, now: int) -> None:
-        # Compiled and loaded is all by then.
+        # Everything is compiled and loaded by then.
         if not first:
             first.append((now, time.process_time()))
         elif now - first[0][0] >= 1e6 * seconds:
@@ -79,7 +82,7 @@ def fly(vehicles: int, apart: float, seconds: float) -> Cost:
     plans = np.concatenate([np.asarray(companion.tally.plan_ns) for companion in flight.companions])
     links = [companion.counters["swarm"] for companion in flight.companions]
     good, filtered = sum(link.good for link in links), sum(link.filtered for link in links)
-    # A heartbeat a second is filtered in any case.
+    # One heartbeat per second is filtered in any case.
     beats = seconds * vehicles * (vehicles - 1)
     return Cost(
         vehicles,
@@ -92,7 +95,7 @@ def fly(vehicles: int, apart: float, seconds: float) -> Cost:
 
 
 def main() -> None:
-    """Fly them one after another, and say what they cost."""
+    """Fly the swarms one after another and print their cost."""
     words = sys.argv[1:]
     apart = _FAR if "--far" in words else _NEAR
     seconds = float(words[words.index("--seconds") + 1]) if "--seconds" in words else _SECONDS
@@ -103,7 +106,7 @@ def main() -> None:
         share_progress() as progress,
         ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as pool,
     ):
-        # The work grows by the square where all hear all.
+        # The work grows with the square where all receive all.
         done, whole = 0.0, float(sum(count * (40 + count) for count in counts))
         for count in counts:
             progress(f"{count} vehicles", done / whole)

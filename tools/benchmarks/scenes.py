@@ -1,6 +1,6 @@
-"""The scenes that every planner is measured on: a seed to a scenario, which ``outrider`` flies too.
+"""Scenes on which every planner is measured: each maps a seed to a scenario, which ``outrider`` also flies.
 
-Whoever takes part is placed by `places`, and so stands where ``outrider`` puts it with the same seed.
+`places` gives the positions, the same as in ``outrider`` with the same seed.
 """
 
 from __future__ import annotations
@@ -17,26 +17,28 @@ from outrider.scenarios.streams import Stream, stream
 from outrider.yaml_files.yaml_file import load
 
 VEHICLES, SIDE, HEIGHT, APART = 12, 12.0, 5.0, 1.5
-"""Of a crowd: how many fly, the side of their square (m), their height (m), and how far any two starts, and
-any two goals, are apart (m)."""
+"""Number of vehicles of a crowd, the side of its square (m), its height (m), and the least distance (m).
+
+The distance holds for any two starts, and for any two goals.
+"""
 _TRIES = 100_000
-"""Places that are drawn before a square counts as full. A dozen takes about twenty."""
+"""Number of positions drawn before a square counts as full. Twelve vehicles need about twenty."""
 
 Scene = Callable[[int], Scenario]
 
 
 def antipodal_8(_seed: int) -> Scenario:
-    """The shipped swap of eight on a circle of 8 m; the seed acts in `places`, where starts are jittered."""
+    """Return the shipped swap of eight on a circle of 8 m; the seed jitters the starts in `places`."""
     return _shipped("antipodal-8")
 
 
 def antipodal_16(_seed: int) -> Scenario:
-    """The shipped swap of sixteen on a circle of 12 m."""
+    """Return the shipped swap of sixteen on a circle of 12 m."""
     return _shipped("antipodal-16")
 
 
 def crowd(seed: int) -> Scenario:
-    """Random starts and goals in a square; everything else as in the swap of eight."""
+    """Return random starts and goals in a square; everything else is as in the swap of eight."""
     document = _shipped("antipodal-8").model_dump(mode="json")
     document |= {
         "name": f"crowd-{VEHICLES}",
@@ -60,15 +62,18 @@ SCENES: Mapping[str, Scene] = {
 
 
 def places(scenario: Scenario, seed: int) -> Starts:
-    """Where all start and must go, as in a flight of ``outrider``."""
+    """Return the starts and goals of all vehicles, as in a flight of ``outrider``."""
     return starts(scenario, seed, scenario.companion.planar)
 
 
 def scattered(
     random: np.random.Generator, count: int = VEHICLES, side: float = SIDE, apart: float = APART
 ) -> Array:
-    """Places (count, 3), fleet-local ENU, m, at `HEIGHT`, evenly drawn in a square around the origin and kept
-    if ``apart`` from all before; whole millimetres. InputError if there is no room."""
+    """Return positions (count, 3), fleet-local ENU, m, at `HEIGHT`, uniform in a square around the origin.
+
+    A position is kept if it is ``apart`` from all before; values are whole millimetres. Raises InputError if
+    there is no room.
+    """
     found = np.empty((0, 2))
     for _ in range(_TRIES):
         place = np.round(random.uniform(-side / 2.0, side / 2.0, 2), 3) + 0.0

@@ -1,12 +1,11 @@
-"""The emulated position controllers on the set-points of a recorded swarm: how far each vehicle is from the
-truth.
+"""Emulated position controllers on the set-points of a recorded swarm: distance from the truth.
 
 recorded vehicle → its own set-points, at their times → firmware's response alone → distance from the truth
 
-Nothing is fitted to a flight. ArduCopter's estimate was within a few centimetres of the truth and is taken to
-be it. PX4's was off by 0.3 m in the middle and 0.8 m at times, and PX4 flies on its estimate; so the recorded
-error of the estimate is given to the emulation, too. A controller that believes to be at x + e and is sent g
-does what one at x does that is sent g − e.
+Nothing is fitted to a flight. ArduCopter's estimate was within a few centimetres of the truth and is taken as
+the truth. PX4's estimate was off by 0.3 m in the median and by 0.8 m at times, and PX4 flies on its estimate;
+the emulation therefore gets the recorded error of the estimate, too. A controller that estimates x + e and
+receives the set-point g acts like a controller at x that receives g − e.
 """
 
 from __future__ import annotations
@@ -22,17 +21,17 @@ from sitl.config.autopilot import AutopilotConfig
 from sitl.values.setpoints import POSITION, Setpoint
 
 STEP: Final = 0.01
-"""s, of the response: as often as the autopilot renews what it tracks."""
+"""Step (s) of the response: the period at which the autopilot renews its reference."""
 LATENCY: Final = 0.005
-"""s, from when a set-point is sent until the autopilot has it."""
+"""Delay (s) between sending a set-point and its arrival at the autopilot."""
 WINDOW: Final = 10.0
-"""s, of the worst stretch of a flight."""
+"""Length (s) of the worst section of a flight."""
 _STRIDE: Final = 100
-"""Steps between two such stretches."""
+"""Number of steps between the starts of two such sections."""
 
 
 class Followed(NamedTuple):
-    """Where the emulation was, and where the vehicle was."""
+    """Positions of the emulation, and of the vehicle."""
 
     times: Array  # (n,) s
     places: Array  # (n, 3) m, NED
@@ -40,13 +39,15 @@ class Followed(NamedTuple):
 
     @property
     def errors(self) -> Array:
-        """How far (n,), m, they are apart."""
+        """Distances (n,), m, between both."""
         return np.asarray(np.linalg.norm(self.places - self.truth, axis=1))
 
 
 class Deviations(NamedTuple):
-    """Of the emulation from the truth, m. ``worst``: the 95th percentile of the ten seconds in which it is
-    largest, and ``since`` (s) when they begin."""
+    """Deviations of the emulation from the truth, m.
+
+    ``worst`` is the 95th percentile of the ten seconds in which it is largest, and ``since`` (s) their start.
+    """
 
     p50: float
     p95: float
@@ -55,7 +56,7 @@ class Deviations(NamedTuple):
 
     @classmethod
     def of(cls, followed: Followed) -> Deviations:
-        """Of one vehicle's flight."""
+        """Return the deviations of one vehicle's flight."""
         errors = followed.errors
         length = round(WINDOW / STEP)
         begins = range(0, max(1, len(errors) - length), _STRIDE)
@@ -66,8 +67,10 @@ class Deviations(NamedTuple):
 
 
 def follow(vehicle: SwarmVehicle) -> Followed:
-    """Fly a vehicle's set-points with its firmware's response and stock parameters, from its true motion at
-    the first of them."""
+    """Fly a vehicle's set-points with its firmware's response and default parameters.
+
+    The flight starts with the true motion at the first set-point.
+    """
     times = np.arange(vehicle.setpoints[0, 0], vehicle.setpoints[-1, 0], STEP)
     true = at_times(vehicle.truth, times)
     carried = vehicle.flavour == "ardupilot"
@@ -101,7 +104,7 @@ def follow(vehicle: SwarmVehicle) -> Followed:
 
 
 def closest(first: Followed, second: Followed) -> tuple[float, float]:
-    """The least distance, m, of two vehicles of one flight: of the emulations, and in truth."""
+    """Return the least distance, m, of two vehicles of one flight: emulated, and true."""
     begin, end = max(first.times[0], second.times[0]), min(first.times[-1], second.times[-1])
     times = np.arange(begin, end, STEP)
     emulated, true = (

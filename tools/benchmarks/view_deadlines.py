@@ -1,8 +1,8 @@
-"""What a live view costs a flight in real time: missed deadlines with it and without, in turns.
+"""Cost of a live view for a real-time flight: missed deadlines with and without it, in turns.
 
 ``python -m benchmarks.view_deadlines [ROUNDS] [--priority] [--browser]``: on an otherwise idle machine, or
-with ``--priority`` (real-time, for all who fly) on one that is not. With ``--browser`` a page is open too
-(Playwright and Chromium, rendering in software): it takes a core, as a browser does.
+with ``--priority`` (real-time priority for all flying processes) on a busy one. With ``--browser`` a page is
+open too (Playwright and Chromium, rendering in software): it takes a core, as a browser does.
 """
 
 from __future__ import annotations
@@ -26,15 +26,18 @@ FLIGHTS = ("without", "with")
 
 
 class Punctual(NamedTuple):
-    """Of one flight: share of the companions' deadlines that were missed, and lateness (ms) of the worst
-    hundredth."""
+    """Punctuality of one flight.
+
+    It has the share of the companions' deadlines that were missed, and the 99th percentile of the lateness
+    (ms).
+    """
 
     missed: float
     late_ms: float
 
 
 def flight(stack: ExitStack, options: set[str], view: bool, seed: int) -> Punctual:
-    """One flight, with a view or without."""
+    """Fly one flight, with a view or without."""
     prepared = prepare("antipodal", Options(vehicles=VEHICLES))
     directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     show = None
@@ -65,7 +68,7 @@ def _open(stack: ExitStack, url: str) -> None:
 
 
 def main() -> None:
-    """Fly in turns, and say what came of it."""
+    """Fly in turns and print the results."""
     rounds = next((int(word) for word in sys.argv[1:] if word.isdigit()), 3)
     options = set(sys.argv[1:])
     found: dict[bool, list[Punctual]] = {False: [], True: []}

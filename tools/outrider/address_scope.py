@@ -1,4 +1,4 @@
-"""Test whether an endpoint is reachable from outside this machine."""
+"""Address scope of endpoints: whether they reach beyond this machine."""
 
 from __future__ import annotations
 

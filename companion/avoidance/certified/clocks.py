@@ -1,11 +1,10 @@
-"""Whether the others' clocks are right, as far as messages can tell.
+"""Monitor of the other vehicles' clocks, as far as messages can show their error.
 
-Plans meet on absolute knots, so every clock must be within ``clock_us`` of fleet time; GPS or the network
-sees to that, and the margin allows for it. TIMESYNC (111) watches over it: a reply that shows tc was made
-after its request left at ts and before it arrived at now, by our clock; so the other clock is ahead by
-something between tc − now and tc − ts, whatever the delays and however unequal. Each round trip narrows that,
-and drift widens it. A clock is wrong when nothing that two right clocks may differ by is left between the
-two.
+Plans meet on absolute knots, so every clock must be within ``clock_us`` of fleet time. GPS or the network
+provides that, and the margin allows for it. TIMESYNC (111) monitors it: a reply that shows tc was made after
+its request left at ts and before it arrived at now, by the own clock. So the other clock is ahead by between
+tc − now and tc − ts, whatever the delays and however unequal they are. Each round trip narrows this interval,
+and drift widens it. A clock is wrong when the interval holds no difference that two right clocks may have.
 """
 
 from __future__ import annotations
@@ -15,14 +14,14 @@ from typing import NamedTuple
 from mavlink_bridge.messages import Source, Timesync
 
 _PERIOD = 1_000_000
-"""µs between two requests."""
+"""Time between two requests, µs."""
 _DRIFT_PPM = 200
 _NS = 1000
-"""In a µs; a request's last three digits are its sender's system id, so that replies find home."""
+"""Nanoseconds in a µs; the last three digits of a request are its sender's system id, to find its reply."""
 
 
 class Ahead(NamedTuple):
-    """By how much another clock is ahead: at least and at most, µs, as known at ``at`` (µs)."""
+    """Bounds (µs) on how far another clock is ahead, at least and at most, as known at ``at`` (µs)."""
 
     least: int
     most: int
@@ -30,7 +29,10 @@ class Ahead(NamedTuple):
 
 
 class ClockWatch:
-    """Of one vehicle over all others. ``bound``: µs that a clock may differ from fleet time."""
+    """Clock monitor of one vehicle for all others.
+
+    ``bound``: time (µs) by which a clock may differ from fleet time.
+    """
 
     def __init__(self, own: Source, bound: int) -> None:
         self._own, self._bound = own, bound
@@ -38,15 +40,18 @@ class ClockWatch:
         self.ahead: dict[int, Ahead] = {}
 
     def due(self, now: int) -> list[Timesync]:
-        """The request, when it is time for one."""
+        """Return the request if one is due."""
         if now < self._next:
             return []
         self._next = now + _PERIOD
         return [Timesync(self._own, 0, now * _NS + self._own.system)]
 
     def receive(self, now: int, message: Timesync) -> list[Timesync]:
-        """A request, and the reply to it; or a reply, which is noted if it is to one of ours and from a
-        companion: an autopilot may answer as well, by the time since it was switched on."""
+        """Receive a TIMESYNC: return the reply to a request, or take note of a reply.
+
+        A reply counts if it answers one of this vehicle's requests and comes from a companion: an autopilot
+        may answer as well, with the time since it was switched on.
+        """
         if message.tc1 == 0:
             return [Timesync(self._own, now * _NS, message.ts1)]
         asked, system = divmod(message.ts1, _NS)
@@ -60,13 +65,13 @@ class ClockWatch:
         if before is not None:
             slack = (now - before.at) * _DRIFT_PPM // 1_000_000 + 1
             both = Ahead(max(found.least, before.least - slack), min(found.most, before.most + slack), now)
-            # Where nothing is left the clock was set in between, and the new answer alone counts.
+            # An empty interval means that the clock was set in between: the new answer alone counts.
             found = both if both.least <= both.most else found
         self.ahead[message.source.system] = found
         return []
 
     @property
     def wrong(self) -> frozenset[int]:
-        """System ids whose clock and ours cannot both be right."""
+        """System ids of vehicles whose clock and the own clock cannot both be right."""
         most = 2 * self._bound
         return frozenset(system for system, one in self.ahead.items() if one.least > most or one.most < -most)

@@ -1,9 +1,9 @@
-"""The committed plan of one vehicle from epoch to epoch: who is held, who replans, what is told.
+"""Committed plan of one vehicle from epoch to epoch: when to hold, when to replan, which plan to announce.
 
 In the epoch that begins at t_e every vehicle flies its plan of t_e and makes that of t_{e+1}: by solving, as
-soon as it holds the plans of t_e of all it counts with; or, when the epoch is nearly over, by carrying its
-own on. Either way the plan of t_{e+1} is told, and told again until the next one is. Delivery is never needed
-for safety, only for progress.
+soon as it holds the plans of t_e of its whole coordination set; or, when the epoch is nearly over, by
+carrying its own plan on. In both cases it announces the plan of t_{e+1}, and repeats it until the next one.
+Delivery is never needed for safety, only for progress.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from mavlink_bridge.wire.plan import WirePlan, quantise
 
 
 class HoldReason(Enum):
-    """Why a plan was carried on instead of made anew."""
+    """Reason for carrying a plan on instead of making a new one."""
 
     MISSING = "a plan of somebody who counts has not arrived"
     CLOCK = "the clock of somebody who counts is wrong, or our own"
@@ -38,10 +38,10 @@ class HoldReason(Enum):
 
 
 class Commitment:
-    """Owns ``current``, the plan that is flown, and ``following``, that of the next epoch once it is made.
+    """Owner of ``current``, the plan that is flown, and ``following``, the plan of the next epoch once made.
 
-    ``epoch`` (µs): a whole number of knots. ``program`` and ``stall`` make plans; what they must keep away
-    from is given with each.
+    An epoch (µs) is a whole number of knots. ``program`` and ``stall`` make plans; the constraints are passed
+    with each plan.
     """
 
     def __init__(
@@ -57,9 +57,9 @@ class Commitment:
         self._planar = planar
         self._rounding = rounding(program.n, config.dt_us)
         self.told_until = 0
-        """The last epoch (µs) of which a plan was told."""
+        """Last epoch (µs) of which a plan was announced."""
         self.current: WirePlan | None = None
-        # What is made of ``current``, and of both plans, is asked for several times.
+        # Caches of what is derived from ``current``, and from both plans: it is needed several times.
         self._ahead: tuple[WirePlan, WirePlan, Array] | None = None
         self._flown: tuple[WirePlan, WirePlan | None, Horizon] | None = None
         self.following: WirePlan | None = None
@@ -67,51 +67,52 @@ class Commitment:
         self.anchored_anew = 0
 
     def epoch(self, now: int) -> int:
-        """The beginning (µs) of the epoch that holds ``now``."""
+        """Return the beginning (µs) of the epoch that holds ``now`` (µs)."""
         return now - now % self._config.epoch_us
 
     def begin(self, now: int, position: Array) -> None:
-        """Stand at ``position`` (3,) m; what is told is the plan of the next epoch of which nothing else has
-        been told."""
+        """Hold ``position`` (3,), m; the plan to announce is that of the first epoch not announced yet."""
         epoch, steps = self.epoch(now), self._program.n
         self.current = resting(epoch, self._config.dt_us, steps, position, self._origin)
         free = max(epoch, self.told_until) + self._config.epoch_us
         self.following = self.current._replace(epoch=free)
 
     def turn(self, now: int) -> bool:
-        """Go on to the epoch that holds ``now``. True if its follower is still to be made."""
+        """Advance to the epoch that holds ``now`` (µs); return whether its following plan is to be made."""
         epoch = self.epoch(now)
         if self.following is not None and self.following.epoch <= epoch:
             self.current, self.following = self.following, None
         if self.current is not None and self.current.epoch < epoch:
-            # Nothing was made or told in the meantime: nobody can have counted on anything else.
+            # No plan was made or announced in the meantime, so no vehicle can rely on another one.
             self.current = carried_on(self.current, (epoch - self.current.epoch) // self.current.dt)
         return self.current is not None and self.following is None
 
     def last_call(self, now: int) -> bool:
-        """Whether the epoch is so nearly over that nothing is waited for any more."""
+        """Return whether the epoch is so nearly over that nothing is waited for any longer."""
         return now + self._config.last_call_us >= self.epoch(now) + self._config.epoch_us
 
     def carry_on(self, why: HoldReason) -> None:
-        """Fly on in the next epoch as committed."""
+        """Continue the committed plan in the next epoch, and count the reason."""
         self.following = self.start()
         self.held[why] += 1
 
     def own(self) -> Array:
-        """Control points (n, 3, 3) of the committed plan from the next epoch on, m."""
+        """Return control points (n, 3, 3) of the committed plan from the next epoch on, m."""
         return self._carried()[1]
 
     def start(self) -> WirePlan:
-        """The committed plan from the next epoch on: where the next plan begins. CompanionError without
-        one."""
+        """Return the committed plan from the next epoch on, at which the next plan begins.
+
+        Raises CompanionError without one.
+        """
         return self._carried()[0]
 
     def replan(self, wish: Objective, goal: Array, others: Others) -> bool:
-        """Make the next epoch's plan; False if none was found and the old one is carried on."""
+        """Make the next epoch's plan; return False if none was found and the old one is carried on."""
         start, own = self._carried()
         corridor = planes(own, others, self._config.spare, upright=self._planar)
         state = State(start.position_m, start.velocity_m_s, self._flown_until(), start.accelerations_m_s2)
-        # Where there is no room, rounding breaks what is just kept: then a little more is asked for.
+        # Without room, rounding breaks what is only just kept: the second attempt asks for slightly more.
         firmly = np.maximum(corridor.wanted, corridor.least + self._rounding)
         for asked in (corridor, corridor._replace(wanted=firmly)):
             try:
@@ -120,7 +121,7 @@ class Commitment:
             except (SolverError, CertificateError):
                 continue
             points = controls(plan)
-            # What was rounded is what is checked: the plan that the others will hold.
+            # The rounded plan is checked: it is the one that the others will hold.
             kept = np.einsum("mnk,nik->mni", corridor.normals, points) - corridor.least
             if kept.min(initial=np.inf) >= 0.0:
                 push = np.einsum("mni,mnk->k", answer.pressure, corridor.normals)
@@ -131,8 +132,10 @@ class Commitment:
         return False
 
     def anchor(self, now: int, measured: Motion) -> None:
-        """Plan the next epoch anew from the ``measured`` motion, to rest: after a jump or a push that left
-        the tube. What is between two such plans is not certified."""
+        """Plan the next epoch anew from the ``measured`` motion, to rest.
+
+        This is for a jump or a push out of the tube. The transition between two such plans is not certified.
+        """
         begins = self.epoch(now) + self._config.epoch_us
         left = 1e-6 * (begins - now)
         n, dt = self._program.n, 1e-6 * self._config.dt_us
@@ -150,7 +153,7 @@ class Commitment:
         self.anchored_anew += 1
 
     def horizon(self) -> Horizon | None:
-        """What is flown from now on: this epoch's plan, and the next one's where it is made."""
+        """Return the horizon flown from now on: this epoch's plan, and the next one's where it is made."""
         if self.current is None:
             return None
         if self._flown is None or self._flown[0] is not self.current or self._flown[1] is not self.following:
@@ -162,18 +165,18 @@ class Commitment:
         return self._flown[2]
 
     def told(self) -> WirePlan | None:
-        """The plan that others are to know now."""
+        """Return the plan to announce now."""
         return self.current if self.following is None else self.following
 
     def _flown_until(self) -> Array:
-        """The acceleration (3,) with which this epoch ends."""
+        """Return the acceleration (3,), m/s², with which this epoch ends."""
         if self.current is None:
             return np.zeros(3)
         result: Array = self.current.accelerations_m_s2[self._config.knots - 1]
         return result
 
     def _carried(self) -> tuple[WirePlan, Array]:
-        """The committed plan from the next epoch on, and its control points."""
+        """Return the committed plan from the next epoch on, and its control points (n, 3, 3), m."""
         if self.current is None:
             raise CompanionError("there is no committed plan yet")
         if self._ahead is None or self._ahead[0] is not self.current:

@@ -2,8 +2,8 @@
 
 With positions in units of ½ A dt² and velocities in A dt (A = 1 mm/s²; see ``mavlink_bridge.wire.plan``) the
 motion over a knot is p' = p + 2v + a, v' = v + a, and the segment between is the quadratic Bézier curve with
-the control points p, p + v, p'. All of it is exact in integers: moving on by a knot, coming to rest, and what
-a receiver makes of the bytes.
+the control points p, p + v, p'. All of this is exact in integers: advancing by a knot, coming to rest, and
+what a receiver decodes from the bytes.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ _MM = 1e-3
 
 
 def resting(epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: int) -> WirePlan:
-    """To stand at ``position`` (3,) m (rounded to the wire) from ``epoch`` (µs) on."""
+    """Return the plan to hold ``position`` (3,), m (rounded to the wire), from ``epoch`` (µs) on."""
     return quantise(epoch, dt, position, np.zeros(3), np.zeros((steps, 3)), origin)
 
 
 def rests(plan: WirePlan) -> bool:
-    """Whether it ends at rest, exactly."""
+    """Return whether the plan ends exactly at rest."""
     return all(v + sum(a) == 0 for v, a in zip(plan.velocity, _by_axis(plan), strict=True))
 
 
 def carried_on(plan: WirePlan, knots: int) -> WirePlan:
-    """The same motion from ``knots`` (≥ 0) later on, as long as before: what is missing at its end is rest.
+    """Return the same motion from ``knots`` (≥ 0) later on, as long as before, filled with rest at its end.
 
     Raises CertificateError for a plan that does not end at rest.
     """
@@ -46,10 +46,10 @@ def carried_on(plan: WirePlan, knots: int) -> WirePlan:
 
 
 def committed(start: WirePlan, accelerations: Array) -> WirePlan:
-    """The plan from the state that ``start`` begins with, with ``accelerations`` (n, 3) m/s² rounded to the
-    wire; the last one is what brings it to rest exactly.
+    """Return the plan from the state that ``start`` begins with, with ``accelerations`` (n, 3), m/s².
 
-    Raises CertificateError if one is not finite.
+    They are rounded to the wire; the last one is what brings the plan to rest exactly. Raises
+    CertificateError if one is not finite.
     """
     if not np.isfinite(accelerations).all():
         raise CertificateError("an acceleration is not finite")
@@ -60,7 +60,10 @@ def committed(start: WirePlan, accelerations: Array) -> WirePlan:
 
 
 def rounding(steps: int, dt: int) -> Array:
-    """How far (n, 3) m rounding moves the control points of a plan, at most: half a unit an acceleration."""
+    """Return how far (n, 3), m, rounding moves the control points of a plan at most.
+
+    An acceleration is off by half a unit at most.
+    """
     n = np.arange(steps)
     units = np.stack([n**2, n**2 + n, (n + 1) ** 2], axis=1)
     result: Array = 0.25 * sqrt(3.0) * _MM * (dt * 1e-6) ** 2 * units
@@ -68,7 +71,7 @@ def rounding(steps: int, dt: int) -> Array:
 
 
 def controls(plan: WirePlan) -> Array:
-    """Control points (n, 3, 3) of the segments, m, fleet-local ENU."""
+    """Return control points (n, 3, 3) of the segments, m, fleet-local ENU."""
     states = plan.states()
     position, velocity = states[:, 0], states[:, 1]
     points = np.stack([position[:-1], position[:-1] + velocity[:-1], position[1:]], axis=1)
@@ -76,7 +79,7 @@ def controls(plan: WirePlan) -> Array:
 
 
 def horizon_of(plan: WirePlan) -> Horizon:
-    """The plan as a horizon, in metres; beyond its end it rests."""
+    """Return the plan as a horizon, in metres; beyond its end it rests."""
     states = plan.states()
     seconds = plan.dt * 1e-6
     knots = np.zeros((len(states), 9))

@@ -1,5 +1,7 @@
-"""What a certified plan keeps away from, on its own knots: the plans of those that share them, what stands,
-and strangers."""
+"""Constraint sources of a certified plan: plans of peers, fixed obstacles and non-cooperative vehicles.
+
+All are given on the plan's own knots.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +21,11 @@ from companion.values.horizon import Array
 from companion.world import View, World
 
 _STEPS_OF_SIGHT = 1.0
-"""m beyond what matters for certain, so that nothing comes into sight in the middle of a plan."""
+"""Distance (m) beyond what matters for certain, so that nothing comes into sight in the middle of a plan."""
 
 
 class ConstraintSources:
-    """Of one vehicle; ``around`` for each plan."""
+    """Constraint sources of one vehicle; ``around`` gives those of each plan."""
 
     def __init__(self, config: CompanionConfig, steps: int) -> None:
         self._config, self._steps = config, steps
@@ -41,13 +43,16 @@ class ConstraintSources:
     def around(
         self, now: int, epoch: int, own: Array, peers: PeerPlans, world: World, view: View
     ) -> tuple[Others, Array]:
-        """All that counts for the plan that begins one epoch after ``epoch``, as known at ``now`` (µs), and
-        the field f (n, 3), m/s², that it would rather yield to; ``own`` (n, 3, 3): the committed control
-        points from there on."""
+        """Return the constraints of the plan that begins one epoch after ``epoch`` (µs), and the field.
+
+        They are as known at ``now`` (µs). The field f (n, 3), m/s², is what the plan yields to where it can.
+        ``own`` (n, 3, 3), m: the committed control points from the next epoch on.
+        """
         plans = [filed.controls for filed in peers.plans(epoch).values()]
         aside = self._aside(now, peers, world)
-        # On the way down it drifts; who is further off may be flown by somebody, at any height. Once silent
-        # it counts as down where it was: what stands switched off on the ground is no danger that grows.
+        # A vehicle drifts while it descends; one that is further off may be flown by another controller, at
+        # any height. Once silent it counts as down where it was: a vehicle switched off on the ground is no
+        # growing danger.
         taken = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
         members = peers.members.union(peers.left.keys() - taken)
         begins = epoch + self._config.certified.epoch_us
@@ -71,8 +76,10 @@ class ConstraintSources:
         return others, self._noncooperative.field(seen, own, sensed)
 
     def _standing(self, own: Array) -> list[tuple[Array, Array]]:
-        """Spheres about their centres; posts beside the vehicle, whatever its height: they count as if they
-        had no top."""
+        """Return spheres about their centres, and posts beside the vehicle, whatever its height.
+
+        Posts count as if they had no top.
+        """
         points = own.reshape(-1, 3)
         found = []
         for fixed, upright in ((self._balls, False), (self._posts, True)):
@@ -88,8 +95,10 @@ class ConstraintSources:
         return found
 
     def _seen(self, sensed: Axes) -> list[tuple[Array, Array]]:
-        """What sensors see, and the ways of traffic: kept clear of as if it stood. One that comes into sight
-        within the committed plan is only yielded to."""
+        """Return what sensors detect, and the predicted ways of traffic, as if these stood still.
+
+        A plan only yields to one that comes into sight within the committed plan.
+        """
         least = self._config.field.d_min + self._margin
         places = sensed.positions.reshape(-1, self._steps, 3, 3)
         return [
@@ -98,9 +107,11 @@ class ConstraintSources:
         ]
 
     def _aside(self, now: int, peers: PeerPlans, world: World) -> dict[int, tuple[float, Array, bool]]:
-        """Of those who said farewell and were heard since beside their last plan: how far (m) beside it,
-        where (3,), and whether they are heard still. Heights do not count, and two estimates of one place
-        differ, too."""
+        """Return the vehicles that said farewell and reported a position beside their last plan since.
+
+        The values are the distance (m) from that plan, the position (3,), m, and whether messages still
+        arrive. Heights do not count, and the difference between two estimates of one position is tolerated.
+        """
         found: dict[int, tuple[float, Array, bool]] = {}
         left = peers.left
         if not left:
@@ -115,8 +126,10 @@ class ConstraintSources:
         return found
 
     def _down(self, own: Array, places: list[Array]) -> list[tuple[Array, Array]]:
-        """At ``places`` (3,) are those who said farewell, on the way down or on the ground: nobody flies over
-        them."""
+        """Return constraints at ``places`` (3,) of vehicles that said farewell, descending or on the ground.
+
+        No vehicle flies over them: heights do not count.
+        """
         found = []
         for place in places:
             centres = own.copy()
@@ -126,7 +139,7 @@ class ConstraintSources:
 
 
 def _later(controls: Array, knots: int) -> Array:
-    """Control points (M, n, 3, 3) ``knots`` later; after the end they rest."""
+    """Return control points (M, n, 3, 3) ``knots`` later; after the end they rest."""
     result = np.empty_like(controls)
     left = max(controls.shape[1] - knots, 0)
     result[:, :left] = controls[:, knots:]

@@ -1,4 +1,4 @@
-"""The certified mode of one companion: what it hears and tells of plans, and when it makes the next one."""
+"""Certified mode of one companion: receives and announces plans, and decides when to make the next one."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SENSES = {"left": -1.0}
 
 
 class CertifiedFlight:
-    """Committed plans, the others' plans and the surroundings, put together for one vehicle."""
+    """Committed plan, peers' plans and constraint sources of one vehicle."""
 
     def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
         certified, steps = config.certified, config.horizon.steps + 1
@@ -52,17 +52,17 @@ class CertifiedFlight:
         self._before_end: Array = seconds - seconds[-1]
         self._steps = steps
         self.off = self.excursion = 0.0
-        """Distance (m) of the vehicle from its plan, now and at most."""
+        """Distance (m) of the vehicle from its plan: ``off`` now, ``excursion`` at most."""
         self.left_tube = 0
-        """How often it got out of the tube."""
+        """Number of times that the vehicle left the tube."""
         self._outside = self._steers = self._told = False
         self._asked: int | None = None
         self._next_told = 0
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
-        """From now to the end of the plan that is made next, s, at most."""
+        """Time (s) from now to the end of the plan that is made next, at most."""
 
     def receive(self, now: int, message: Tunnel | Timesync) -> None:
-        """A TUNNEL or TIMESYNC on the swarm link."""
+        """Receive a TUNNEL or TIMESYNC of the swarm link."""
         system = message.source.system
         if isinstance(message, Timesync):
             self._replies += self.clocks.receive(now, message)
@@ -76,9 +76,11 @@ class CertifiedFlight:
                 self.peers.refused += 1
 
     def stand(self, now: int, position: Array) -> None:
-        """Not steering, not yet or just again: the plan is to stand at ``position`` (3,), and nobody is told
-        before it steers. But a plan in whose tube the vehicle still is goes on, and so does one that was told
-        for this epoch: others count on it. To leave one that was told before is to plan anew."""
+        """While not in control, hold ``position`` (3,), m, unannounced until the vehicle steers.
+
+        But a plan in whose tube the vehicle still is continues, and so does one that was announced for this
+        epoch: others rely on it. Leaving a plan that was announced earlier counts as planning anew.
+        """
         self._asked = now
         commitment, horizon = self.commitment, self.commitment.horizon()
         if horizon is not None:
@@ -92,8 +94,10 @@ class CertifiedFlight:
         self._steers = self._told = False
 
     def due(self, now: int) -> bool:
-        """Whether the next epoch's plan is to be made now, one way or the other. Carries on by itself what
-        cannot wait any longer."""
+        """Return whether the next epoch's plan is to be made now, by ``plan`` or otherwise.
+
+        When waiting for plans must end, this carries the committed plan on and returns False.
+        """
         self._asked, self._steers = now, True
         if not self.commitment.turn(now):
             return False
@@ -105,8 +109,10 @@ class CertifiedFlight:
         return False
 
     def watch(self, now: int, measured: Motion) -> None:
-        """Note how far the vehicle is from its plan. Outside the tube the promise rests; the plan stays, for
-        the autopilot finds back to it."""
+        """Record how far the vehicle is from its plan.
+
+        Outside the tube the guarantee is suspended; the plan stays, because the autopilot returns to it.
+        """
         horizon = self.commitment.horizon()
         if horizon is None:
             return
@@ -119,11 +125,14 @@ class CertifiedFlight:
 
     @property
     def lost(self) -> bool:
-        """Whether the vehicle is so far from its plan that it has to be planned anew from where it is."""
+        """Whether the vehicle is so far from its plan that planning must start anew at the vehicle."""
         return self.off > self._config.guard.tube
 
     def plan(self, now: int, aim: Aim, world: World, view: View) -> bool:
-        """Make the next epoch's plan towards ``aim``, whose end is where this plan ends."""
+        """Make the next epoch's plan towards ``aim``; return False if the old one is carried on.
+
+        The end of ``aim`` is the end of that plan.
+        """
         commitment = self.commitment
         start = commitment.start()
         own = commitment.own()
@@ -134,20 +143,23 @@ class CertifiedFlight:
         return commitment.replan(wish, aim.destination, others)
 
     def idle(self, now: int) -> bool:
-        """Whether there is nothing to make or to tell until something else is due."""
+        """Return whether there is nothing to make or to announce until something else is due."""
         following = self.commitment.following
         waiting = following is not None and now < following.epoch and now < self._next_told
         return waiting and not self._replies
 
     def horizon(self) -> Horizon | None:
-        """What is flown."""
+        """Return the horizon that is flown; None without a plan."""
         return self.commitment.horizon()
 
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
-        """What is to be told on the swarm link now: the newest plan, at once and then from time to time, and
-        whom it was made with. ``farewell``: it makes no other; that is said once it flies the last. Without
-        that a plan that is not flown is not told: it steers no more that was not asked at ``now`` either
-        whether a plan is ``due``, or to ``stand``."""
+        """Return the messages for the swarm link now.
+
+        They are the newest plan, at once and then repeated at intervals, and its roster: the coordination set
+        that it was made with. ``farewell``: the vehicle makes no further plan; that is announced once it
+        flies the last one. Without ``farewell``, a plan that is not flown is not announced: control lapses
+        unless ``due`` or ``stand`` is called at ``now``.
+        """
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()
         if farewell:

@@ -1,8 +1,8 @@
-"""Those that share no plan: balls that hold them, which planes keep clear of, and the paper's field of them,
-which a plan would rather yield to.
+"""Non-cooperative vehicles: balls that hold them, and the paper's field around them.
 
-The planes ask for no more than is there: from one that comes nearer by itself they do not drive away. The
-field does, as far as other plans leave room.
+Planes keep clear of the balls; a plan yields to the field where it can. The planes ask for no more distance
+than there is: they do not drive the vehicle away from one that comes nearer by itself. The field does, as far
+as other plans leave room.
 """
 
 from __future__ import annotations
@@ -23,12 +23,18 @@ from companion.values.vectors import limit
 from companion.world import View, World
 
 _NEAREST_COUNTS = 20.0
-"""The sum of the field is limited, not its parts (see ``companion.avoidance.field.planner``)."""
+"""Clamp of one force, as a multiple of a_total.
+
+The sum of the field is limited, not its parts (see ``companion.avoidance.field.planner``).
+"""
 
 
 class Stranger(NamedTuple):
-    """Where it was, (3,) m, its velocity (3,) m/s, how long before the next epoch that was, s, the least
-    distance (m) from it, and whether heights do not count."""
+    """Non-cooperative vehicle as last received.
+
+    Its ``position`` (3,), m, and ``velocity`` (3,), m/s; ``age``: time from then to the next epoch, s;
+    ``least``: least distance (m) from it; ``upright``: heights do not count.
+    """
 
     position: Array
     velocity: Array
@@ -38,7 +44,7 @@ class Stranger(NamedTuple):
 
 
 class NonCooperative:
-    """Of one vehicle, on its plans' ``steps`` knots."""
+    """Non-cooperative vehicles around one vehicle, on the ``steps`` knots of its plans."""
 
     def __init__(self, config: CompanionConfig, steps: int) -> None:
         self._config, self._steps = config, steps
@@ -46,7 +52,7 @@ class NonCooperative:
         self._vehicle = between(own, config.field, config.limits)
         away = margin(own, config.field, config.limits)
         self._exact = exact = config.field.d_min + away
-        # Where such a thing says that it is counts as exact.
+        # The reported position of a moving obstacle counts as exact.
         self._things = {
             one.system: (exact + one.radius, isinstance(one, MovingPost)) for one in config.moving
         }
@@ -54,7 +60,7 @@ class NonCooperative:
         self._seconds: Array = 1e-6 * own.dt_us * np.arange(steps + 1.0)
 
     def seen(self, begins: int, members: Set[int], world: World) -> list[Stranger]:
-        """All but the ``members`` that are heard, for the epoch that begins at ``begins`` (µs)."""
+        """Return the received vehicles except ``members``, for the epoch that begins at ``begins`` (µs)."""
         found = []
         for system, time, position, velocity in world.neighbours.last_heard():
             if system not in members:
@@ -65,8 +71,10 @@ class NonCooperative:
         return found
 
     def balls(self, seen: list[Stranger], own: Array) -> list[tuple[Array, Array]]:
-        """Centres (n, 3, 3) and least distances (n,) from them, m, beside control points ``own`` (n, 3,
-        3)."""
+        """Return centres (n, 3, 3) and least distances (n,) from them, m, for the vehicles ``seen``.
+
+        ``own`` (n, 3, 3), m, are the control points of the own plan.
+        """
         bounds = self._config.certified.stranger_speed, self._config.certified.stranger_acceleration
         found = []
         for one in seen:
@@ -81,9 +89,11 @@ class NonCooperative:
         return found
 
     def target(self, now: int, begins: int, view: View) -> list[tuple[Array, Array]]:
-        """The same for the target, where it is an obstacle, as seen at ``now`` for the epoch that begins at
-        ``begins`` (µs): that it flies on as it does is taken for granted, for it is followed and not guarded
-        against. One that falls silent stays where it was last."""
+        """Return the same for the target, where it is an obstacle, as seen at ``now`` (µs).
+
+        It is for the epoch that begins at ``begins`` (µs). The target is assumed to keep its motion, because
+        it is followed and not guarded against. One that falls silent stays where it was last.
+        """
         if view.target_last is None or self._target is None:
             return []
         ends = view.target_last.ahead(self._seconds + 1e-6 * (begins - now)).positions
@@ -91,8 +101,11 @@ class NonCooperative:
         return [(np.stack([ends[:-1], middle, ends[1:]], axis=1), np.full(self._steps, self._target))]
 
     def field(self, seen: list[Stranger], own: Array, sensed: Axes | None = None) -> Array:
-        """f (n, 3), m/s², after each step of the committed plan ``own`` (n, 3, 3): eqs. (8) and (9) for those
-        that fly on as they do until they are near, and for what is ``sensed`` beside its control points."""
+        """Return f (n, 3), m/s², after each step of the committed plan ``own`` (n, 3, 3): eqs. (9) and (10).
+
+        It is the field of those ``seen``, which keep their velocity until they are near, and of what is
+        ``sensed`` beside the plan's control points.
+        """
         config = self._config
         if sensed is None:
             sensed = Axes((), np.empty((0, 3 * self._steps, 3)), np.empty(0))
@@ -118,8 +131,11 @@ class NonCooperative:
 
 
 def _hold_where_caught(centres: Array, own: Array, radii: Array) -> None:
-    """Where a ball has grown over the plan nothing is promised, whatever its plane: there it stays on the
-    side that it came from, for beyond the vehicle it would keep that from flying away."""
+    """Hold a ball from where it has grown over the plan, on the side that it came from.
+
+    There nothing is guaranteed, whatever the plane. Beyond the vehicle the ball would keep it from flying
+    away.
+    """
     off = own - centres
     caught = (np.vecdot(off, off) < radii[:, None] ** 2).any(axis=1)
     if caught.any():
@@ -128,8 +144,11 @@ def _hold_where_caught(centres: Array, own: Array, radii: Array) -> None:
 
 
 def _stop_when_near(places: Array, distance: Array, least: Array) -> None:
-    """Hold each of ``places`` (M, n, 3) where its ``distance`` (M, n) first comes to ``least`` (M,), or is
-    smallest: what has gone through the vehicle would drive it back into the way of what is yet to come."""
+    """Hold each of ``places`` (M, n, 3) where its ``distance`` (M, n) first reaches ``least`` (M,).
+
+    If it never does, hold it where the distance is smallest. A place that has passed through the vehicle
+    would drive it back into the way of what is yet to come.
+    """
     for place, far, enough in zip(places, distance, least, strict=True):
         near = int(np.argmax(far <= enough)) if (far <= enough).any() else int(far.argmin())
         place[near:] = place[near]

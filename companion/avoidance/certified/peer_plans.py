@@ -1,11 +1,11 @@
-"""What each knows of the others' committed plans, and whom it counts with.
+"""Peers' committed plans, filed by the epoch at which they begin, and the coordination set.
 
-Plans are filed by the epoch they begin at. A vehicle replans in an epoch only if it holds the plan of that
-very epoch of everybody it counts with, and each of them counts with it in that epoch (``missing`` is empty):
-an older plan will not do, for its sender may have made another since. Who was once heard with a plan or a
-roster counts from then on, and so does whoever one of those counts with; who has said farewell flies its last
-plan to the end and stays there. That is believed only with the very plan that the farewell goes with, for an
-older one may end elsewhere; and only for as long as plans are, for its sender may have joined again since.
+A vehicle replans in an epoch only if it holds the plan of that very epoch of every member of its coordination
+set, and each member counts it as a member in that epoch (``missing`` is empty). An older plan is not enough,
+because its sender may have made another since. A sender of a plan or a roster is a member from then on, and
+so are the members in its roster. A vehicle that said farewell flies its last plan to the end and stays there.
+A farewell is accepted only with the very plan that it goes with, because an older one may end elsewhere; and
+only for as long as plans are, because its sender may have joined again since.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from mavlink_bridge.wire.plan import WirePlan, unpack
 from mavlink_bridge.wire.roster import Roster
 
 _KEPT = 4
-"""Epochs of a sender that are kept; nothing that is older or further ahead is believed."""
+"""Epochs of a sender that are kept; nothing older or further ahead is accepted."""
 
 
 class Filed(NamedTuple):
-    """A plan with its control points (n, 3, 3), m."""
+    """Plan with its control points (n, 3, 3), m."""
 
     plan: WirePlan
     controls: Array
@@ -32,8 +32,10 @@ class Filed(NamedTuple):
 
 @lru_cache(maxsize=512)
 def _read(payload: bytes) -> tuple[Filed, bool]:
-    """A plan on the wire, and whether it ends at rest. Where many companions share a process each is read
-    once. Raises PlanWireError."""
+    """Return a received plan, and whether it ends at rest; raises PlanWireError.
+
+    Where many companions share a process, each payload is decoded once.
+    """
     plan = unpack(payload)
     points = controls(plan)
     points.flags.writeable = False
@@ -41,8 +43,11 @@ def _read(payload: bytes) -> tuple[Filed, bool]:
 
 
 class PeerPlans:
-    """Plans and rosters of the others. ``expected``: system ids that are to take part, heard or not.
-    ``steps`` and ``dt`` (µs) are everybody's; ``epoch`` (µs) is a whole number of dt."""
+    """Plans and rosters of the peers.
+
+    ``expected``: system ids that must take part, received or not. ``steps`` and ``dt`` (µs) are those of all
+    vehicles; ``epoch`` (µs) is a whole number of dt.
+    """
 
     def __init__(
         self, own: int, expected: frozenset[int], steps: int, dt: int, epoch: int, origin: int
@@ -52,7 +57,8 @@ class PeerPlans:
         self._steps, self._dt, self._epoch, self._origin = steps, dt, epoch, origin
         self._plans: dict[int, dict[int, Filed]] = {}
         self._rosters: dict[int, Roster] = {}
-        # From which epoch (µs) on each counts with us, and which rosters (µs) tell of it at the earliest.
+        # Epoch (µs) from which on each peer counts this vehicle, and the earliest epoch (µs) of rosters that
+        # show it.
         self._counted: dict[int, int] = {}
         self._telling = 0
         self._left: dict[int, Filed] = {}
@@ -62,7 +68,7 @@ class PeerPlans:
 
     @property
     def members(self) -> frozenset[int]:
-        """Everybody that is counted with."""
+        """System ids of the coordination set."""
         if self._members is None:
             named = (roster.members for roster in self._rosters.values())
             known = self._expected.union(self._plans, self._rosters, *named)
@@ -70,8 +76,8 @@ class PeerPlans:
         return self._members
 
     def receive_plan(self, now: int, system: int, payload: bytes) -> None:
-        """A TUNNEL payload of kind plan; one that cannot be a committed plan is refused and counted."""
-        # Most are told again what they hold.
+        """Receive a TUNNEL payload of kind plan; refuse and count one that cannot be a committed plan."""
+        # Most payloads repeat the last one.
         if system == self._own or self._last.get(system) == payload:
             return
         try:
@@ -102,13 +108,17 @@ class PeerPlans:
                 del filed[epoch]
 
     def receive_roster(self, now: int, system: int, roster: Roster) -> None:
-        """Whom a member counts with. A farewell says that its plan of that epoch is its last; whoever has
-        not got that plan yet, or is not in that epoch yet, hears it again. One that comes late says nothing:
-        who joined again since makes plans."""
+        """Receive a roster: the coordination set of ``system``, or its farewell.
+
+        A farewell means that the sender's plan of that epoch is its last. It is repeated for receivers that
+        do not hold that plan yet or are not in that epoch yet. A late farewell has no effect: a sender that
+        has joined again since makes plans.
+        """
         if system == self._own:
             return
         if roster.epoch - now > _KEPT * self._epoch:
-            # By a clock that will be set right: what is said then would come too early.
+            # The sender's clock is wrong and will be set right: its rosters from then on would be dated
+            # before this one.
             self.refused += 1
             return
         last = self._rosters.get(system)
@@ -134,15 +144,22 @@ class PeerPlans:
         self._rosters[system] = roster
 
     def leave(self, epoch: int) -> None:
-        """Farewell is said with the own plan of ``epoch`` (µs): who believes it counts with us no more. So
-        nobody is taken to, until it tells so when it can no longer come to believe it. A roster goes with a
-        plan that begins at most two epochs later."""
+        """Record the own farewell with the own plan of ``epoch`` (µs).
+
+        A peer that accepts it no longer counts this vehicle. So no peer is assumed to count it until it
+        reports so at a time when it can no longer accept the farewell. A roster goes with a plan that begins
+        at most two epochs later.
+        """
         self._counted.clear()
         self._telling = epoch + (_KEPT + 3) * self._epoch
 
     def missing(self, epoch: int) -> set[int]:
-        """Members whose plan of ``epoch`` (µs) is not held, or who may replan in it without counting with us:
-        whoever says so only with a later plan may have made that plan before it counted with us."""
+        """Return the members that keep this vehicle from replanning in ``epoch`` (µs).
+
+        They are those whose plan of that epoch is not held, and those that may replan in it without counting
+        this vehicle. A member that first counts this vehicle with a later plan may have made that plan before
+        it did so.
+        """
         found = set()
         for system in self.members:
             counted = self._counted.get(system)
@@ -151,7 +168,7 @@ class PeerPlans:
         return found
 
     def plans(self, epoch: int) -> dict[int, Filed]:
-        """Plans of ``epoch`` (µs), that of now, by system id: of members and of those who left."""
+        """Return the plans of the present ``epoch`` (µs) by system id, of members and of those that left."""
         found = {system: filed[epoch] for system, filed in self._plans.items() if epoch in filed}
         for system, last in self._left.items():
             plan = carried_on(last.plan, (epoch - last.plan.epoch) // self._dt)
@@ -160,5 +177,5 @@ class PeerPlans:
 
     @property
     def left(self) -> dict[int, Filed]:
-        """The last plans of those who said farewell."""
+        """Last plans of those that said farewell, by system id."""
         return dict(self._left)

@@ -1,14 +1,14 @@
-"""The QP of the certified mode: three axes together, because planes couple them; PIQP, with the rows that
-matter.
+"""QP of the certified mode: three axes together, because planes couple them; PIQP, with the rows that matter.
 
 Variables are the accelerations a_n (n = 0…N) of each axis in turn. The cost is the paper's on every step
 instead of the last alone, without the field in the input: a plan that ends at rest cannot follow a lasting
-push with its accelerations. What is added for the field is −2 Ω_f f·x on every step, as if it were the slope
-of a potential there: it moves the plan, as far as nothing is in the way. The plan ends at rest.
-Bounds of acceleration are bounds on variables; limits of speed and place and the planes are rows Ga ≥ low, of
-which only those take part that the committed plan is near to, that the best plan without any rows would
-break, or that a solution has broken. Whatever limit the committed plan itself breaks is widened to it: so
-that plan solves every problem.
+push with its accelerations. For the field, −2 Ω_f f·x is added on every step, as if f were the slope of a
+potential there: it moves the plan as far as nothing is in the way. The plan ends at rest.
+
+Bounds of acceleration are bounds on variables. Limits of speed and position and the planes are rows Ga ≥ low.
+Only those rows take part that the committed plan is near to, that the best plan without any rows would break,
+or that a solution has broken. A limit that the committed plan itself breaks is widened to it, so that this
+plan is feasible in every problem.
 """
 
 from __future__ import annotations
@@ -28,16 +28,19 @@ from companion.values.prediction import prediction
 
 _ROUNDS = 8
 _NEAR = 0.1
-"""m/s and m: rows that the committed plan is nearer to take part from the first solution on."""
+"""Distance (m/s, m) of the committed plan within which a row takes part from the first solution on."""
 _TOLERANCE = 1e-5
-"""m and m/s: what PIQP leaves; far below what is wanted beyond the least distance."""
+"""Error (m, m/s) that PIQP leaves; far below what is wanted beyond the least distance."""
 _ROUNDED = 0.01
-"""m/s²: bounds are that much tighter, so that rounding, and coming to rest exactly, keep them."""
+"""Tightening of the bounds (m/s²), so that rounding, and coming to rest exactly, keep them."""
 
 
 class State(NamedTuple):
-    """Where a plan begins: position (3,) m, velocity (3,) m/s, the acceleration (3,) m/s² until then, and the
-    accelerations (n, 3) that the committed plan has from there on."""
+    """Beginning of a plan: position (3,), m, and velocity (3,), m/s.
+
+    ``before`` (3,), m/s², is the acceleration until then; ``committed`` (n, 3), m/s², are the accelerations
+    that the committed plan has from there on.
+    """
 
     position: Array
     velocity: Array
@@ -46,8 +49,10 @@ class State(NamedTuple):
 
 
 class Objective(NamedTuple):
-    """What is preferred after each step: places (n, 3) m, velocities (n, 3) m/s, and the field f (n, 3) m/s²
-    that is yielded to."""
+    """Preferred places (n, 3), m, and velocities (n, 3), m/s, after each step.
+
+    ``field``: the field f (n, 3), m/s², that the plan yields to.
+    """
 
     places: Array
     velocities: Array
@@ -55,8 +60,10 @@ class Objective(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Accelerations (n, 3) m/s²; ``pressure`` (M, n, 3) ≥ 0: the multipliers of the planes' rows; how many
-    solutions it took."""
+    """Accelerations (n, 3), m/s², of a solution.
+
+    ``pressure`` (M, n, 3) ≥ 0: the multipliers of the planes' rows. ``rounds``: the number of QPs solved.
+    """
 
     accelerations: Array
     pressure: Array
@@ -73,12 +80,12 @@ class SeparationQp:
         self.n, self._config = n, config
         self._S_v, self._S_x, _ = prediction(n, dt)
         v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self._S_v, self._S_x))
-        # How control point b of segment i depends on a, (3, n, n), and on time where a = 0, (n, 3).
+        # Control point b of segment i, depending on a, (3, n, n), and on time where a = 0, (n, 3).
         self._maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x])
         self._times: Array = dt * (np.arange(n)[:, None] + np.array([0.0, 0.5, 1.0]))
         self._weights = np.full(n, config.omega_place)
         self._weights[-1] = config.omega_end
-        # a_n − a_{n−1}; before the first is what is flown until then.
+        # a_n − a_{n−1}; before the first is the acceleration flown until then.
         change = np.eye(n) - np.eye(n, k=-1)
         one = 2.0 * (
             self._S_x.T @ (self._weights[:, None] * self._S_x)
@@ -88,17 +95,17 @@ class SeparationQp:
         )
         self._P = np.asfortranarray(np.kron(np.eye(3), one))
         self._A = np.asfortranarray(np.kron(np.eye(3), self._S_v[-1:]))
-        # Of the optimality conditions without rows and bounds, so that the best plan is one product.
+        # Inverse of the optimality conditions without rows and bounds: the best plan is then one product.
         conditions = np.block([[self._P, self._A.T], [self._A, np.zeros((3, 3))]])
         self._without_rows: Array = np.linalg.inv(conditions)[: 3 * n]
         self.pull = 2.0 * float(self._weights.sum())
-        """What the cost pulls with at a plan that is a metre from all the places that it should be at."""
+        """Cost gradient at a plan that is one metre from all its preferred places."""
         a_max = np.array(limits.u_max) - _ROUNDED
         if planar:
-            # The heights stay, as good as: an interior-point method wants an interior.
+            # The heights stay almost constant: an interior-point method needs an interior.
             a_max[2] = _ROUNDED
         self._a_max = np.repeat(a_max, n)
-        # Speeds after each step and control points but the first of each segment, both ways.
+        # Speeds after each step, and control points except the first of each segment, both ways.
         kron = [np.kron(np.eye(3), part) for part in (self._S_v, self._maps[1], self._maps[2])]
         self._limits_G: Array = np.vstack([sign * part for part in kron for sign in (1.0, -1.0)])
         v_max, low, high = (
@@ -108,8 +115,10 @@ class SeparationQp:
         self._limits_low: Array = np.concatenate([-v_max, -v_max, low, -high, low, -high])
 
     def solve(self, state: State, wish: Objective, planes: Planes) -> Answer:
-        """The best plan from ``state`` that keeps all rows. SolverError if PIQP finds none, or if rows are
-        still broken after some rounds."""
+        """Return the best plan from ``state`` that keeps all rows.
+
+        Raises SolverError if PIQP finds none, or if rows are still broken after some rounds.
+        """
         free = self._free(state.position, state.velocity)
         c = self._cost(free[:, 2], state.velocity, state.before, wish)
         rows = _Rows(self, free, state, planes)
@@ -134,8 +143,11 @@ class SeparationQp:
         return position + self._times[:, :, None] * velocity
 
     def _cost(self, ends: Array, velocity: Array, before: Array, wish: Objective) -> Array:
-        """c (3n,) where the motion without input ends its steps at ``ends`` (n, 3); ``before`` (3,): the
-        acceleration until the plan begins."""
+        """Return c (3n,).
+
+        ``ends`` (n, 3), m: the ends of the steps without input. ``before`` (3,), m/s²: the acceleration until
+        the plan begins.
+        """
         config = self._config
         flown = np.zeros_like(wish.field)
         flown[0] = before
@@ -149,8 +161,10 @@ class SeparationQp:
 
 
 class _Rows:
-    """All rows of one problem: those of the limits, then those of the planes, which are written out only
-    where they take part."""
+    """All rows of one problem: first those of the limits, then those of the planes.
+
+    Rows of planes are written out only where they take part.
+    """
 
     def __init__(self, program: SeparationQp, free: Array, state: State, planes: Planes) -> None:
         self._program, self._normals = program, planes.normals
@@ -160,14 +174,14 @@ class _Rows:
         none = np.concatenate([s * part for part in (speeds, *places) for s in (1.0, -1.0)])
         self._split = len(none)
         wanted = planes.wanted - np.einsum("mnk,nik->mni", planes.normals, free)
-        # The first control point is where the vehicle is, whatever it does.
+        # The first control point is the vehicle's position, which no input changes.
         wanted[:, 0, 0] = -np.inf
         self._low: Array = np.concatenate([program._limits_low - none, wanted.ravel()])
         # The planes are made so that the committed plan keeps them.
         self._low[: self._split] -= np.maximum(-self.values(state.committed)[: self._split], 0.0)
 
     def values(self, a: Array) -> Array:
-        """By how much each row holds with accelerations (n, 3)."""
+        """Return by how much each row holds with accelerations ``a`` (n, 3), m/s²."""
         moved = np.einsum("bij,jk->ibk", self._program._maps, a)
         planes = np.einsum("mnk,nik->mni", self._normals, moved)
         limits = self._program._limits_G @ a.T.ravel()
@@ -175,7 +189,7 @@ class _Rows:
         return result
 
     def chosen(self, active: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """G (R, 3n) and low (R,) of the ``active`` rows."""
+        """Return G (R, 3n) and low (R,) of the ``active`` rows."""
         program, n = self._program, self._program.n
         m, i, b = np.unravel_index(np.flatnonzero(active[self._split :]), (*self._normals.shape[:2], 3))
         planes = self._normals[m, i][:, :, None] * program._maps[b, i][:, None, :]
@@ -183,7 +197,7 @@ class _Rows:
         return G, self._low[active]
 
     def pressure(self, active: NDArray[np.bool_], multipliers: Array) -> Array:
-        """The multipliers of the planes' rows, (M, n, 3)."""
+        """Return the multipliers of the planes' rows, (M, n, 3)."""
         every = np.zeros(len(active))
         every[active] = multipliers
         return every[self._split :].reshape(*self._normals.shape[:2], 3)

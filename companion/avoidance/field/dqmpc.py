@@ -1,14 +1,16 @@
-"""The DQMPC of the paper, eqs. (2) to (6), as three QPs of N + 1 variables each: x, y and z decouple.
+"""DQMPC of the paper, eqs. (2) to (7), as three QPs of N + 1 variables each: x, y and z decouple.
 
-Settled against the text. The variable is the total acceleration a = u + f, because cost and dynamics see
-nothing else: f only shifts the bounds, a ∈ [f + u_min, f + u_max]. Gravity is absent: u is relative to hover,
-and the vehicle's controller carries the weight (with g in the dynamics and |u| ≤ 2 the problem has no
+Deviations from the paper. The variable is the total acceleration a = u + f, because cost and dynamics depend
+on nothing else: f only shifts the bounds, a ∈ [f + u_min, f + u_max]. Gravity is absent: u is relative to
+hover, and the vehicle's controller carries the weight (with g in the dynamics and |u| ≤ 2 the problem has no
 solution). The vehicle's own bound, ‖u + f‖ ≤ a_total, holds for every solution: the box is shrunk from
-outside until its far corner lies in that ball. Box and speed limits come before the field: where the bounds
-that f has shifted leave no input that keeps them, these bounds are opened again towards what the vehicle has,
-as late in the horizon as may be, so that a vehicle still evades with all its force until it is fast enough
-(``_late``), and then as little as is enough. Only a limit that even this cannot keep is widened to what is
-reachable, so that every QP has a solution. With ``j_max`` the jerk is bounded, too (``jerk``).
+outside until its far corner lies in that ball.
+
+Box and speed limits have priority over the field. Where the bounds shifted by f leave no input that keeps
+these limits, the bounds are opened towards what the vehicle can do: first as late in the horizon as possible,
+so that a vehicle still evades with full force until it is fast enough (``_late``), and then as little as
+necessary. Only a limit that even this cannot keep is widened to what is reachable, so that every QP has a
+solution. With ``j_max`` the jerk is bounded, too (``jerk``).
 """
 
 from __future__ import annotations
@@ -27,17 +29,18 @@ from companion.values.horizon import Array
 from companion.values.prediction import prediction
 
 _TOLERANCE = 1e-7
-"""m and m/s by which a state limit may be passed: far below what anything can measure."""
+"""Violation of a state limit (m, m/s) that is tolerated: far below what can be measured."""
 _SPARE, _SLOWER, _INSIDE = 0.5, 0.02, 0.05
-"""Share of the braking that is counted on, m/s below v_max and m inside the box, where bounds give way to
-limits."""
+"""Margins where bounds yield to limits.
+
+They are the share of the braking that is counted on, m/s below v_max, and m inside the box.
+"""
 _WIDEN = 0.01
-"""Share of the reach by which an unreachable bound is widened: an interior keeps the interior-point method
-happy."""
+"""Share of the reach by which an unreachable bound is widened: an interior-point method needs an interior."""
 
 
 class AxisQp(NamedTuple):
-    """One axis: min ½ aᵀPa + cᵀa, x_l ≤ a ≤ x_u, h_l ≤ Ga ≤ h_u."""
+    """QP of one axis: min ½ aᵀPa + cᵀa, x_l ≤ a ≤ x_u, h_l ≤ Ga ≤ h_u."""
 
     P: Array
     c: Array
@@ -49,9 +52,12 @@ class AxisQp(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """The vectors of the three QPs, (3, n) and (3, 2n): c, bounds of a, bounds of velocities and positions
-    1…N + 1. ``far`` (3, n): the largest |a| that the vehicle has on that axis, whatever the field. ``flown``:
-    what the plan goes on from, where jerk is bounded."""
+    """Vectors of the three QPs, (3, n) and (3, 2n).
+
+    They are c, the bounds of a, and the bounds of velocities and positions 1…N + 1. ``far`` (3, n): the
+    largest |a| that the vehicle has on that axis, in either direction: |f| + u_max, scaled to a_total.
+    ``flown``: the motion that the plan continues, where jerk is bounded.
+    """
 
     c: Array
     x_l: Array
@@ -63,14 +69,17 @@ class Problem(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """``acceleration`` a = u + f (N + 1, 3); ``relaxed`` counts axes whose state limits had to be dropped."""
+    """Total ``acceleration`` a = u + f (N + 1, 3), m/s²; eq. (1) with the field.
+
+    ``relaxed`` counts axes on which constraints had to be dropped, mostly state limits.
+    """
 
     acceleration: Array
     relaxed: int
 
 
 class _Solvers(NamedTuple):
-    """For one weight Ω_t: −P⁻¹ (n, n), the QP without state limits, and the QP with them."""
+    """Solvers for one weight Ω_t: −P⁻¹ (n, n), the QP without state limits, and the QP with them."""
 
     minimiser: Array
     bounded: QpSolver
@@ -78,8 +87,10 @@ class _Solvers(NamedTuple):
 
 
 class Dqmpc:
-    """Matrices and solvers for one horizon, cost and set of limits. ``omega_scale`` lowers Ω_t (tangential
-    band)."""
+    """Matrices and solvers for one horizon, cost and set of limits.
+
+    ``omega_scale`` lowers Ω_t (tangential band).
+    """
 
     def __init__(self, horizon: HorizonConfig, cost: CostConfig, limits: LimitsConfig) -> None:
         n = horizon.steps + 1
@@ -92,7 +103,7 @@ class Dqmpc:
         self._jerk = None if limits.j_max is None else JerkRows(n, dt, np.array(limits.j_max))
         self._u = np.array(limits.u_max)[:, None]
         ones, no = np.ones(n), np.zeros(n)
-        # [v, x] (3, 2) times this is what velocities and positions 1…n are without any input (3, 2n).
+        # [v, x] (3, 2) times this gives velocities and positions 1…n without any input (3, 2n).
         self._drift: Array = np.vstack([np.hstack([ones, self._time]), np.hstack([no, ones])])
         self._low, self._high = (
             np.hstack([np.outer(speed, ones), np.outer(place, ones)])
@@ -101,14 +112,16 @@ class Dqmpc:
                 (np.array(limits.v_max), limits.box_max),
             )
         )
-        # [x − x̌, v − v̌] at the end (3, 2) times this is c, for Ω_t as configured.
+        # [x − x̌, v − v̌] at the end (3, 2) times this gives c, for Ω_t as configured.
         weights = 2.0 * np.array([cost.omega_t_position, cost.omega_t_velocity])
         self._pull: Array = weights[:, None] * np.vstack([self.S_x[-1], self.S_v[-1]])
         self._solvers = lru_cache(maxsize=16)(self._build)
 
     def hessian(self, omega_scale: float) -> Array:
-        """P = 2(Ω_i I + Ω_x s_x s_xᵀ + Ω_v s_v s_vᵀ); PIQP likes its weights
-        between 1e2 and 1e3."""
+        """Return P = 2(Ω_i I + Ω_x s_x s_xᵀ + Ω_v s_v s_vᵀ), with Ω_x and Ω_v times ``omega_scale``.
+
+        PIQP works best with weights between 1e2 and 1e3.
+        """
         s_x, s_v = self.S_x[-1], self.S_v[-1]
         w = self.cost
         return 2.0 * (
@@ -127,8 +140,12 @@ class Dqmpc:
         omega_scale: float,
         flown: Flown | None = None,
     ) -> Problem:
-        """The QPs' vectors from state (3,), (3,), field f (N + 1, 3), destination x̌ (3,) and terminal
-        velocity (3,); ``flown`` counts where jerk is bounded, and its absence there means at rest."""
+        """Return the vectors of the QPs from the state and the field.
+
+        The state is ``x``, ``v`` (3,), the field ``f`` (N + 1, 3), the destination x̌ (3,) and the terminal
+        ``velocity`` (3,). ``flown`` counts where jerk is bounded; without it the plan starts from zero
+        acceleration.
+        """
         fT = f.T
         reach = np.abs(fT) + self._u
         norm = np.sqrt((reach * reach).sum(axis=0))
@@ -147,9 +164,11 @@ class Dqmpc:
         )
 
     def reachable(self, problem: Problem) -> Problem:
-        """The problem with state limits that can be kept: first the bounds on a are opened for them, as
-        late and as little as is enough; what even then no input keeps is widened to what is reachable, and a
-        little."""
+        """Return the problem with state limits that can be kept.
+
+        First the bounds on a are opened for the limits, as late and as little as necessary. A limit that no
+        input keeps even then is widened to slightly beyond what is reachable.
+        """
         _, x_l, x_u, h_l, h_u, far, flown = problem
         least, most = -far, far
         if self._jerk is not None and flown is not None:
@@ -157,7 +176,7 @@ class Dqmpc:
             x_l, x_u = np.minimum(np.maximum(x_l, a_l), a_u), np.maximum(np.minimum(x_u, a_u), a_l)
             least, most = np.minimum(np.maximum(least, a_l), a_u), np.maximum(np.minimum(most, a_u), a_l)
         least, most = np.minimum(least, x_l), np.maximum(most, x_u)
-        # The state that the plan begins with, as the drift in the rows has it.
+        # The state that the plan begins with, recovered from the drift in the rows.
         v = self._low[:, 0] - h_l[:, 0]
         x = self._low[:, -1] - h_l[:, -1] - self.seconds * v
         down = np.any(h_l > x_u @ self._G_T + _TOLERANCE, axis=1, keepdims=True)
@@ -183,9 +202,12 @@ class Dqmpc:
     def _late(
         self, pushed: Array, least: Array, room: Array, v: Array, flown: Flown | None, side: float
     ) -> Array:
-        """The accelerations (3, n) towards a ``side`` (1 up, −1 down) that is ``room`` (3,) m away, at ``v``
-        (3,) m/s: as ``pushed`` (3, n), until speed or braking distance allow no more. Not less than ``least``
-        (3, n); with bounded jerk no change that it forbids."""
+        """Return accelerations (3, n) as ``pushed`` (3, n) until speed or braking distance allow no more.
+
+        They point towards a ``side`` (1 up, −1 down) that is ``room`` (3,) m away, approached at ``v`` (3,)
+        m/s. Without a bound on jerk they are not less than ``least`` (3, n); with one, their changes stay
+        within it.
+        """
         dt, found, room = self.dt, np.empty_like(pushed), room - _INSIDE
         strong = -_SPARE * np.minimum(least[:, -1], 0.0)
         fastest = self._high[:, 0] - _SLOWER
@@ -196,12 +218,12 @@ class Dqmpc:
             lost = dt if jerk is None else dt + strong / (2.0 * jerk)
             stop = np.sqrt(2.0 * strong * np.maximum(room - lost * np.maximum(v, 0.0), 0.0))
             rest = np.minimum(fastest, stop) - v
-            # A vehicle that is too fast away from that side has to be slowed down first.
+            # A vehicle that moves away from that side too fast must be slowed down first.
             wanted = np.maximum(pushed[:, n], (-fastest - v) / dt)
             if jerk is None:
                 a = np.maximum(np.minimum(wanted, rest / dt), least[:, n])
             else:
-                # v + dt a + a²/2j, what it is when a has come back to zero, stays below.
+                # v + dt a + a²/2j, the speed when a has come back to zero, stays below.
                 slow = jerk * (np.sqrt(dt * dt + 2.0 * np.maximum(rest, 0.0) / jerk) - dt)
                 back = np.maximum(rest / dt, -np.sqrt(jerk * np.maximum(-rest, 0.0)))
                 a = np.minimum(wanted, np.where(rest > 0.0, slow, back))
@@ -213,9 +235,12 @@ class Dqmpc:
         return found
 
     def _opened(self, missing: Array, room: Array, margin: Array) -> Array:
-        """What bounds (3, n) on a have to give way by, of the ``room`` (3, n) that they have, so that rows
-        (3, 2n) gain what is ``missing`` there, and a ``margin``: the same share of it at every n."""
-        # Speed has been seen to: what is still too fast cannot be slowed down in time.
+        """Return by how much bounds (3, n) on a give way so that rows (3, 2n) gain what is ``missing`` there.
+
+        They give way within their ``room`` (3, n), by the same share of it at every n. The rows gain a
+        ``margin`` in addition.
+        """
+        # Speed has been treated before: a vehicle that is still too fast cannot be slowed down in time.
         missing = missing[:, self.n :]
         if (missing <= _TOLERANCE).all():
             return np.zeros_like(room)
@@ -226,7 +251,7 @@ class Dqmpc:
         return opened
 
     def axis(self, problem: Problem, axis: int, omega_scale: float) -> AxisQp:
-        """One axis in full, for another solver or a KKT check."""
+        """Return the QP of one axis in full, for another solver or a KKT check."""
         problem = self.reachable(problem)
         low, high = self._rows(problem)
         return AxisQp(
@@ -240,24 +265,25 @@ class Dqmpc:
         )
 
     def _rows(self, problem: Problem) -> tuple[Array, Array]:
-        """Bounds (3, m) of all rows: velocities, positions and, where it is bounded, changes of a."""
+        """Return bounds (3, m) of all rows: velocities, positions and, with bounded jerk, changes of a."""
         if self._jerk is None or problem.flown is None:
             return problem.h_l, problem.h_u
         d_l, d_u = self._jerk.bounds(problem.flown)
         return np.hstack([problem.h_l, d_l]), np.hstack([problem.h_u, d_u])
 
     def solve(self, problem: Problem, omega_scale: float) -> Solution:
-        """Solve the three axes, each with no more constraints than matter.
+        """Solve the three axes, each with no more constraints than necessary.
 
-        The free minimiser is the solution where it lies within the bounds on a and on jerk; otherwise PIQP
+        The free minimiser is the solution where it lies within the bounds on a and on jerk. Otherwise PIQP
         solves with these bounds, and once more with all constraints where that solution breaks a state limit.
-        An axis whose constraints contradict each other is solved without its state limits and counted; its
-        bounds on a and on jerk always hold. SolverError only if even that fails.
+        An axis whose constraints contradict each other is solved without its state limits and counted. Its
+        bounds on a and on jerk still hold; where these contradict each other, the bounds on jerk hold. Raises
+        SolverError only if even that fails.
         """
         solvers = self._solvers(omega_scale)
         c, x_l, x_u, h_l, h_u = problem[:5]
         a: Array = solvers.minimiser @ c.T
-        # Asked so that a NaN anywhere fails both questions, and reaches a solver that refuses it.
+        # Written so that a NaN anywhere fails both comparisons, and reaches a solver that refuses it.
         inside = ((a >= x_l.T) & (a <= x_u.T)).all(axis=0)
         relaxed = 0
         if self._jerk is None or problem.flown is None:
@@ -285,15 +311,18 @@ class Dqmpc:
             x_l = np.where(kept[:, None], x_l, opened.x_l)
             x_u = np.where(kept[:, None], x_u, opened.x_u)
         if self._jerk is None:
-            # PIQP keeps bounds to 1e-8: the last digits are ours.
+            # PIQP keeps bounds to 1e-8: this clips the rest.
             np.minimum(np.maximum(a, x_l.T), x_u.T, out=a)
         return Solution(a, relaxed)
 
     def _bounded(
         self, solver: QpSolver, jerk: JerkRows, problem: Problem, i: int, low: Array, high: Array
     ) -> tuple[Array, bool]:
-        """One axis with bounds on a and on jerk; where they contradict each other, the jerk's: what comes
-        nearest to the middle of the others. Whether that was so."""
+        """Solve one axis with bounds on a and on jerk; return whether these contradict each other, too.
+
+        If they do, the bounds on jerk hold, and a comes as near as they allow to the smallest one within its
+        own bounds.
+        """
         try:
             return solver.solve(problem.c[i], problem.x_l[i], problem.x_u[i], low, high), False
         except SolverError:
@@ -301,10 +330,10 @@ class Dqmpc:
             return jerk.limited(middle, low, high), True
 
     def gradient(self, a: Array, x_end: Array, v_end: Array, destination: Array, velocity: Array) -> Array:
-        """∇J = ∂J/∂x(N+1) + ∂J/∂u(N) as a vector (3,), divided by Ω_t (Sec. III-C.1).
+        """Return ∇J = ∂J/∂x(N+1) + ∂J/∂u(N), eq. (11), as a vector (3,), divided by Ω_t (Sec. III-D.1).
 
-        The paper adds a state gradient and an input gradient; both are taken in position space, and the
-        division makes k_s and k_tang fit any scale of the weights. It vanishes at the destination.
+        The paper adds a state gradient and an input gradient; both are taken in position space here, and the
+        division makes k_s and k_tang fit any scale of the weights. The gradient vanishes at the destination.
         """
         w, dt = self.cost, self.dt
         ratio_v = w.omega_t_velocity / w.omega_t_position

@@ -1,18 +1,20 @@
-"""The repulsive potential field of the paper, eqs. (8) and (9), over the whole horizon.
+"""Repulsive potential field of the paper, eqs. (9) and (10), over the whole horizon.
 
 F(d) = K · (π/2)/(d_safe − d_min) · (cot z + z − π/2),  z = (π/2)(d − d_min)/(d_safe − d_min)
 
-Settled against the text: the force points *away* from the obstacle (the printed α points towards it); below
-d_min the formula turns negative, so it is clamped there, far above what the vehicle has. It is the sum that
-is limited to a_total, not its parts, or one that pushes from behind would cancel one that is about to be hit.
+Deviations from the paper: the force points *away* from the obstacle (the printed α points towards it). Below
+d_min the formula turns negative, so it is clamped there, far above what the vehicle has. The sum is limited
+to a_total, not its parts: otherwise an obstacle that pushes from behind would cancel one that is about to be
+hit.
 
 Closing speed. From d_safe = 3 m the bare field cannot stop two vehicles that meet at 5 m/s each: that takes
 about 10 m/s² net. So the distance that enters F is what would be left after braking, d − ċ²/(2 a_rel) with ċ
-the speed of closing and a_rel the relative deceleration to count on. At rest this is the paper's field; when
-closing fast its reach grows with the square of the speed, and d_min is approached no faster than can be
-braked. With bounded jerk a vehicle brakes late: ``reaction`` seconds of closing are taken off, too. Who moves
-away has as much to spare, up to twice its distance from d_min: a field that pushes as hard on the way out as
-on the way in flings vehicles out of every encounter. ``braking=None`` is the paper's field alone.
+the closing speed and a_rel the relative deceleration to count on. At rest this is the paper's field; at a
+high closing speed its reach grows with the square of the speed, and d_min is approached no faster than the
+vehicle can brake. With bounded jerk a vehicle brakes late: ``reaction`` seconds of closing are subtracted,
+too. Where the distance grows the term is added, until the distance from d_min is doubled: a field that pushes
+as hard on the way out as on the way in throws vehicles out of every encounter. ``braking=None`` is the
+paper's field alone.
 """
 
 from __future__ import annotations
@@ -25,14 +27,16 @@ from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
 
 _CLOSES = 1.0
-"""m/s."""
+"""Closing speed (m/s) from which ``turn`` applies in full."""
 _NEAR = 1e-6
-"""Below this distance (m) no direction is away; the force then points along +x rather than nowhere."""
+"""Distance (m) below which no direction points away; the force then points along +x."""
 
 
 def magnitude(distance: Array, d_min: Array, d_safe: Array, gain: float, clamp: float) -> Array:
-    """F_hyp(d), m/s², the shapes broadcast: 0 from d_safe on, continuous, falling, ``clamp`` at and below
-    d_min."""
+    """Return F_hyp(d), m/s²; the shapes broadcast.
+
+    It is 0 from d_safe on, continuous and decreasing, and ``clamp`` at and below d_min.
+    """
     width = d_safe - d_min
     z = np.minimum(np.maximum((0.5 * pi) * (distance - d_min) / width, 1e-9), 0.5 * pi)
     force: Array = np.minimum((gain * 0.5 * pi) * (1.0 / np.tan(z) + z - 0.5 * pi) / width, clamp)
@@ -49,11 +53,12 @@ def repulsion(
     reaction: float = 0.0,
     turn: float = 0.0,
 ) -> Array:
-    """Σ_j F_rep (N + 1, 3) on the own predicted positions (N + 1, 3), each source clamped to ``clamp`` m/s².
+    """Return Σ_j F_rep (N + 1, 3), m/s², on the ``own`` predicted positions (N + 1, 3), m.
 
-    ``braking`` is a_rel (m/s²) of the module's docstring, ``reaction`` (s) what passes until it brakes,
-    ``dt`` (s) the step between the predicted positions. ``turn`` (rad, counter-clockwise from above): by
-    so much the force of an obstacle is turned that closes at ``_CLOSES`` or faster, by less of a slower one.
+    Each source is clamped to ``clamp`` m/s². ``braking`` is a_rel (m/s²) of the module's docstring,
+    ``reaction`` (s) the time until the vehicle brakes, ``dt`` (s) the step between the predicted positions.
+    ``turn`` (rad, counter-clockwise from above) is the rotation of the force of an obstacle that closes at
+    ``_CLOSES`` or faster; it is smaller for a slower one.
     """
     if not obstacles.ids:
         return np.zeros_like(own)
@@ -77,7 +82,7 @@ def repulsion(
 
 
 def _turned(away: Array, angle: Array) -> Array:
-    """Vectors (M, N + 1, 3) turned about the vertical by ``angle`` (M, N + 1)."""
+    """Return vectors (M, N + 1, 3) rotated about the vertical by ``angle`` (M, N + 1), rad."""
     c, s = np.cos(angle), np.sin(angle)
     turned = away.copy()
     turned[..., 0] = c * away[..., 0] - s * away[..., 1]
@@ -86,7 +91,7 @@ def _turned(away: Array, angle: Array) -> Array:
 
 
 def closing_speed(distance: Array, dt: float) -> Array:
-    """How fast distances (M, N + 1) shrink, m/s; negative where they grow."""
+    """Return how fast distances (M, N + 1), m, shrink, m/s; negative where they grow."""
     closing = np.empty_like(distance)
     np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
     closing[:, -1] = closing[:, -2]
@@ -95,8 +100,10 @@ def closing_speed(distance: Array, dt: float) -> Array:
 
 
 def stopping_distance(distance: Array, braking: float, dt: float, reaction: float = 0.0) -> Array:
-    """ċ²/(2 a_rel) + ċ·``reaction`` (M, N + 1) from predicted distances (M, N + 1), with ċ their rate;
-    negative where they grow."""
+    """Return ċ²/(2 a_rel) + ċ·``reaction`` (M, N + 1), m, from predicted distances (M, N + 1), m.
+
+    ċ is the speed at which they shrink; the result is negative where they grow.
+    """
     closing = np.empty_like(distance)
     np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
     closing[:, -1] = closing[:, -2]

@@ -1,7 +1,7 @@
-"""The bound on jerk, as rows of the QPs: |a(0) − a₋| ≤ j·h, |a(n) − a(n − 1)| ≤ j·dt.
+"""Bound on jerk, as rows of the QPs: |a(0) − a₋| ≤ j·h, |a(n) − a(n − 1)| ≤ j·dt.
 
-a₋ is the acceleration that is flown until now, and h the time since the last plan began: replanned often, a
-plan may change its first acceleration but little. An autopilot shapes what changes faster on its own, late
+a₋ is the acceleration flown until now, and h the time since the last plan began: with frequent replanning a
+plan may change its first acceleration only slightly. An autopilot shapes faster changes on its own, late
 (PSC_JERK_XY), and then the vehicle is not where the plan says.
 """
 
@@ -15,16 +15,20 @@ from companion.values.horizon import Array
 
 
 class Flown(NamedTuple):
-    """What a plan goes on from: the acceleration (3,), m/s², flown until now, and for how long (s) the plan
-    that it comes from has been flown."""
+    """Motion that a plan continues: the ``acceleration`` (3,), m/s², flown until now.
+
+    ``elapsed``: for how long (s) the plan that it comes from has been flown.
+    """
 
     acceleration: Array
     elapsed: float
 
 
 class JerkRows:
-    """For N + 1 accelerations an axis, ``dt`` seconds apart, with ``j_max`` (3,) m/s³. ``D`` (n, n): the
-    matrix of the rows."""
+    """Rows for N + 1 accelerations per axis, ``dt`` (s) apart, with ``j_max`` (3,), m/s³.
+
+    ``D`` (n, n) is the matrix of the rows.
+    """
 
     def __init__(self, n: int, dt: float, j_max: Array) -> None:
         self.D: Array = np.eye(n) - np.eye(n, k=-1)
@@ -34,21 +38,23 @@ class JerkRows:
         self._count = np.arange(n)
 
     def bounds(self, flown: Flown) -> tuple[Array, Array]:
-        """Lower and upper bounds (3, n) of D a."""
+        """Return lower and upper bounds (3, n) of D a."""
         first = self._j_max * min(flown.elapsed, self._dt)
         low, high = -self._step.copy(), self._step.copy()
         low[:, 0], high[:, 0] = flown.acceleration - first, flown.acceleration + first
         return low, high
 
     def reach(self, flown: Flown) -> tuple[Array, Array]:
-        """The least and the greatest accelerations (3, n) that the rows leave."""
+        """Return the least and the greatest accelerations (3, n), m/s², that the rows allow."""
         grown = self._j_max[:, None] * (min(flown.elapsed, self._dt) + self._dt * self._count)
         start = flown.acceleration[:, None]
         return start - grown, start + grown
 
     def limited(self, wanted: Array, low: Array, high: Array) -> Array:
-        """The accelerations (n,) of one axis that follow ``wanted`` (n,) as fast as its rows' bounds ``low``,
-        ``high`` (n,) let them."""
+        """Return accelerations (n,) of one axis that follow ``wanted`` (n,) as fast as its rows allow.
+
+        ``low`` and ``high`` (n,) are the bounds of these rows.
+        """
         found, last = np.empty_like(wanted), 0.0
         for n in range(len(wanted)):
             last = min(max(float(wanted[n]), last + float(low[n])), last + float(high[n]))
@@ -57,8 +63,10 @@ class JerkRows:
 
 
 def rate_limited(force: Array, last: Array, first: float, step: float) -> Array:
-    """A field (N + 1, 3) whose change is limited in norm: by ``first`` from ``last`` (3,) on, by ``step``
-    from one n to the next."""
+    """Return the field (N + 1, 3) with its change limited in norm.
+
+    The limit is ``first`` from ``last`` (3,) on, and ``step`` from one n to the next.
+    """
     found = np.empty_like(force)
     most = first
     for n in range(len(force)):

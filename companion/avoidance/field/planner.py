@@ -1,4 +1,4 @@
-"""Destination → forces → QP → plan: Algorithm 1 of the paper, on one screen."""
+"""Planner: destination → forces → QP → plan, Algorithm 1 of the paper on one screen."""
 
 from __future__ import annotations
 
@@ -27,8 +27,11 @@ _ZERO.flags.writeable = False
 
 
 class Aim(NamedTuple):
-    """Where to: destination x̌ (3,) and terminal velocity (3,) at the end of the horizon, the target now (3,)
-    and then (3,), fleet-local ENU; and the surface that x̌ lies on, None for a goal."""
+    """Aim of a plan at the end of the horizon, fleet-local ENU.
+
+    ``destination`` x̌ (3,) and terminal ``velocity`` (3,); ``target`` (3,) now and ``target_end`` (3,) at the
+    end of the horizon. ``surface`` is the one that x̌ lies on, None for a goal.
+    """
 
     destination: Array
     velocity: Array
@@ -38,13 +41,13 @@ class Aim(NamedTuple):
 
 
 def standing(goal: Array, target: Array | None = None) -> Aim:
-    """To come to rest at ``goal`` (3,), and face ``target`` (3,)."""
+    """Return the aim to come to rest at ``goal`` (3,), facing ``target`` (3,), m."""
     seen = goal if target is None else target
     return Aim(goal, np.zeros(3), seen, seen)
 
 
 class Plan(NamedTuple):
-    """A solved plan, with what it was made from. ``gradient`` is ∇J (3,), normalised by Ω_t."""
+    """Solved plan and its inputs. ``gradient`` is ∇J (3,), divided by Ω_t."""
 
     horizon: Horizon
     aim: Aim
@@ -56,7 +59,7 @@ class Plan(NamedTuple):
 
 
 class Planner:
-    """Plans for one vehicle; remembers its gradient and what its methods latch."""
+    """Planner of one vehicle; keeps its gradient and what its methods latch."""
 
     def __init__(self, config: CompanionConfig) -> None:
         self.config = config
@@ -67,12 +70,12 @@ class Planner:
         self._planned_at: int | None = None
 
     def use(self, methods: tuple[MethodName, ...]) -> None:
-        """From the next plan on, with nothing latched."""
+        """Use ``methods`` from the next plan on, with nothing latched."""
         self.config = self.config.model_copy(update={"methods": methods})
         self._methods = build(self.config)
 
     def keep(self, limits: LimitsConfig) -> None:
-        """Within other ``limits`` from the next plan on, with nothing latched."""
+        """Keep other ``limits`` from the next plan on, with nothing latched."""
         self.config = config = self.config.model_copy(update={"limits": limits})
         self.dqmpc = Dqmpc(config.horizon, config.cost, limits.within(config.field.margin(1)))
         self._methods = build(config)
@@ -87,10 +90,10 @@ class Planner:
         obstacles: Obstacles,
         acceleration: Array = _ZERO,
     ) -> Plan:
-        """One plan from the state at ``now`` (µs), with the ``acceleration`` (3,) that is flown until then.
-        ``prediction`` (N + 1, 3): the previous plan at n = 0…N.
+        """Return a plan from the state at ``now`` (µs).
 
-        SolverError when there is no solution: the caller holds what it has.
+        ``acceleration`` (3,), m/s², is flown until then. ``prediction`` (N + 1, 3), m, is the previous plan
+        at n = 0…N. Raises SolverError when there is no solution: the caller keeps the plan that it has.
         """
         to_go = aim.destination - (aim.target_end - aim.target) - position
         scene = Scene(
@@ -128,7 +131,7 @@ class Planner:
         )
 
     def _elapsed(self, now: int) -> float:
-        """Seconds since the last plan; ∞ for the first."""
+        """Return the time (s) since the last plan; ∞ for the first."""
         last, self._planned_at = self._planned_at, now
         return inf if last is None else (now - last) * 1e-6
 
@@ -154,12 +157,16 @@ class Planner:
         return influence._replace(force=self._smoothed(elapsed, limit(force, a_total)))
 
     def _smoothed(self, elapsed: float, force: Array) -> Array:
-        """The field without its steps: neighbours' plans arrive at 10 Hz and would jolt the attitude. With
-        bounded jerk it changes no faster than the acceleration may, in time and along the horizon."""
+        """Return the field without its steps: neighbours' plans arrive at 10 Hz and would jolt the attitude.
+
+        With bounded jerk the field changes no faster than the acceleration may, in time and along the
+        horizon.
+        """
         j_max, dt = self.config.limits.j_max, self.dqmpc.dt
         if j_max is not None:
             jerk = min(j_max)
-            # Where plans are made seldom, the last one's field has gone on along its horizon since.
+            # The last plan's field has moved on along its horizon since, which matters where plans are made
+            # seldom.
             last = self._force[min(int(min(elapsed, self.dqmpc.seconds) / dt), len(self._force) - 1)]
             force = rate_limited(force, last, jerk * min(elapsed, dt), jerk * dt)
         elif elapsed < inf and self.config.field.smoothing_us > 0:
@@ -171,14 +178,17 @@ class Planner:
 
 _FLAT = np.array([1.0, 1.0, 0.0])
 _SIGNS = {"own": 0.0, "right": 1.0, "left": -1.0}
-"""Of the angle by which forces are turned; where each vehicle has a sense of its own they are not."""
+"""Sign of the angle by which forces are turned; 0 where each vehicle has a turning sense of its own."""
 _NEAREST_COUNTS = 20.0
-"""The sum is limited to a_total, not its parts: were each limited, two that push from behind would cancel one
-that is about to be hit."""
+"""Clamp of one force, as a multiple of a_total.
+
+The sum is limited to a_total, not its parts: otherwise two obstacles that push from behind would cancel one
+that is about to be hit.
+"""
 
 
 def build(config: CompanionConfig) -> list[Method]:
-    """The strategies that the configuration names, in its order; ``baseline`` adds nothing."""
+    """Return the methods that the configuration names, in its order; ``baseline`` adds nothing."""
     u_max, dt = max(config.limits.u_max), config.horizon.dt_us * 1e-6
     makers: dict[str, Callable[[], Method]] = {
         "swivel": lambda: Swivel(config.swivel, config.turning_sense),

@@ -163,7 +163,7 @@ class Px4:
     def takeoff(
         self, altitude: float, relative: bool | None, ground: float, status: Status, /
     ) -> Takeoff | Denial:
-        """Decide on NAV_TAKEOFF (22) to ``altitude`` (m)."""
+        """Decide on NAV_TAKEOFF (22) to ``altitude`` (m above home if ``relative``, else above sea level)."""
         if not status.ready:
             return Denial(TEMPORARILY_REJECTED, "Takeoff refused: no position estimate")
         if math.isinf(altitude):

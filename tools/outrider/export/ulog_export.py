@@ -116,7 +116,7 @@ def _file(folder: Path, system: int, zero: int, kinds: list[Kind]) -> UlogFile:
 class _Book:
     """Converter of messages to the file of one vehicle.
 
-    ``by_link`` tells whether links are distinguished: in a log outside a run the low bits of the time stamps
+    ``by_link`` sets whether links are distinguished: in a log outside a run the low bits of the time stamps
     may not be link numbers.
     """
 

@@ -1,1 +1,1 @@
-"""The page of pictures: every method in every scenario."""
+"""Gallery: flies every method in every scenario and returns a page of pictures."""

@@ -1,4 +1,4 @@
-"""``outrider gallery``: flies what is shown, resumable, then draws it and writes the page."""
+"""Command ``outrider gallery``: flies the selected scenarios, resumable, and writes the page of pictures."""
 
 from __future__ import annotations
 
@@ -29,18 +29,19 @@ def gallery(
     to: Path | None = None,
     run: str = RUN,
 ) -> int:
-    """Fly and draw the scenarios ``names``, or all; the exit status.
+    """Fly and draw the scenarios ``names``, or all, and return the exit status.
 
-    0 drawn; 1 a flight came to nothing; 3 interrupted. That a way gets stuck, or comes too near, is shown.
-    The journal is in ``out`` (``runs/sweep-gallery``), the page, ``README.md``, with its pictures in ``to``,
-    or there, too. InputError for an unknown scenario, or for another page there.
+    The status is 0 if all were drawn, 1 after a failed flight, and 3 after an interruption. A method that
+    gets stuck, or violates d_min, is a result that the picture shows. The journal is in ``out``
+    (``runs/sweep-gallery``); the page, ``README.md``, with its pictures is in ``to``, by default there too.
+    Raises InputError for an unknown scenario, or if another page exists there.
     """
     shown = showings(chosen(names))
     found = cells_of(shown)
     folder = places.prepare(out, "gallery")
     there = folder if to is None else to
     _check(there)
-    # Of all, so that a few may be flown first, and the rest later.
+    # The header covers all scenarios, so that a few may be flown first and the rest later.
     whole = header("gallery", cells_of(showings(scenarios())))
     entries = flown(whole, found, (SEED,), folder, run, jobs)
     if entries is None:
@@ -59,7 +60,7 @@ def gallery(
 
 
 def _check(folder: Path) -> None:
-    """Make the ``folder`` of the page. InputError if that cannot be, or another page is there."""
+    """Create the ``folder`` of the page. Raises InputError if that fails, or if another page exists there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

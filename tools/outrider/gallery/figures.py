@@ -1,4 +1,4 @@
-"""One picture for each scenario: a column for each way, the paths from above and the least separation."""
+"""Picture of each scenario: a column for each method, with the paths from above and the least separation."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 _TARGET, _THING = "0.25", "0.6"
 _LIMIT = "#b00020"
 _LONG = 44
-"""Characters of a failure that are shown above a panel."""
+"""Largest number of characters of a failure above a panel."""
 _HIGH = 6.0
-"""m of separation that is shown: above, nobody is near."""
+"""Largest separation (m) shown; above it no vehicles are close."""
 
 Panel = tuple[str, Run, Mapping[str, Any] | None]
-"""A way, what came of it, and the flight's scene, if there was a flight."""
+"""Method, result of the run, and the scene of the flight, or None without a flight."""
 
 
 def draw(scenario: str, panels: Sequence[Panel], path: Path) -> None:
@@ -45,7 +45,7 @@ def draw(scenario: str, panels: Sequence[Panel], path: Path) -> None:
 
 
 def outcome(run: Run) -> str:
-    """What came of a flight, in a few words."""
+    """Describe the result of a flight in a few words."""
     what = shorten(run.what or "", _LONG)
     if run.ending in (Ending.FAULT, Ending.LOST):
         return f"no flight: {what}"
@@ -60,7 +60,7 @@ def outcome(run: Run) -> str:
 
 
 def _elsewhere(run: Run) -> str:
-    """Of what a violation was, where it was none of two vehicles."""
+    """Name what a violation concerns, if it is not a pair of vehicles."""
     apart = run.separation is not None and run.d_min is not None and run.separation >= run.d_min
     return " (target or obstacle)" if apart else ""
 

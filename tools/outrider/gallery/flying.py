@@ -1,4 +1,4 @@
-"""What a worker does with a flight that is to be shown: its summary, and what the picture needs."""
+"""Function that a worker runs for a flight of the gallery: its summary, and the data of the picture."""
 
 from __future__ import annotations
 
@@ -13,19 +13,22 @@ from outrider.sweep.tasks import Task
 
 RUN = f"{__name__}:fly"
 _EVERY = 5
-"""Samples of the truth to a point of the picture: 0.1 s."""
+"""Number of samples of the ground truth for one point of the picture: 0.1 s."""
 
 
 def fly(task: Task) -> dict[str, Any]:
-    """Fly it without files. The same task gives the same result."""
+    """Fly a task without files and return its summary. The same task gives the same result."""
     outcome, summary = measured(prepared(task), task.seed)
     return {**summary, "scene": _scene(outcome)}
 
 
 def _scene(outcome: Outcome) -> dict[str, Any]:
-    """From the clock's start: times (T,) s; positions (T, K, 2) and the target's ways (T, 2), m from above;
-    least separation (T,), m; obstacles as (east, north, radius), the ways of those that move (M, T, 2) with
-    their radii, and how many of the vehicles are escorts. Rounded to cm: it goes into a journal."""
+    """Return the data of the picture, rounded to cm because it goes into a journal.
+
+    From the start of the clock it has times (T,) s; positions (T, K, 2) and the path of the target (T, 2), m
+    from above; the least separation (T,), m; obstacles as (east, north, radius); the paths of moving
+    obstacles (M, T, 2) with their radii; and the number of escorts among the vehicles.
+    """
     start = outcome.clock_start or 0
     samples = outcome.truth.samples(start, outcome.clock_end)
     near = samples.separation

@@ -1,4 +1,4 @@
-"""The page: what each picture shows, and a table of all flights."""
+"""Markdown page of the gallery: a description, a table of all flights, and the pictures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ escort no proof covers it. Certified vehicles stay where they are while clocks d
 
 
 def page(panels: Mapping[str, Sequence[Panel]], descriptions: Mapping[str, str], seed: int) -> str:
-    """The Markdown, beside pictures named ``SCENARIO.png``."""
+    """Return the Markdown, for pictures named ``SCENARIO.png`` beside it."""
     ways = " | ".join(way.replace("_", " ") for way in WAYS)
     text = _HEAD.format(seed=seed, ways=ways, rules="---|" * len(WAYS))
     for scenario, of in panels.items():

@@ -1,4 +1,4 @@
-"""What is shown: each shipped scenario by each method of the paper, and certified."""
+"""Selection of the gallery: each shipped scenario with each method of the paper, and certified."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from outrider.sweep.cells import Cell, cells
 from outrider.sweep.grid import Sweep
 
 WAYS = ("baseline", "swivel", "approach_angle", "tangential", "certified")
-"""The methods, and what stands in their place."""
+"""Methods, and the certified avoidance that replaces them."""
 
 
 class Showing(NamedTuple):
@@ -22,12 +22,12 @@ class Showing(NamedTuple):
 
 
 def scenarios() -> tuple[str, ...]:
-    """The names of the shipped scenarios, sorted."""
+    """Return the names of the shipped scenarios, sorted."""
     return tuple(sorted(path.stem for path in Path(config_root(), "scenarios").glob("*.yaml")))
 
 
 def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of ``names``, or all if there are none. InputError for one that is not shipped."""
+    """Return ``names``, or all scenarios if it is empty. Raises InputError for a name that is not shipped."""
     known = scenarios()
     for name in names:
         if name not in known:
@@ -36,12 +36,12 @@ def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def showings(names: tuple[str, ...]) -> tuple[Showing, ...]:
-    """Each scenario in each way."""
+    """Return each scenario in each of ``WAYS``."""
     return tuple(Showing(name, way) for name in names for way in WAYS)
 
 
 def cells_of(shown: tuple[Showing, ...]) -> list[Cell]:
-    """What each flies: the scenario as it is shipped, from the air."""
+    """Return the cell of each panel: the scenario as shipped, started in the air."""
     found = []
     for number, (scenario, way) in enumerate(shown, 1):
         other = {"companion.avoidance": "certified"} if way == "certified" else {"companion.methods": [way]}

@@ -1,6 +1,6 @@
-"""What is in a tlog, whoever recorded it:
+"""Contents of a tlog from any recorder: takes a log, gives its systems, messages, rates and gaps.
 
-    log → census (who speaks, what, with which breaks; what could not be read) → listing (tables, or JSON)
+    log → census (systems, their messages and gaps; unreadable parts) → listing (tables, or JSON)
 
 Only headers are read, and the last HEARTBEAT of each component.
 """

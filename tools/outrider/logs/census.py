@@ -1,4 +1,4 @@
-"""Who is in a log: values only."""
+"""Census of a log, as values only."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ class Gaps(NamedTuple):
 
 
 class Vehicle(NamedTuple):
-    """All that was sent under one system id. ``kind`` and ``autopilot``: numbers of MAV_TYPE and
-    MAV_AUTOPILOT in its last HEARTBEAT, None without one; of several components the autopilot's counts.
+    """All that was sent under one system id.
+
+    ``kind`` and ``autopilot``: numbers of MAV_TYPE and MAV_AUTOPILOT in its last HEARTBEAT, None without one;
+    of several components the autopilot's counts.
 
     ``counts``: message ids and how many of each, the most frequent first; ``versions``: of MAVLink;
     ``signed``: messages that carry a signature; ``first``, ``last``: its earliest and latest time (µs).
@@ -40,16 +42,19 @@ class Vehicle(NamedTuple):
 
     @property
     def messages(self) -> int:
-        """How many there are."""
+        """Number of messages."""
         return sum(count for _, count in self.counts)
 
     def rate(self, count: int) -> float:
-        """``count`` messages over the time from its first to its last, 1/s; 0 if that is one instant."""
+        """Return the rate (1/s) of ``count`` messages from the first to the last.
+
+        It is 0 if the two are one instant.
+        """
         return count / (1e-6 * (self.last - self.first)) if self.last > self.first else 0.0
 
 
 class Census(NamedTuple):
-    """A whole log; ``vehicles`` by system id, ground stations and payloads among them."""
+    """Census of a whole log; ``vehicles`` by system id, including ground stations and payloads."""
 
     vehicles: tuple[Vehicle, ...]
     report: TlogReport
@@ -66,5 +71,5 @@ class Census(NamedTuple):
 
     @property
     def signed(self) -> int:
-        """Messages that carry a signature."""
+        """Number of messages that carry a signature."""
         return sum(vehicle.signed for vehicle in self.vehicles)

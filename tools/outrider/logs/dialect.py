@@ -1,4 +1,4 @@
-"""What pymavlink's dialect says of each message: its fields, where they lie in a payload, and their units."""
+"""Definition of each message in pymavlink's dialect: its fields, their places in a payload, their units."""
 
 from __future__ import annotations
 
@@ -24,8 +24,11 @@ _CODES: Final = {
 
 
 class Field(NamedTuple):
-    """A field as the dialect defines it. ``length``: of an array, 0 for a single value; ``unit`` is MAVLink's
-    own word (``degE7``, ``cm/s``), empty where it has none."""
+    """A field as the dialect defines it.
+
+    ``length``: of an array, 0 for a single value; ``unit`` is MAVLink's own word (``degE7``, ``cm/s``), empty
+    where it has none.
+    """
 
     name: str
     type: str
@@ -35,29 +38,29 @@ class Field(NamedTuple):
 
     @property
     def is_text(self) -> bool:
-        """Characters that end at the first NUL."""
+        """Whether the field is text, which ends at the first NUL."""
         return self.type == "char"
 
     @property
     def is_bytes(self) -> bool:
-        """An array of bytes that measures nothing: a payload, an id."""
+        """Whether the field is an array of bytes without unit: a payload, an id."""
         return self.type == "uint8_t" and self.length > 0 and not self.unit
 
     @property
     def is_float(self) -> bool:
-        """Whether it may hold a NaN."""
+        """Whether the field may hold a NaN."""
         return self.type in ("float", "double")
 
     @property
     def code(self) -> str:
-        """Its format for ``struct``."""
+        """Format of the field for ``struct``."""
         if self.is_text:
             return f"{max(self.length, 1)}s"
         return f"{self.length or ''}{_CODES[self.type]}"
 
     @property
     def numpy(self) -> tuple[str, str] | tuple[str, str, tuple[int]]:
-        """Its entry of a structured dtype."""
+        """Entry of the field in a structured dtype."""
         if self.is_text:
             return self.name, f"S{max(self.length, 1)}"
         one = self.name, f"<{_CODES[self.type]}"
@@ -83,18 +86,23 @@ class Kind:
 
     @cached_property
     def dtype(self) -> np.dtype[np.void]:
-        """Of whole payloads, one after the other."""
+        """Structured dtype of complete payloads, one after the other."""
         return np.dtype([field.numpy for field in self.wire])
 
     def whole(self, payload: bytes) -> bytes:
-        """A payload with the zeros that MAVLink 2 cuts off, and the extensions that MAVLink 1 does not have;
-        what a newer dialect has added at the end is left out."""
+        """Return a payload of full size.
+
+        The zeros that MAVLink 2 cuts off, and the extensions that MAVLink 1 lacks, are added; fields that a
+        newer dialect has added at the end are removed.
+        """
         size = self.size
         return payload if len(payload) == size else payload.ljust(size, b"\0")[:size]
 
     def read(self, payload: bytes) -> dict[str, Any]:
-        """A whole payload's values by name, in the order of ``wire``: text as text, bytes as bytes, other
-        arrays as tuples."""
+        """Return the values of a complete payload by name, in the order of ``wire``.
+
+        Text is returned as str, bytes as bytes, other arrays as tuples.
+        """
         parts = self._struct.unpack(payload)
         result: dict[str, Any] = {}
         at = 0
@@ -113,16 +121,16 @@ class Kind:
 
 
 def text(raw: bytes) -> str:
-    """Up to the first NUL; bytes that are no UTF-8 are replaced."""
+    """Decode ``raw`` up to the first NUL; bytes that are not UTF-8 are replaced."""
     return raw.partition(b"\0")[0].decode("utf-8", "replace")
 
 
 @cache
 def kind(identifier: int) -> Kind:
-    """The type of message with this id. KeyError if the dialect lacks it."""
+    """Return the type of message with this id; raise KeyError if the dialect lacks it."""
     return Kind(dialect.mavlink_map[identifier])
 
 
 def identifiers() -> list[int]:
-    """Of all types of messages in the dialect."""
+    """Return the ids of all types of messages in the dialect."""
     return sorted(dialect.mavlink_map)

@@ -40,7 +40,7 @@ _AUTO: Final = {
 
 
 def mode_name(flavour: str, custom_mode: int) -> str:
-    """The name, or the number if it has none."""
+    """Return the name of the mode, or its number if it has none."""
     if flavour == "ardupilot":
         return _COPTER.get(custom_mode, str(custom_mode))
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
@@ -49,11 +49,11 @@ def mode_name(flavour: str, custom_mode: int) -> str:
 
 
 def told_mode(beat: Heartbeat) -> str:
-    """The name of the mode in an autopilot's HEARTBEAT (0), and whether it is disarmed, to be shown."""
+    """Return the name of the mode in an autopilot's HEARTBEAT (0) and whether it is disarmed, for display."""
     flavour = "ardupilot" if beat.autopilot == ARDUPILOT.autopilot else "px4"
     return mode_name(flavour, beat.custom_mode) + ("" if is_armed(beat) else ", disarmed")
 
 
 def is_armed(beat: Heartbeat) -> bool:
-    """Whether an autopilot's HEARTBEAT (0) says so."""
+    """Return whether an autopilot's HEARTBEAT (0) reports it as armed."""
     return bool(beat.base_mode & ARMED)

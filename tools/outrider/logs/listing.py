@@ -1,4 +1,4 @@
-"""``outrider replay LOG --list``: who is in a log, as a table or as JSON."""
+"""``outrider replay LOG --list``: the systems in a log, as a table or as JSON."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _ALLOWED = "allowed: a .tlog, or a .tlog.gz"
 
 
 def listing(path: Path, as_json: bool = False) -> int:
-    """Say who is in the log at ``path``; the exit status, which is 0.
+    """Print the systems in the log at ``path``; return the exit status, which is 0.
 
-    InputError for what is no file, cannot be read, or holds no whole record.
+    Raises InputError if ``path`` is no file, cannot be read, or holds no complete record.
     """
     _refuse_what_is_no_file(path)
     with share_progress() as watch:
@@ -40,7 +40,7 @@ def listing(path: Path, as_json: bool = False) -> int:
 
 
 def _refuse_what_is_no_file(path: Path) -> None:
-    """A device may never end, and a pipe cannot be read twice."""
+    """Raise InputError if ``path`` is not a file: a device may never end, a pipe cannot be read twice."""
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:
@@ -55,9 +55,12 @@ def _refuse_what_is_no_file(path: Path) -> None:
 
 
 def document(census: Census) -> dict[str, Any]:
-    """Values of JSON. ``good``, ``bad``, ``unknown`` count records as TlogReport says; ``skipped`` are bytes,
-    those in no good or unknown record. Times are Unix time, s. A rate is messages over the time from the
-    vehicle's first to its last."""
+    """Return the census as values of JSON.
+
+    ``good``, ``bad``, ``unknown`` count records as TlogReport does; ``skipped`` counts the bytes in no good
+    or unknown record. Times are Unix time, s. A rate is the number of messages over the time from the
+    vehicle's first to its last.
+    """
     report = census.report
     return {
         "vehicles": [_vehicle(vehicle) for vehicle in census.vehicles],

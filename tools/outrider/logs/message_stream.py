@@ -1,4 +1,4 @@
-"""A tlog as a stream of messages, and what of it could not be read."""
+"""A tlog as a stream of messages, with a count of its unreadable parts."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from outrider.logs.dialect import Kind, kind
 LATEST: Final = (1 << 63) // 1000 - 1
 """µs, in the year 2262: later stamps do not fit the formats that count nanoseconds, and are damage."""
 _OFTEN: Final = 2048
-"""Messages from one look at the progress to the next."""
+"""Number of messages between two reports of progress."""
 
 Watch = Callable[[str, float], None]
 
 
 class Spoken(NamedTuple):
-    """A message of a log: ``time`` Unix µs, the ``link`` (0…3) that it went over, who said it, and its whole
-    payload."""
+    """A message of a log.
+
+    ``time`` Unix µs, its ``link`` (0…3), its sender, and its complete payload.
+    """
 
     time: int
     link: int
@@ -33,15 +35,17 @@ class Spoken(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """What a pass left out: ``damaged`` stretches, and well-placed messages that the dialect lacks."""
+    """Parts that a pass left out: ``damaged`` stretches, and well-placed messages that the dialect lacks."""
 
     damaged: int
     unknown: int
 
 
 class Log:
-    """The tlog at ``path``. ``owner``: the vehicle whose companion recorded it; None for a log of any
-    kind."""
+    """The tlog at ``path``.
+
+    ``owner``: the vehicle whose companion recorded it; None for any other log.
+    """
 
     def __init__(self, path: Path, owner: int | None) -> None:
         self.path, self.owner = path, owner
@@ -50,16 +54,18 @@ class Log:
 
     @property
     def size(self) -> int:
-        """Bytes of the file."""
+        """Size of the file in bytes."""
         return self.path.stat().st_size
 
     def check(self) -> None:
-        """Raises LogError if it is missing, unreadable or without MAVLink."""
+        """Raise LogError if the log is missing, unreadable or without MAVLink."""
         read_tlog(self.path)
 
     def __iter__(self) -> Iterator[Spoken]:
-        """Every message once, in the order of the file, but for the key that SETUP_SIGNING holds; afterwards
-        ``loss`` says what else was left out."""
+        """Yield every message once, in the order of the file, without SETUP_SIGNING, which holds a key.
+
+        Afterwards ``loss`` holds what else was left out.
+        """
         reader = read_tlog(self.path)
         self.done = late = 0
         for record in reader:
@@ -81,8 +87,10 @@ class Log:
 
 
 def watched(logs: list[Log], watch: Watch, share: tuple[float, float] = (0.0, 1.0)) -> list[Iterator[Spoken]]:
-    """The messages of each log; ``watch`` hears how much of all has been read, as a share that goes from one
-    number to the other."""
+    """Return the messages of each log, with progress reports.
+
+    ``watch`` is called with the share of all logs that has been read, scaled to the range ``share``.
+    """
     total = max(sum(log.size for log in logs), 1)
     low, high = share
 
@@ -97,5 +105,5 @@ def watched(logs: list[Log], watch: Watch, share: tuple[float, float] = (0.0, 1.
 
 
 def total_loss(logs: list[Log]) -> Loss:
-    """Of all of them together."""
+    """Return the loss of all logs together."""
     return Loss(sum(log.loss.damaged for log in logs), sum(log.loss.unknown for log in logs))

@@ -1,4 +1,4 @@
-"""A census for people."""
+"""Tables of a census."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_SHOWN, MOST_BESIDE = 30, 12
 
 
 def show(name: str, census: Census) -> None:
-    """The log as tables: what it is as a whole, who is in it, and how often each says what."""
+    """Print the log as tables: the log as a whole, its systems, and the rate of each message."""
     console = Console()
     # Above the table, where a long name is not broken.
     console.print(Text(name), soft_wrap=True)
@@ -80,7 +80,7 @@ def _breaks(vehicle: Vehicle) -> str:
 
 
 def _often(vehicles: Sequence[Vehicle], names: Sequence[str]) -> Table:
-    """A row for each message, a column for each system."""
+    """Return the table of rates: a row for each message, a column for each system."""
     table = Table(title="messages per second")
     table.add_column("")
     for vehicle in vehicles:
@@ -92,7 +92,7 @@ def _often(vehicles: Sequence[Vehicle], names: Sequence[str]) -> Table:
 
 
 def _names(vehicles: Sequence[Vehicle]) -> list[str]:
-    """Of all messages, those first that anyone sends most often."""
+    """Return the names of all messages, in the order of their highest rate."""
     best: dict[str, float] = {}
     for vehicle in vehicles:
         for name, rate in rates(vehicle).items():
@@ -105,7 +105,7 @@ def _listed(numbers: tuple[int, ...]) -> str:
 
 
 def _date(time: int) -> str:
-    """Of µs; the number itself where no calendar has it."""
+    """Return a time (µs) as text; the number itself where no calendar has it."""
     try:
         return f"{datetime.fromtimestamp(time // MILLION, UTC):%Y-%m-%d %H:%M:%S} UTC"
     except (OverflowError, ValueError, OSError):

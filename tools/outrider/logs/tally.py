@@ -1,4 +1,4 @@
-"""The counting that leads to a census: a look at each header, in room that does not grow with the log."""
+"""Counting of messages for a census: reads each header, in memory that does not grow with the log."""
 
 from __future__ import annotations
 
@@ -15,19 +15,18 @@ from mavlink_bridge.wire.framing import SIGNED_FLAG, START_V2
 from outrider.logs.census import NO_AUTOPILOT, Census, Gaps, Vehicle
 
 SHORTEST_GAP = 1 << 21
-"""µs, 2.1 s: a silence of less is never a gap. Whoever is there sends a HEARTBEAT every second."""
+"""µs, 2.1 s: a shorter silence is never a gap, because components send a HEARTBEAT every second."""
 UNUSUAL = 8
-"""A silence of so many usual intervals is a gap."""
+"""A silence of this many usual intervals is a gap."""
 _HEARTBEAT = 0
 _OFTEN = 1 << 12
-"""Records from one look at the progress to the next."""
+"""Number of records between two reports of progress."""
 
 
 def count(path: Path, progress: Callable[[float], None]) -> Census | None:
-    """Who is in the log at ``path``; None if it holds no whole record. ``progress`` hears the share that is
-    read.
+    """Return the census of the log at ``path``; None if it holds no complete record.
 
-    Raises LogError if it cannot be read.
+    ``progress`` is called with the share that is read. Raises LogError if the log cannot be read.
     """
     try:
         size = path.stat().st_size
@@ -54,8 +53,11 @@ class _Stream:
 
 
 class _Speaker:
-    """One system id. ``silences``: those that may be gaps, by the bits of their µs, so that a log of any
-    length takes no more room."""
+    """One system id.
+
+    ``silences`` counts those that may be gaps, by the bit length of their µs, so that memory does not grow
+    with the log.
+    """
 
     __slots__ = ("before", "first", "last", "links", "longest", "signed", "silences")
 
@@ -66,7 +68,10 @@ class _Speaker:
         self.silences: Counter[int] = Counter()
 
     def gaps(self, messages: int) -> Gaps:
-        """Of so many messages. The limit is a power of two, as what is known of the silences is."""
+        """Return the gaps of a system with this number of ``messages``.
+
+        The limit is a power of two, because the silences are counted in powers of two.
+        """
         usual = (self.last - self.first) // max(messages - 1, 1)
         limit = max(SHORTEST_GAP, 1 << (UNUSUAL * usual - 1).bit_length() if usual else 0)
         number = sum(many for bits, many in self.silences.items() if 1 << bits > limit)
@@ -74,7 +79,10 @@ class _Speaker:
 
 
 class _Tally:
-    """The counting. A stream is told by the bytes of its header, which differ in length by version."""
+    """Counter of messages.
+
+    A stream is identified by the bytes of its header, whose length depends on the version.
+    """
 
     def __init__(self) -> None:
         self._streams: dict[bytes, _Stream] = {}
@@ -113,12 +121,12 @@ class _Tally:
         elif time < speaker.first:
             speaker.first = time
         if silence > SHORTEST_GAP:
-            # The silence of exactly a power of two belongs below it.
+            # A silence of exactly a power of two belongs below it.
             speaker.silences[(silence - 1).bit_length()] += 1
             speaker.longest = max(speaker.longest, silence)
 
     def vehicles(self) -> tuple[Vehicle, ...]:
-        """Everyone met so far."""
+        """Return all systems so far."""
         return tuple(self._vehicle(system) for system in sorted(self._speakers))
 
     def _vehicle(self, system: int) -> Vehicle:
@@ -149,6 +157,6 @@ def _message_id(key: bytes) -> int:
 
 
 def _spokesman(frames: list[bytes]) -> Heartbeat | None:
-    """Of the components' heartbeats that of the autopilot, or else the first."""
+    """Return the autopilot's heartbeat, or else that of the lowest component id; None without any."""
     beats = [message for frame in frames for message in Codec().feed(frame) if isinstance(message, Heartbeat)]
     return min(beats, key=lambda beat: (beat.autopilot == NO_AUTOPILOT, beat.source.component), default=None)

@@ -1,8 +1,8 @@
-"""The records of a log on one time line that never goes back.
+"""Records of a log on one time line that never goes back.
 
 Clocks of recording computers are set, logs are joined, and single stamps are wrong. A stamp that goes back by
 more than a second, or ahead by more than a day, begins a new stretch that follows the last one, if the next
-record says the same; if not it is one wrong stamp, and counts as the one before it.
+record confirms it. Otherwise it is a single wrong stamp, and is replaced by the previous one.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from collections.abc import Iterable, Iterator
 from mavlink_bridge.tlog.log import Record
 
 IDLE = 5_000_000
-"""µs of silence that are gone through; what is longer is skipped where nobody has to notice it."""
+"""µs of silence that are stepped through; a longer silence is skipped."""
 _BACK = 1_000_000
 _AHEAD = 86_400_000_000
 _LONE = 60_000_000
-"""µs: a stamp that is further ahead than that has to be confirmed by the next."""
+"""µs; a stamp that is further ahead must be confirmed by the next."""
 
 
 def on_one_line(records: Iterable[Record]) -> Iterator[Record]:
-    """The same records with times (µs, multiples of 4) that never decrease."""
+    """Yield the same records with times (µs, multiples of 4) that never decrease."""
     shift, last = 0, None
     following = iter(records)
     record = next(following, None)

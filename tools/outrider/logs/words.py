@@ -1,4 +1,4 @@
-"""What MAVLink calls the numbers of a census."""
+"""MAVLink's names for the numbers of a census."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ MILLION: Final = 1_000_000
 
 
 def rates(vehicle: Vehicle) -> Mapping[str, float]:
-    """Messages per second, by name, the most frequent first."""
+    """Return the messages per second by name, the most frequent first."""
     return {dialect.mavlink_map[number].msgname: vehicle.rate(many) for number, many in vehicle.counts}
 
 
 def enumerated(enumeration: str, number: int | None) -> str | None:
-    """The word of ``enumeration`` for it, or its number behind the enumeration's name if there is none."""
+    """Return the name of ``number`` in ``enumeration``; None for None.
+
+    Without a name, it is the enumeration's name and the number.
+    """
     if number is None:
         return None
     entry = dialect.enums[enumeration].get(number)
@@ -27,7 +30,7 @@ def enumerated(enumeration: str, number: int | None) -> str | None:
 
 
 def kind(vehicle: Vehicle) -> str:
-    """Type and autopilot, for people."""
+    """Return type and autopilot in words."""
     autopilot = None if vehicle.autopilot == NO_AUTOPILOT else vehicle.autopilot
     named = (("MAV_TYPE", vehicle.kind), ("MAV_AUTOPILOT", autopilot))
     names = [(enumeration, enumerated(enumeration, number)) for enumeration, number in named]

@@ -1,4 +1,6 @@
-"""``outrider paper``: the paper's table and figures, flown again.
+"""Reproduction of the paper: flies the table's rows and returns the table, Markdown and figures.
 
-rows → cells → worker processes (``flying``) → results → table, Markdown, figures
+::
+
+    rows → cells → worker processes (flying) → results → table, Markdown, figures
 """

@@ -1,4 +1,4 @@
-"""``outrider paper``: every row by every seed, resumable, then table, Markdown and figures."""
+"""Command ``outrider paper``: flies every row with every seed, resumable, and writes table and figures."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ def paper(
     run: str = RUN,
     response: Response = "exact",
 ) -> int:
-    """Fly the paper's table, on autopilots of that ``response``; the exit status.
+    """Fly the paper's table on autopilots of the given ``response`` and return the exit status.
 
-    0 flown; 1 a violation of d_min somewhere, or a run that came to nothing; 3 interrupted. That a row gets
-    stuck is a result. Writes ``paper.json``, ``paper.md`` and figures beside the journal in ``out``
-    (``runs/sweep-paper``, ``runs/sweep-paper-firmware``).
+    The status is 0 if all was flown, 1 after a violation of d_min or a failed run, and 3 after an
+    interruption. A row that gets stuck is a result, not an error. Writes ``paper.json``, ``paper.md`` and
+    figures beside the journal in ``out`` (``runs/sweep-paper``, ``runs/sweep-paper-firmware``).
     """
     found = cells_of(rows, response)
     name = "paper" if response == "exact" else f"paper-{response}"
@@ -62,7 +62,7 @@ def paper(
 
 
 def _traces(rows: tuple[Row, ...], found: list[Cell], entries: Flown) -> dict[Row, dict[str, Any]]:
-    """Of the seed that is drawn, where it was flown."""
+    """Return the traces of the seed that is drawn, for rows that have one."""
     traces = {}
     for row, cell in zip(rows, found, strict=True):
         summary = entries[cell.key, TRACED].summary

@@ -1,4 +1,4 @@
-"""Figures like the paper's: trajectories and ‖∇J‖ of every row, and the times to converge side by side."""
+"""Figures as in the paper: trajectories and ‖∇J‖ of every row, and a comparison of the times to converge."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _TARGET = "0.25"
 def draw(
     rows: Sequence[Row], results: Sequence[Result], traces: Mapping[Row, Mapping[str, Any]], folder: Path
 ) -> list[Path]:
-    """Write ``METHOD.png`` for each method and ``times.png``; where they are."""
+    """Write ``METHOD.png`` for each method and ``times.png``, and return their paths."""
     paths = []
     for method in _METHODS:
         of = [row for row in rows if row.method == method and row in traces]
@@ -70,7 +70,7 @@ def _gradient(axes: Axes, trace: Mapping[str, Any]) -> None:
 
 
 def _times(rows: Sequence[Row], results: Sequence[Result]) -> Figure:
-    """Medians with the worst above them, beside the paper's; what got stuck is hatched up to the top."""
+    """Draw the medians, with the worst above them, beside the paper's; stuck rows are hatched to the top."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 4.5), layout="constrained")
@@ -96,7 +96,7 @@ def _times(rows: Sequence[Row], results: Sequence[Result]) -> Figure:
 
 
 def _number(text: str) -> float | None:
-    """The seconds in what the paper says."""
+    """Return the number of seconds in the paper's text, or None."""
     digits = text.strip("≈ ")
     return float(digits) if digits.isdigit() else None
 

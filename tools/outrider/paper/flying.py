@@ -1,5 +1,4 @@
-"""What a worker does with a run of the paper's table: the flight, its summary, and its trace for the
-figures."""
+"""Function that a worker runs for the paper's table: the flight, its summary, and its trace for figures."""
 
 from __future__ import annotations
 
@@ -14,20 +13,23 @@ from outrider.sweep.tasks import Task
 
 RUN = f"{__name__}:fly"
 TRACED = 1
-"""The seed that is drawn."""
+"""Seed that is drawn."""
 _EVERY = 5
-"""Samples of the truth to a point of the trace: 0.1 s."""
+"""Number of samples of the ground truth for one point of the trace: 0.1 s."""
 
 
 def fly(task: Task) -> dict[str, Any]:
-    """Fly it without files. The same task gives the same result."""
+    """Fly a task without files and return its summary. The same task gives the same result."""
     outcome, summary = measured(prepared(task), task.seed)
     return {**summary, "trace": _trace(outcome)} if task.seed == TRACED else dict(summary)
 
 
 def _trace(outcome: Outcome) -> dict[str, Any]:
-    """Times (T,) s after the goal event; positions (T, K, 3) m; ‖∇J‖ (T, vehicles) of the plan before each
-    time; where the target is at the end. Rounded to mm: it goes into a journal."""
+    """Return the trace of a flight, rounded to mm because it goes into a journal.
+
+    It has times (T,) s after the goal event; positions (T, K, 3) m; ‖∇J‖ (T, vehicles) of the plan before
+    each time; and the final position of the target.
+    """
     start = outcome.clock_start or 0
     samples = outcome.truth.samples(start, outcome.clock_end)
     time = samples.time[::_EVERY]

@@ -1,4 +1,4 @@
-"""What came of each row."""
+"""Results of the rows."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from outrider.sweep.statistics import least, plain
 
 @dataclass(frozen=True)
 class Result:
-    """One row of the table. ``median_s``: None if half of the runs or more did not converge; ``worst_s`` of
-    those that did; ``converged``, ``stuck``: counts; ``failed``: runs that came to nothing."""
+    """Result of one row of the table.
+
+    ``median_s`` is None if half of the runs or more did not converge; ``worst_s`` is the longest time of
+    those that did. ``converged``, ``stuck`` and ``failed`` count runs; ``failed`` runs have no usable flight.
+    """
 
     scenario: str
     method: str
@@ -30,12 +33,12 @@ class Result:
     failed: int
 
     def document(self) -> dict[str, Any]:
-        """Values of JSON."""
+        """Return the result as values of JSON."""
         return asdict(self)
 
 
 def result_of(row: Row, runs: Sequence[Run]) -> Result:
-    """The runs of a row, put together."""
+    """Return the result of a row from its runs."""
     times = [inf if run.seconds is None else run.seconds for run in runs]
     done = [time for time in times if isfinite(time)]
     separations = [run.separation for run in runs if run.separation is not None]

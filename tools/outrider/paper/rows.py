@@ -1,4 +1,4 @@
-"""The rows of the paper's comparison: which scenario by which method, and what the paper reports."""
+"""Rows of the paper's comparison: scenario, method, and the time that the paper reports."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from outrider.sweep.grid import Sweep
 
 Response = Literal["exact", "firmware"]
 SENSORS = "rtk"
-"""Times are compared with vehicles that know where they are to 2 cm."""
+"""Sensor profile: times are compared for vehicles whose position is known to 2 cm."""
 
 
 class Row(NamedTuple):
-    """One row. ``told``: what the paper says (Sec. IV-C to IV-F), s, "stuck", or nothing."""
+    """One row. ``told`` is the paper's result (Sec. IV-B to IV-G): s, "stuck", or empty."""
 
     scenario: str
     method: str
@@ -40,8 +40,10 @@ ROWS = (
 
 
 def cells_of(rows: tuple[Row, ...], response: Response = "exact") -> list[Cell]:
-    """What each row flies: the shipped scenario with its method, on autopilots of that ``response``; it
-    begins in the air, since the clock does so too."""
+    """Return the cell of each row: the shipped scenario with its method, on autopilots of that ``response``.
+
+    The flight starts in the air, because the paper's clock does so too.
+    """
     found = []
     followed = {} if response == "exact" else {"autopilot.response": response}
     for number, row in enumerate(rows, 1):

@@ -1,4 +1,4 @@
-"""The paper's table beside ours, for a terminal and in Markdown."""
+"""Table of the paper's results beside the flown ones, for a terminal and in Markdown."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def show(rows: Sequence[Row], results: Sequence[Result], console: Console | None
 
 
 def markdown(rows: Sequence[Row], results: Sequence[Result]) -> str:
-    """The same as Markdown."""
+    """Return the same table as Markdown."""
     lines = [" | ".join(_HEADS), " | ".join("---" for _ in _HEADS)]
     lines += [" | ".join(words) for _, words in _lines(rows, results)]
     return "".join(f"| {line} |\n" for line in lines)

@@ -1,0 +1,1 @@
+"""Resources of processes: gives the number of cores."""

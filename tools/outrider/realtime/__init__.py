@@ -1,5 +1,5 @@
-"""A scenario in real time: one process per node, over UDP on this machine, led and watched by the parent.
+"""Flight of a scenario in real time: takes a scenario, gives its outcome, with one process per node over UDP.
 
 wiring opens the links → fleet makes the nodes → workers fork and run them, each under its own loop → the
-board shares what the parent must see → flight conducts, ends, and puts the true traces together.
+shared page holds what the parent must see → flight conducts, ends, and merges the true traces.
 """

@@ -1,5 +1,7 @@
-"""One real-time flight of a scenario: one process per node over UDP; this process is the operator's, which
-leads the flight by what the board shows."""
+"""One real-time flight of a scenario, with one process per node over UDP.
+
+This process is the operator's; it leads the flight by the contents of the board.
+"""
 
 from __future__ import annotations
 
@@ -38,16 +40,21 @@ from outrider.simulation.flight import Progress, truth_of
 from sitl.vehicle.config import VehicleConfig
 
 _START, _START_WITH_PRIORITY = 1_000_000, 3_000_000
-"""µs between forking and the first step: who becomes real-time while others still start makes them late."""
+"""µs between forking and the first step.
+
+A process that becomes real-time while others still start delays them.
+"""
 _NOTHING = Tally(0, 0, 0, 0, 0, ())
 
 
 class RealTimeFlight:
-    """Forks the nodes of ``scenario`` and flies them. ``directory`` gets the tlogs. With ``priority`` every
-    node asks for real-time priority; ``priority_told`` then says what it got.
+    """Real-time flight of the nodes of ``scenario``, each in a forked process.
 
-    ``run`` may be called once, from the main thread: it takes over SIGINT and SIGTERM meanwhile, of which the
-    first lands the fleet and the second ends at once.
+    The tlogs are written to ``directory``. With ``priority`` every node requests real-time priority;
+    ``priority_told`` then reports the result.
+
+    ``run`` may be called once, from the main thread. Meanwhile it handles SIGINT and SIGTERM: the first one
+    lands the fleet, the second one ends the flight at once.
     """
 
     def __init__(
@@ -74,8 +81,11 @@ class RealTimeFlight:
         self._interrupts = 0
 
     def run(self) -> None:
-        """Fly to the end; ``outcome`` then says how it was. OutriderError if a process ended by a fault."""
-        # Compiled before forking, so that not every process has to.
+        """Fly to the end; ``outcome`` then holds the results.
+
+        Raises OutriderError if a process ended by a fault.
+        """
+        # Compiled before forking, so that not every process has to compile.
         first = self.fleet.autopilot(0)
         for now in (0, self.fleet.vehicle.physics_period):
             first.step(now, [])
@@ -108,7 +118,7 @@ class RealTimeFlight:
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
-        """Count SIGINT and SIGTERM instead of dying of them."""
+        """Count SIGINT and SIGTERM instead of ending by them."""
 
         def count(_signal: int, _frame: FrameType | None) -> None:
             self._interrupts += 1
@@ -167,7 +177,7 @@ class RealTimeFlight:
 
 
 class _Leader:
-    """Shows the conductor what the board shows, and lets happen to processes what the scenario says."""
+    """Link between the board and the conductor; it also applies the scenario's events to processes."""
 
     def __init__(
         self,
@@ -182,7 +192,7 @@ class _Leader:
         self._progress = progress
         self._view = view
         self.moves: list[tuple[int, Array]] = []
-        """When (µs) the target was moved by hand, and where to (3,)."""
+        """Times (µs) and places (3,) of the moves of the target by hand."""
         self._events: deque[Event] = deque(events(fleet.scenario))
         self._target = fleet.target()
         self._moving = fleet.moving()
@@ -190,7 +200,7 @@ class _Leader:
         self._looked = 0
 
     def look(self, now: int, interrupted: bool) -> bool:
-        """After every step of the operator; True ends the run."""
+        """Process a step of the operator; return True to end the run."""
         if now - self._looked < SAMPLE:
             return False
         self._looked = now
@@ -224,7 +234,7 @@ class _Leader:
         return over
 
     def _show(self, now: int, place: Array | None, view: RealTimeView, window: Window) -> None:
-        """To the view; and what is wished there to those that it concerns."""
+        """Send a snapshot to the view, and apply the view's commands."""
         conductor, board = self._conductor, self._board
         start = conductor.clock_start
         seconds = None if start is None else 1e-6 * (now - start)
@@ -238,7 +248,7 @@ class _Leader:
                 self.moves.append((now, np.array(change.target)))
 
     def _blind(self, now: int) -> bool:
-        """While somebody has not been seen yet; True ends the run: nothing comes of it any more."""
+        """Wait for vehicles without a position yet; return True to end the run, because it has failed."""
         unseen = np.isnan(self._board.positions).any(axis=1)
         if now - (self._began or now) > PREPARE_CAP:
             systems = [str(self._fleet.systems[k]) for k in np.flatnonzero(unseen)]
@@ -246,7 +256,7 @@ class _Leader:
         return self._conductor.stage is not Stage.PREPARE
 
     def _check(self, now: int, interrupted: bool) -> None:
-        """Land everybody if somebody asked for it, or if a process is gone that should be there."""
+        """Land all vehicles after an interruption, or if a required process has ended."""
         conductor, board = self._conductor, self._board
         if interrupted and conductor.stage in (Stage.PREPARE, Stage.CLOCK):
             conductor.abort(now, "interrupted: all vehicles were told to land")
@@ -256,17 +266,17 @@ class _Leader:
                 k = self._fleet.systems.index(int(system))
                 if board.gone[k]:
                     continue
-                # Nobody can tell its vehicle to land any more.
+                # Its vehicle can no longer be ordered to land.
                 board.gone[k] = 1
             conductor.abort(now, f"the process of {name} ended with status {status}")
 
-    # What happens to companions' computers; partitions are each companion's own.
+    # Faults of companions' computers; each companion's process applies partitions itself.
 
     def freeze(self, system: int) -> None:
         self._crew.freeze(names.companion(system))
 
     def thaw(self, system: int) -> None:
-        # Written while it stands still: its next step sees it.
+        # Written while the process is stopped, so that its next step reads it.
         self._board.thaws[self._fleet.systems.index(system)] += 1
         self._crew.thaw(names.companion(system))
 
@@ -281,7 +291,7 @@ class _Leader:
 
 
 def _nothing(conductor: Conductor, why: str) -> str:
-    """Why there is no outcome."""
+    """Return the reason why there is no outcome."""
     said = f"{conductor.failure}; " if conductor.failure else ""
     return f"{said}{why}: there is no truth about its vehicle"
 

@@ -1,5 +1,8 @@
-"""A node behind rough links: what arrives over a perfect loopback is delayed, lost and reordered as the
-scenario says, by the same ether as in lock-step."""
+"""Node behind impaired links.
+
+Datagrams that arrive over a perfect loopback are delayed, lost and reordered by the scenario's faults, in the
+same simulated network as in lock-step.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,8 @@ from outrider.runs import names
 class Rough:
     """``node`` behind ``ether``, in which every channel leads from one sender to it.
 
-    ``senders``: for each link the node at its other end; None where there are many, who are told by the
-    system id in the header. What comes from elsewhere, as on a multicast group that others use too, is
-    dropped.
+    ``senders``: for each link the node at its other end; None where there are many, which are identified by
+    the system id in the header. Data from elsewhere, as on a multicast group that others use too, is dropped.
     """
 
     def __init__(
@@ -32,11 +34,11 @@ class Rough:
 
     @property
     def name(self) -> str:
-        """That of the node."""
+        """The node's name."""
         return self.node.name
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """As the node, with what has come through the ether by ``now``."""
+        """Step the node with what has passed the simulated network by ``now``."""
         for datagram in inbox:
             sender = self._senders.get(datagram.link) or self._speaker(datagram)
             if (sender, datagram.link) in self._known:
@@ -48,7 +50,7 @@ class Rough:
         return leaving
 
     def show(self, taps: Sequence[Tap]) -> None:
-        """Let ``taps`` see the last step of the node, with what came through the ether; once."""
+        """Pass the last step of the node, with what passed the network, to ``taps``; once."""
         if self._last is None:
             return
         (now, delivered, leaving), self._last = self._last, None
@@ -60,19 +62,19 @@ class Rough:
                     tap(now, self.name, direction, datagram)
 
     def _speaker(self, datagram: Datagram) -> str:
-        """The node that has the system id in the header."""
+        """Return the name of the node with the system id in the header."""
         system = sending_system(datagram.data)
         moving = names.moving(system)
         return moving if (moving, datagram.link) in self._known else names.companion(system)
 
     def cut(self, members: Iterable[str]) -> None:
-        """Nothing passes on the swarm's channels between ``members`` and others."""
+        """Block the swarm's channels between ``members`` and others."""
         inside = list(members)
         for channel in self._swarm:
             self.ether.cut(channel, inside)
 
     def heal(self, members: Iterable[str]) -> None:
-        """It passes again."""
+        """End the block of the swarm's channels between ``members`` and others."""
         inside = list(members)
         for channel in self._swarm:
             self.ether.heal(channel, inside)

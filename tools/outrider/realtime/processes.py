@@ -1,5 +1,4 @@
-"""The processes of a real-time run: forked, watched, stopped and let go on, joined, and what they leave
-behind."""
+"""Processes of a real-time run: they are forked, observed, stopped and resumed, joined, and leave results."""
 
 from __future__ import annotations
 
@@ -17,18 +16,18 @@ from outrider.realtime.wiring import Wiring
 from outrider.realtime.workers import Remains, Worker
 
 _FAREWELL = 10.0
-"""s that a process has to leave what it must."""
+"""s that a process has to write its results."""
 
 
 class Crew:
-    """One process for each of ``workers``; each leaves its remains in ``scratch``."""
+    """One process for each of ``workers``; each writes its results to ``scratch``."""
 
     def __init__(self, workers: Sequence[Worker], wiring: Wiring, board: Board, scratch: Path) -> None:
         self._workers, self._wiring, self._board, self._scratch = workers, wiring, board, scratch
         self._processes: dict[str, BaseProcess] = {}
 
     def start(self, *, priority: bool) -> None:
-        """Fork all of them."""
+        """Fork all processes."""
         fork = multiprocessing.get_context("fork")
         for worker in self._workers:
             name = worker.rough.name
@@ -37,7 +36,7 @@ class Crew:
             self._processes[name].start()
 
     def ended(self) -> dict[str, int]:
-        """Exit status of those that have ended, by name."""
+        """Return the exit status of the processes that have ended, by name."""
         found = {name: process.exitcode for name, process in self._processes.items()}
         return {name: status for name, status in found.items() if status is not None}
 
@@ -46,11 +45,11 @@ class Crew:
         self._signal(name, signal.SIGSTOP)
 
     def thaw(self, name: str) -> None:
-        """Let a stopped process go on."""
+        """Resume a stopped process."""
         self._signal(name, signal.SIGCONT)
 
     def join(self) -> dict[str, Remains]:
-        """Tell all to end, wait for them, and by force end who does not come; what they left, by name."""
+        """End all processes, kill those that do not end in time, and return their results by name."""
         self._board.stop = True
         for name in self._processes:
             self.thaw(name)
@@ -74,7 +73,7 @@ def _child(worker: Worker, wiring: Wiring, scratch: Path, priority: bool) -> Non
 
 
 def _remains(path: Path) -> Remains:
-    """What a process left; nothing if it was killed."""
+    """Return the results of a process; empty ones if it was killed."""
     try:
         found = pickle.loads(path.read_bytes())
     except (OSError, EOFError, pickle.UnpicklingError):

@@ -1,7 +1,7 @@
-"""What the processes of a real-time run share: a page of memory that each writes its own rows of.
+"""Shared memory of the processes of a real-time run; each process writes its own rows.
 
-Rows are float64, written by one process each; a reader may see a row half old and half new, which is one step
-of a vehicle and does not matter to who watches.
+Rows are float64, written by one process each. A reader may see a row half old and half new; the difference is
+one step of a vehicle and does not matter to an observer.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ _TEXT = 240
 
 
 class Board:
-    """For ``vehicles`` vehicles; made before the processes fork, which share it from then on.
+    """Shared memory for ``vehicles`` vehicles; made before the processes fork.
 
     Times are µs, 0 for not yet. ``goal``: the goal event; ``end``: the end of the clock; ``stop``: all shall
-    end; ``gone`` (K,): the companions that shall end; ``thaws`` (K,): how often each was let go on after it
-    had been stopped. ``window``: where all show themselves to a view, if there is one.
+    end; ``gone`` (K,): the companions that shall end; ``thaws`` (K,): how often each was resumed after a
+    stop. ``window``: shared memory for a view, if there is one.
     """
 
     def __init__(self, vehicles: int, window: Window | None = None) -> None:
@@ -43,7 +43,7 @@ class Board:
 
     @property
     def goal(self) -> int:
-        """When the goal event was."""
+        """Time of the goal event, µs."""
         return int(self._flags[0])
 
     @goal.setter
@@ -52,7 +52,7 @@ class Board:
 
     @property
     def end(self) -> int:
-        """When the clock ended."""
+        """Time of the end of the clock, µs."""
         return int(self._flags[1])
 
     @end.setter
@@ -61,7 +61,7 @@ class Board:
 
     @property
     def stop(self) -> bool:
-        """Whether all shall end."""
+        """Whether all processes shall end."""
         return bool(self._flags[2])
 
     @stop.setter
@@ -71,12 +71,12 @@ class Board:
     def show_vehicle(
         self, k: int, position: NDArray[np.float64], velocity: NDArray[np.float64], armed: bool
     ) -> None:
-        """Vehicle ``k``: position and velocity (3,) ENU, and whether its motors may turn."""
+        """Write position and velocity (3,) ENU of vehicle ``k``, and whether its motors may turn."""
         self._rows[k, 0:3], self._rows[k, 3:6] = position, velocity
         self._armed[k] = armed
 
     def show_companion(self, k: int, ready: bool, waiting: str) -> None:
-        """Companion ``k``: whether it is under way, and what it waits for."""
+        """Write whether companion ``k`` is under way, and what it waits for."""
         self._ready[k] = ready
         data = waiting.encode()[: _TEXT - 1]
         begin = self._texts + k * _TEXT
@@ -84,27 +84,27 @@ class Board:
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """(K, 3), a copy; NaN until a vehicle shows itself."""
+        """Positions (K, 3), a copy; NaN until a vehicle has written its own."""
         return self._rows[:, 0:3].copy()
 
     @property
     def velocities(self) -> NDArray[np.float64]:
-        """(K, 3), a copy."""
+        """Velocities (K, 3), a copy."""
         return self._rows[:, 3:6].copy()
 
     @property
     def armed(self) -> NDArray[np.bool_]:
-        """(K,)."""
+        """Whether the motors of each vehicle may turn, (K,)."""
         armed: NDArray[np.bool_] = self._armed != 0
         return armed
 
     @property
     def ready(self) -> NDArray[np.bool_]:
-        """(K,)."""
+        """Whether each companion is under way, (K,)."""
         ready: NDArray[np.bool_] = self._ready != 0
         return ready
 
     def waiting(self, k: int) -> str:
-        """What companion ``k`` waits for."""
+        """Return what companion ``k`` waits for."""
         begin = self._texts + k * _TEXT
         return self._memory[begin : begin + _TEXT].rstrip(b"\0").decode(errors="replace")

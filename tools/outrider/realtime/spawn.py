@@ -1,4 +1,4 @@
-"""The workers of a fleet: each node with its rough links, its schedule, and the events that concern it."""
+"""Workers of a fleet: each node with its impaired links, its schedule, and its events."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from outrider.simulation.targets import Target
 def muster(
     fleet: Fleet, wiring: Wiring, clock: Clock, board: Board, start: int, logs: Path, scratch: Path
 ) -> list[Worker]:
-    """One worker for each node but the operator, due from ``start`` (µs) on. ``logs`` gets the tlogs,
-    ``scratch`` the true traces.
+    """Return one worker for each node but the operator, due from ``start`` (µs) on.
 
-    No two are due at one instant if it can be helped: on few cores the last of them would be late.
+    The tlogs are written to ``logs``, the true traces to ``scratch``. No two workers are due at one instant
+    if that can be avoided: on few cores the last of them would be late.
     """
     start -= start % QUANTUM
     timing, happening = fleet.scenario.timing, events(fleet.scenario)
@@ -74,9 +74,11 @@ def muster(
 
 
 def turns(fleet: Fleet, k: int, start: int) -> tuple[int, int, NodeClock]:
-    """Phases (µs) from ``start`` on of the autopilot ``k`` and of its companion, by the companion's own
-    clock; and that clock. In true time all are evenly spread, whatever the clocks show at the start: later
-    they drift."""
+    """Return the phases (µs) of autopilot ``k`` and its companion from ``start`` on, and the latter's clock.
+
+    The companion's phase is on its own clock. In true time all phases are evenly spread at the start,
+    whatever the clocks show; later they drift.
+    """
     timing, slots, clock = fleet.scenario.timing, _slots(fleet), fleet.clock(k, start)
     turn = start + staggered(2 * k, slots, timing.companion_us)
     companion = turn + (clock.local(turn) - turn) % timing.companion_us
@@ -85,28 +87,32 @@ def turns(fleet: Fleet, k: int, start: int) -> tuple[int, int, NodeClock]:
 
 
 def operators_turn(fleet: Fleet, start: int) -> int:
-    """When from ``start`` (µs) on the operator is due: last, in nobody's slot."""
+    """Return the time from ``start`` (µs) on at which the operator is due: last, in a slot of its own."""
     slots = _slots(fleet)
     return start - start % QUANTUM + staggered(slots - 1, slots, fleet.scenario.timing.companion_us)
 
 
 def _slots(fleet: Fleet) -> int:
-    """One for each autopilot, companion and helm, one for what the harness plays, and the operator's."""
+    """Return the number of slots.
+
+    There is one for each autopilot, companion and backup node, one for all nodes that the harness plays, and
+    the operator's.
+    """
     return 2 * len(fleet.systems) + len(fleet.helmed) + 2
 
 
 def staggered(k: int, count: int, period: int) -> int:
-    """When in its ``period`` (µs) the node ``k`` of ``count`` is due: evenly spread, a multiple of 4."""
+    """Return the phase (µs) in ``period`` of node ``k`` of ``count``: evenly spread, a multiple of 4."""
     return k * period // count // QUANTUM * QUANTUM
 
 
 def rough(fleet: Fleet, node: Node, senders: dict[str, str | None]) -> Rough:
-    """``node`` behind the links that the scenario gives it; ``senders`` as for ``Rough``."""
+    """Return ``node`` behind the links that the scenario defines for it; ``senders`` as for ``Rough``."""
     return Rough(node, senders, _channels(fleet, node.name), fleet.seed, fleet.scenario.timing.base_tick_us)
 
 
 def _channels(fleet: Fleet, receiver: str) -> list[Channel]:
-    """From every node that ``receiver`` can hear, a channel to it with the faults of that way."""
+    """Return a channel to ``receiver``, with its faults, from every node that can send to it."""
     found = []
     for channel in fleet.channels():
         link = channel.members.get(receiver)

@@ -1,4 +1,4 @@
-"""The true motion of one vehicle, kept by the process that simulates it, and put together by the parent."""
+"""True motion of one vehicle: recorded by the process that simulates it, merged by the parent."""
 
 from __future__ import annotations
 
@@ -20,8 +20,11 @@ from sitl.node import Autopilot
 
 
 class Trace(NamedTuple):
-    """``times`` (n,) µs of all physics steps, ``positions`` (n, 3) ENU, NaN on the ground; ``sampled`` (m,)
-    µs and ``rows`` (m, ROW)."""
+    """Trace of one vehicle.
+
+    ``times`` (n,) µs of all physics steps, ``positions`` (n, 3) ENU, NaN on the ground; ``sampled`` (m,) µs
+    and ``rows`` (m, ROW).
+    """
 
     times: NDArray[np.int64]
     positions: Array
@@ -30,13 +33,13 @@ class Trace(NamedTuple):
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """What ``TraceWriter.save`` wrote."""
+        """Load what ``TraceWriter.save`` wrote."""
         with np.load(path) as file:
             return cls(*(file[name] for name in cls._fields))
 
 
 class TraceWriter:
-    """Collects the trace of ``autopilot`` step by step."""
+    """Recorder of the trace of ``autopilot``, step by step."""
 
     def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
@@ -46,7 +49,7 @@ class TraceWriter:
         self._rows: list[Array] = []
 
     def see(self, now: int) -> Array | None:
-        """After a step at ``now``: take its trace; the sample (ROW,), if one is due."""
+        """Record the trace after a step at ``now``; return the sample (ROW,), if one is due."""
         autopilot = self._autopilot
         track = ned_to_enu(autopilot.trace)
         if not autopilot.airborne:
@@ -61,7 +64,7 @@ class TraceWriter:
         return sample
 
     def save(self, path: Path) -> None:
-        """Write it as NumPy arrays."""
+        """Write the trace as NumPy arrays."""
         trace = Trace(
             np.concatenate(self._times),
             np.concatenate(self._positions),
@@ -73,17 +76,17 @@ class TraceWriter:
 
 
 class Moved:
-    """The clone of a ``target`` that was moved by hand: at times (µs), to places (3,)."""
+    """Clone of a ``target`` that was moved by hand: at times (µs), to places (3,)."""
 
     def __init__(self, target: Target, moves: Sequence[tuple[int, Array]]) -> None:
         self._target, self._moves = target, deque(moves)
 
     def begin(self, now: int) -> None:
-        """As the target."""
+        """Start the target at the goal event."""
         self._target.begin(now)
 
     def position(self, now: int) -> Array | None:
-        """As the target; asked for times that do not decrease."""
+        """Return the target's position at ``now``; the times of the calls must not decrease."""
         while self._moves and self._moves[0][0] <= now:
             self._target.move(*self._moves.popleft())
         return self._target.position(now)
@@ -97,8 +100,11 @@ def put_together(
     goal: int | None,
     truth: Truth,
 ) -> None:
-    """Show ``truth`` the flight of all vehicles on one grid of physics steps (``period`` µs), from when the
-    last began to when the first ended. The clones of ``target`` and ``moving`` begin at ``goal`` (µs)."""
+    """Pass the flight of all vehicles to ``truth`` on one grid of physics steps (``period`` µs).
+
+    It lasts from the beginning of the last trace to the end of the first. The clones of ``target`` and
+    ``moving`` begin at ``goal`` (µs).
+    """
     begin = max(int(trace.times[0]) for trace in traces)
     end = min(int(trace.times[-1]) for trace in traces)
     begin += -begin % SAMPLE
@@ -117,8 +123,7 @@ def put_together(
 
 
 def _at(trace: Trace, steps: NDArray[np.int64]) -> Array:
-    """Positions (n, 3) at ``steps``: those of the trace, or between its neighbours if its grid lies
-    beside."""
+    """Return the positions (n, 3) at ``steps``, interpolated where they are not on the trace's grid."""
     after = np.clip(np.searchsorted(trace.times, steps), 1, len(trace.times) - 1)
     left, right = trace.times[after - 1], trace.times[after]
     share = ((steps - left) / (right - left))[:, None]
@@ -129,7 +134,7 @@ def _at(trace: Trace, steps: NDArray[np.int64]) -> Array:
 
 
 def _sample(trace: Trace, now: int) -> Array:
-    """The last sample up to ``now``."""
+    """Return the last sample up to ``now``."""
     index = max(int(np.searchsorted(trace.sampled, now, side="right")) - 1, 0)
     result: Array = trace.rows[index]
     return result

@@ -1,4 +1,4 @@
-"""A real-time flight for the view: told by the process that leads it, from what the others show."""
+"""View of a real-time flight, sent by the process that leads it."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from outrider.scene.snapshot import Array, Moment, Single, State, enu_attitude
 from outrider.scene.view_commands import decoded
 
 PICTURE = 50_000
-"""µs between two moments that are told."""
+"""µs between two snapshots."""
 
 
 class Seen(NamedTuple):
-    """``since`` s after the goal event, or after the start before it; stage; positions (K, 3), the target's
-    place and those of the moving obstacles, fleet-local ENU."""
+    """State of a flight as its leader observes it.
+
+    ``since`` s after the goal event, or after the start before it; stage; positions (K, 3), the target's
+    place and those of the moving obstacles, fleet-local ENU.
+    """
 
     since: float
     stage: str
@@ -30,27 +33,29 @@ class Seen(NamedTuple):
 
 
 class Shown(Protocol):
-    """What companions and vehicles show of themselves: ``attitudes`` (K, 4) FRD in NED, ``plans``
-    (K, KNOTS, 6), K ``states``."""
+    """State that companions and vehicles provide for a view.
+
+    ``attitudes`` (K, 4) FRD in NED, ``plans`` (K, KNOTS, 6), K ``states``.
+    """
 
     @property
     def attitudes(self) -> Array:
-        """NaN until a vehicle shows itself."""
+        """Attitudes; NaN until a vehicle has written its own."""
         ...
 
     @property
     def plans(self) -> NDArray[np.float32]:
-        """NaN where there is none."""
+        """Plans; NaN where there is none."""
         ...
 
     @property
     def states(self) -> tuple[State, ...]:
-        """In the order of the vehicles."""
+        """States in the order of the vehicles."""
         ...
 
 
 class RealTimeView:
-    """At one end of ``line``; what is changed by hand goes into ``orders``."""
+    """View at one end of ``line``; changes by hand are recorded in ``orders``."""
 
     def __init__(self, line: Line) -> None:
         self._line = line
@@ -58,7 +63,7 @@ class RealTimeView:
         self.orders = Orders()
 
     def show(self, now: int, seen: Seen, shown: Shown) -> None:
-        """Tell the moment ``now`` (µs), unless it is too soon after the one before."""
+        """Send the snapshot at ``now`` (µs), unless the previous one is too recent."""
         if now < self._next:
             return
         self._next = now + PICTURE
@@ -76,7 +81,7 @@ class RealTimeView:
         self._line.send(pickle.dumps(moment, pickle.HIGHEST_PROTOCOL))
 
     def changes(self, seconds: float | None) -> Iterator[Change]:
-        """What is newly wished, ``seconds`` after the goal event."""
+        """Yield the new changes, which are dated ``seconds`` after the goal event."""
         for data in self._line.receive():
             wishes = decoded(data)
             change = None if wishes is None else self.orders.new(wishes, seconds)

@@ -1,7 +1,7 @@
-"""What the processes of a real-time run show to who looks on, and what is wished of them: a page of memory.
+"""Shared memory of a real-time run for its view: states of the nodes, and commands to them.
 
-As on the ``Board`` each row is written by one process; a reader may see one half old and half new. It is
-there only in a run with a view.
+As on the ``Board`` each row is written by one process; a reader may see one half old and half new. The memory
+exists only in a run with a view.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from outrider.scene.snapshot import KNOTS, Array, State
 from outrider.scene.view_commands import Wishes
 
 EVERY = 50_000
-"""µs between two looks at a node."""
+"""µs between two snapshots of a node."""
 _PLAN = 6 * KNOTS
 _ROW = 8 + _PLAN
-"""Attitude (4), mode, age, plan's time, held plans, plan."""
+"""Columns: attitude (4), mode, age, plan's time, held plans, plan."""
 _WISHES = 7
-"""How often something was wished; methods as bits; loss; how often the target was moved, and where to (3)."""
+"""Columns: number of commands; methods as bits; loss; number of moves of the target, and its place (3)."""
 _METHODS = Wishes(methods="baseline+swivel+approach_angle+tangential").method_names
 
 
 class Window:
-    """For ``vehicles`` vehicles; made before the processes fork."""
+    """Shared memory for ``vehicles`` vehicles; made before the processes fork."""
 
     def __init__(self, vehicles: int) -> None:
         memory = mmap.mmap(-1, 8 * (_WISHES + vehicles * _ROW))
@@ -39,28 +39,28 @@ class Window:
         self._wishes[1:3] = np.nan
 
     def show_attitude(self, k: int, attitude: Array) -> None:
-        """Of vehicle ``k``: (4,) w x y z, FRD in NED."""
+        """Write the attitude of vehicle ``k``: (4,) w x y z, FRD in NED."""
         self._rows[k, 0:4] = attitude
 
     def show_companion(self, k: int, seen: Glimpse) -> None:
-        """Of companion ``k``."""
+        """Write the snapshot of companion ``k``."""
         state, row = seen.state, self._rows[k]
         row[4:8] = MODES.index(state.mode), state.age_s, state.plan_ms, state.held or 0
         row[8:] = seen.plan.ravel()
 
     @property
     def attitudes(self) -> Array:
-        """(K, 4), a copy; NaN until a vehicle shows itself."""
+        """Attitudes (K, 4), a copy; NaN until a vehicle has written its own."""
         return self._rows[:, 0:4].copy()
 
     @property
     def plans(self) -> NDArray[np.float32]:
-        """(K, KNOTS, 6), a copy."""
+        """Plans (K, KNOTS, 6), a copy."""
         return self._rows[:, 8:].astype(np.float32).reshape(-1, KNOTS, 6)
 
     @property
     def states(self) -> tuple[State, ...]:
-        """K of them."""
+        """States of the K companions."""
         return tuple(
             State()
             if np.isnan(mode)
@@ -69,7 +69,7 @@ class Window:
         )
 
     def wish(self, change: Change) -> None:
-        """Let the processes know of a change. They see it when they next look."""
+        """Write a change for the processes, which read it at their next snapshot."""
         found = self._wishes
         if change.methods is not None:
             asked = Wishes(methods=change.methods).method_names
@@ -83,12 +83,12 @@ class Window:
 
     @property
     def wishes(self) -> int:
-        """How often something was wished."""
+        """Number of commands so far."""
         return int(self._wishes[0])
 
     @property
     def methods(self) -> tuple[MethodName, ...]:
-        """Those that are wished; none: those of the scenario."""
+        """Commanded methods; empty: those of the scenario."""
         bits = self._wishes[1]
         if np.isnan(bits):
             return ()
@@ -96,16 +96,16 @@ class Window:
 
     @property
     def loss(self) -> float | None:
-        """The share that is wished to be lost; None: that of the scenario."""
+        """Commanded share of lost datagrams; None: that of the scenario."""
         loss = float(self._wishes[2])
         return None if np.isnan(loss) else loss
 
     @property
     def moves(self) -> int:
-        """How often the target was moved."""
+        """Number of moves of the target."""
         return int(self._wishes[3])
 
     @property
     def place(self) -> Array:
-        """Where to (3,), a copy."""
+        """Place of the last move (3,), a copy."""
         return self._wishes[4:7].copy()

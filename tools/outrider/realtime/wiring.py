@@ -1,5 +1,7 @@
-"""The links of a real-time run, all on this machine's loopback: vehicles and operator over unicast UDP, the
-swarm and the target over multicast groups of their own."""
+"""Links of a real-time run, all on this machine's loopback.
+
+Vehicles and operator use unicast UDP, the swarm and the target multicast groups of their own.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,10 @@ _HOST = "127.0.0.1"
 
 
 class Wiring(NamedTuple):
-    """Open links by node: of each autopilot, companion and helm by link name; of target, moving obstacles and
-    operator."""
+    """Open links of all nodes, by node and link name.
+
+    ``helms`` are those of the backup nodes.
+    """
 
     autopilots: list[dict[str, list[Link]]]
     companions: list[dict[str, list[Link]]]
@@ -27,7 +31,7 @@ class Wiring(NamedTuple):
     operator: dict[str, list[Link]]
 
     def close_others(self, own: dict[str, list[Link]]) -> None:
-        """Close every link but ``own``: a process keeps its node's alone."""
+        """Close every link but ``own``: a process keeps only those of its node."""
         nodes = (*self.autopilots, *self.companions, *self.helms, *self.moving, self.target, self.operator)
         for node in nodes:
             if node is not own:
@@ -37,8 +41,10 @@ class Wiring(NamedTuple):
 
 
 def wire(vehicles: int, clock: Clock, moving: int = 0, helms: int = 0) -> Wiring:
-    """Open all links, those of so many ``moving`` obstacles and of the first vehicles' ``helms`` too, on free
-    ports. LinkError if one cannot be opened; then none stays open."""
+    """Open all links on free ports, also those of ``moving`` obstacles and of the first vehicles' ``helms``.
+
+    Raises LinkError if one cannot be opened; then none stays open.
+    """
     with ExitStack() as opened:
 
         def opening(endpoint: str) -> Link:
@@ -53,7 +59,7 @@ def wire(vehicles: int, clock: Clock, moving: int = 0, helms: int = 0) -> Wiring
         group = _group(_port(listening[0][0]))
         swarm, target = (f"mcast:{group}:{port},{_HOST}" for port in _free_ports(2))
         for vehicle, ground in listening:
-            # As real ones do, the autopilot speaks first.
+            # The autopilot sends first, as real ones do.
             autopilots.append({"autopilot": [opening(f"udpout:{_HOST}:{_port(vehicle)}")]})
             companions.append(
                 {
@@ -66,7 +72,8 @@ def wire(vehicles: int, clock: Clock, moving: int = 0, helms: int = 0) -> Wiring
             operator.append(opening(f"udpout:{_HOST}:{_port(ground)}"))
         helmed = []
         for autopilot, companion in list(zip(autopilots, companions, strict=True))[:helms]:
-            # What it carries on it tells the autopilot; that the companion speaks it hears from both.
+            # The backup node sends its set-points to the autopilot. It receives the data of both, and so
+            # detects whether the companion sends.
             ends = [opening(f"udpin:{_HOST}:0"), opening(f"udpin:{_HOST}:0")]
             for node, end in zip((autopilot, companion), ends, strict=True):
                 node["autopilot"].append(opening(f"udpout:{_HOST}:{_port(end)}"))
@@ -86,13 +93,15 @@ def _port(link: Link) -> int:
 
 
 def _group(port: int) -> str:
-    """A multicast group (of those of RFC 2365 for local use) of this run's own: no other run on this machine
-    has the unicast ``port``."""
+    """Return a multicast group (of those of RFC 2365 for local use) for this run only.
+
+    It is unique, because no other run on this machine has the unicast ``port``.
+    """
     return f"239.255.{port >> 8}.{port & 255}"
 
 
 def _free_ports(count: int) -> list[int]:
-    """Ports that nobody has; all are taken at once, so that none is given twice."""
+    """Return free ports; all are bound at the same time, so that none is returned twice."""
     with ExitStack() as held:
         sockets = [held.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)]
         for one in sockets:

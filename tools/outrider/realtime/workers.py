@@ -1,5 +1,7 @@
-"""What the process of a node does: run it under the wall clock over its links until the run ends, show it on
-the board, and leave behind what the summary needs."""
+"""Process of a node: runs it under the wall clock over its links until the run ends.
+
+It also writes the node's state to the board, and leaves the results for the summary.
+"""
 
 from __future__ import annotations
 
@@ -40,13 +42,16 @@ from outrider.simulation.targets import Target
 from sitl.node import Autopilot
 
 TOLERANCE = 1_000
-"""µs; a deadline whose step begins later than that is missed: a tenth of a companion's usual period."""
+"""µs; a deadline whose step begins later is missed: a tenth of a companion's usual period."""
 
 
 @dataclass
 class Remains:
-    """What a process leaves behind. ``deadlines`` passed, from the first step to the last; ``misses`` of them
-    had no step within the tolerance."""
+    """Results that a process leaves behind.
+
+    ``deadlines`` that passed, from the first step to the last; ``misses`` of them had no step within the
+    tolerance.
+    """
 
     deadlines: int = 0
     misses: int = 0
@@ -61,7 +66,7 @@ class Remains:
 
 
 class Seat(NamedTuple):
-    """Where a node sits: behind its rough links, when it is due, its open links, the clock, the board."""
+    """Environment of a node: its impaired links, schedule, open links, clock and board."""
 
     rough: Rough
     scheduled: Scheduled
@@ -71,10 +76,10 @@ class Seat(NamedTuple):
 
 
 class Worker:
-    """One node in its own process, to which ``events`` happen after the goal event."""
+    """One node in its own process, with ``events`` that are applied after the goal event."""
 
     above = 0
-    """Levels of real-time priority above the others'."""
+    """Levels of real-time priority above that of the others."""
 
     def __init__(self, seat: Seat, events: Iterable[Event] = ()) -> None:
         self.rough, self._scheduled, self.links, self._clock, self.board = seat
@@ -85,28 +90,28 @@ class Worker:
         self._taps: list[Tap] = []
 
     def over(self) -> bool:
-        """Whether to end: it was said, or the parent is gone."""
+        """Return whether to end: it was requested, or the parent is gone."""
         return self.board.stop or os.getppid() != self._parent
 
     def excused(self) -> bool:
-        """Whether it was stopped on purpose since this was asked for the last time."""
+        """Return whether the process was stopped on purpose since the last call."""
         return False
 
     def begin(self, now: int) -> None:
-        """The goal event, at ``now`` µs."""
+        """Process the goal event, at ``now`` µs."""
 
     def strike(self, event: Event) -> None:
-        """Let an event happen to the node."""
+        """Apply an event to the node."""
 
     def show(self, now: int) -> None:
-        """After every step."""
+        """Write the node's state to the board after a step."""
 
     def leave(self, path: Path) -> None:
-        """Write what is left; called at the end, whatever it was."""
+        """Write the results to ``path``; called at the end, also after an error."""
         path.write_bytes(pickle.dumps(self.remains))
 
     def main(self, directory: Path, priority: bool) -> None:
-        """The process, from fork to exit."""
+        """Run the process from fork to exit."""
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         if priority:
@@ -117,14 +122,14 @@ class Worker:
         try:
             self._run()
         except Exception as error:
-            # The parent tells it in a sentence: this process has no console of its own.
+            # The parent reports the error: this process has no console of its own.
             self.remains.error = f"{type(error).__name__}: {error}"
             status = 3
         self.leave(directory / self.rough.name)
         sys.exit(status)
 
     def taps(self, files: ExitStack) -> list[Tap]:
-        """What looks on at the datagrams; closed with ``files``."""
+        """Return the observers of the datagrams; they are closed with ``files``."""
         return []
 
     def _run(self) -> None:
@@ -141,7 +146,7 @@ class Worker:
             try:
                 statistics = loop.run(self.over, self._stepped)
             finally:
-                # What a node fails at is logged.
+                # The input on which a node fails is logged.
                 self.rough.show(self._taps)
                 due = loop.deadlines
                 self.remains.lateness = due.lateness
@@ -152,7 +157,7 @@ class Worker:
         self.remains.dropped = counters.dropped + statistics.overruns
 
     def _stepped(self, now: int) -> None:
-        # After sending, so that writing a log makes no set-point late.
+        # After sending, so that writing a log delays no set-point.
         self.rough.show(self._taps)
         goal = self.board.goal
         if goal and not self._goal_seen:
@@ -164,7 +169,7 @@ class Worker:
 
 
 class AutopilotWorker(Worker):
-    """An autopilot with its vehicle; being due more often than the others it goes first."""
+    """An autopilot with its vehicle; it has a higher priority because it is due more often."""
 
     above = 1
 
@@ -175,12 +180,15 @@ class AutopilotWorker(Worker):
         self._trace_path = trace
 
     def begin(self, now: int) -> None:
+        """Pass the goal event to the autopilot."""
         self._node.begin(now)
 
     def strike(self, event: Event) -> None:
+        """Apply an event to the autopilot."""
         strike_autopilot(event, self._node)
 
     def show(self, now: int) -> None:
+        """Record the trace, and write each sample to the board."""
         sample = self._trace.see(now)
         if sample is not None:
             self.board.show_vehicle(self._k, sample[0:3], sample[3:6], self._node.armed)
@@ -188,12 +196,13 @@ class AutopilotWorker(Worker):
                 self.board.window.show_attitude(self._k, self._node.state.attitude)
 
     def leave(self, path: Path) -> None:
+        """Write the trace and the results."""
         self._trace.save(self._trace_path)
         super().leave(path)
 
 
 class CompanionWorker(Worker):
-    """A companion; it writes its vehicle's tlog in ``logs``."""
+    """A companion; it writes its vehicle's tlog to ``logs``."""
 
     def __init__(
         self, k: int, node: Companion, system: int, logs: Path, seat: Seat, events: Iterable[Event]
@@ -208,19 +217,24 @@ class CompanionWorker(Worker):
         self._last: Tally | None = None
 
     def over(self) -> bool:
+        """Return whether to end: also when this companion shall vanish."""
         return bool(self.board.gone[self._k]) or super().over()
 
     def excused(self) -> bool:
+        """Return whether the companion was frozen since the last call."""
         before, self._thaws = self._thaws, int(self.board.thaws[self._k])
         return self._thaws != before
 
     def begin(self, now: int) -> None:
+        """Record the tally at the goal event."""
         self._first = self._node.tally
 
     def strike(self, event: Event) -> None:
+        """Apply a partition to the companion's links."""
         strike_computer(event, _Radio(self.rough))
 
     def show(self, now: int) -> None:
+        """Write the companion's state to the board and, if there is one, to the view."""
         if self.board.end and self._last is None:
             self._last = self._node.tally
         pilot = self._node.pilot
@@ -233,7 +247,7 @@ class CompanionWorker(Worker):
             self._look_on(now, self.board.window)
 
     def _look_on(self, now: int, window: Window) -> None:
-        """Show the node to the view, and let it have what is wished there."""
+        """Write the node's snapshot for the view, and apply the view's commands."""
         window.show_companion(self._k, glimpse(self._node, now))
         if window.wishes == self._wishes:
             return
@@ -244,6 +258,7 @@ class CompanionWorker(Worker):
             self.rough.ether.lose(LOSSY, window.loss)
 
     def leave(self, path: Path) -> None:
+        """Write the results, with tallies and plan log."""
         now = self._node.tally
         self.remains.tallies = (self._first or now, self._last or now)
         self.remains.bad = self._node.bad_frames
@@ -251,11 +266,12 @@ class CompanionWorker(Worker):
         super().leave(path)
 
     def taps(self, files: ExitStack) -> list[Tap]:
+        """Return the recorder of the vehicle's tlog."""
         return [Recorder(self._logs, [self._system], files)]
 
 
 class PlayedWorker(Worker):
-    """What the harness plays: the target, or a moving obstacle."""
+    """A node that the harness plays: the target, or a moving obstacle."""
 
     def __init__(self, node: Target | MovingObstacle, seat: Seat) -> None:
         super().__init__(seat)
@@ -263,9 +279,11 @@ class PlayedWorker(Worker):
         self._moves = 0
 
     def begin(self, now: int) -> None:
+        """Start the node at the goal event."""
         self._node.begin(now)
 
     def show(self, now: int) -> None:
+        """Move the target as the view commands."""
         window = self.board.window
         if window is not None and window.moves != self._moves and not isinstance(self._node, MovingObstacle):
             self._moves = window.moves
@@ -273,20 +291,19 @@ class PlayedWorker(Worker):
 
 
 class _Radio:
-    """Partitions of the swarm, as one companion feels them; what happens to whole processes is the
-    parent's."""
+    """Partitions of the swarm for one companion; the parent applies faults of whole processes."""
 
     def __init__(self, rough: Rough) -> None:
         self._rough = rough
 
     def freeze(self, system: int) -> None:
-        """The parent stops the process."""
+        """Do nothing: the parent stops the process."""
 
     def thaw(self, system: int) -> None:
-        """The parent lets it go on."""
+        """Do nothing: the parent resumes it."""
 
     def vanish(self, system: int) -> None:
-        """The parent ends it."""
+        """Do nothing: the parent ends it."""
 
     def cut(self, systems: tuple[int, ...]) -> None:
         self._rough.cut(map(names.companion, systems))

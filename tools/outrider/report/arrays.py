@@ -64,7 +64,7 @@ def motions(path: Path) -> Motions:
     if not (np.diff(time) > 0.0).all():
         raise InputError(f"{path.name}: time_s does not rise")
     system = tuple(arrays["system"].astype(int).tolist())
-    # An infinite separation means that there is no pair; other values out of range are unknown.
+    # An infinite separation means that no pair is in the air; other values out of range are unknown.
     rest = [
         arrays[name] if name == "separation" else np.where(np.abs(arrays[name]) < _FAR, arrays[name], np.nan)
         for name in _MOTIONS

@@ -129,7 +129,10 @@ def _separation(run: Run, motions: Motions, shown: np.ndarray) -> Chart:
 
 
 def _where(run: Run, motions: Motions) -> tuple[str, str, Array] | None:
-    """Return title, note and distances (T, k), m, of the vehicles that fly the task from goal or surface."""
+    """Return title, note and distances (T, k), m, of the vehicles that fly the task from goal or surface.
+
+    The result is None if the scenario is not known or does not fit the motions.
+    """
     scenario = run.scenario
     if scenario is None or len(motions.system) != scenario.size:
         return None

@@ -56,7 +56,7 @@ def to_obstacles(motions: Motions, scenario: Scenario) -> Array:
 def encounters(motions: Motions, d_min: float, scenario: Scenario | None) -> list[Encounter]:
     """Return all violations in order of time: vehicles closer than ``d_min`` (m), and the scenario's limits.
 
-    For pairs of vehicles only samples count in which at least one vehicle is in the air.
+    For pairs of vehicles only samples with a finite separation count, that is with a pair in the air.
     """
     flies = np.isfinite(motions.separation)
     found = []

@@ -27,10 +27,10 @@ _PAUSE = 2.0
 class Way(NamedTuple):
     """Loss from one sender to one receiver (system ids): of ``sent`` messages ``lost`` did not arrive.
 
-    ``exact`` tells that the sender's own log was used, otherwise its sequence numbers. The other values count
-    from the goal event on, if that is known: ``silence`` is the longest time (s) without a message until the
-    sender sent its last; ``usual`` is the time (s) within which 95 % of the arrivals follow the one before.
-    They are None if too few messages arrived.
+    ``exact`` is true if the sender's own log was used, and false if its sequence numbers were. The other
+    values count from the goal event on, if that is known: ``silence`` is the longest time (s) without a
+    message until the sender sent its last; ``usual`` is the time (s) within which 95 % of the arrivals follow
+    the one before. They are None if too few messages arrived.
     """
 
     sender: int
@@ -79,7 +79,7 @@ class Ledger:
         self._seconds = _Seconds()
 
     def take(self, log: Log, ahead: float | None = None) -> None:
-        """Add the log of another owner; ``ahead`` is the offset of its clock in s (``clocks.offset``) or None."""
+        """Add the log of another owner; ``ahead`` is its clock's offset (s, ``clocks.offset``), if known."""
         ahead = 0.0 if ahead is None else ahead
         new = _Party(log._replace(heard={}), ahead, log.begin - 1e6 * min(0.0, ahead))
         waiting: dict[int, list[Stream]] = {}

@@ -1,1 +1,1 @@
-"""Files of a run directory: takes a finished flight, gives its logs, arrays, summary and figures, and reads them."""
+"""Files of a run directory: a finished flight is written as logs, arrays and a summary, and read back."""

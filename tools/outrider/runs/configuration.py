@@ -15,7 +15,7 @@ CONFIGURATION = "configuration.yaml"
 
 
 class Resolved(BaseModel):
-    """Configuration that a run leaves beside its logs."""
+    """Configuration that a run leaves next to its logs."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

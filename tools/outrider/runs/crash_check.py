@@ -1,4 +1,4 @@
-"""Check whether a vehicle crashed; a flight with a crash does not count as finished."""
+"""Crash check of a flight; a flight with a crash does not count as finished."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
 
 
 def _separation(axes: Axes, flight: Outcome, samples: Samples, time: np.ndarray) -> None:
-    """Least distance of any pair at every physics step, against d_min and the vehicles' own size."""
+    """Draw the least distance of any pair at every physics step, with d_min and the vehicles' own size."""
     separation = np.where(np.isfinite(samples.separation), samples.separation, np.nan)
     axes.plot(time, separation, lw=1.2, color="C0", label="vehicle to vehicle")
     offset = np.linalg.norm(samples.position - samples.target[:, None], axis=-1).min(axis=1)

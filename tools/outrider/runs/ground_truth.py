@@ -167,7 +167,7 @@ class Truth:
         self._moved.clear()
 
     def latest(self) -> tuple[Array, Array, Array | None]:
-        """Return positions (K, 3) and velocities (K, 3) of the last sample, and the target's position or None."""
+        """Return positions and velocities (K, 3) of the last sample, and the target's position or None."""
         _, rows, place, _ = self._rows[-1]
         return rows[:, 0:3], rows[:, 3:6], None if np.isnan(place).any() else place
 

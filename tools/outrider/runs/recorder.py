@@ -29,11 +29,13 @@ class Recorder:
             self._steps[name] = files.enter_context(closing(StepsFile(directory / names.steps(system))))
 
     def begin(self, now: int, node: str, /) -> None:
+        """Record the time of a step of ``node``."""
         steps = self._steps.get(node)
         if steps is not None:
             steps.add(now)
 
     def __call__(self, now: int, node: str, _direction: Direction, datagram: Datagram, /) -> None:
+        """Write a datagram of ``node`` to its tlog."""
         writer = self._writers.get(node)
         if writer is not None:
             writer.write(now, names.LINK_NUMBERS[datagram.link], datagram.data)

@@ -18,27 +18,27 @@ class _Fault(_OfVehicle):
 
 
 class Freeze(_Fault):
-    """The companion computes nothing for a while; incoming data waits as in a socket's buffer."""
+    """Freeze of the companion: it computes nothing for a while; input waits as in a socket's buffer."""
 
     kind: Literal["freeze"]
     for_s: Duration
 
 
 class Vanish(_Fault):
-    """The companion stops for good: no set-points, no messages. The autopilot's time-outs apply."""
+    """End of the companion for good: no set-points, no messages; the autopilot's time-outs apply."""
 
     kind: Literal["vanish"]
 
 
 class GpsLoss(_Fault):
-    """The autopilot loses its position fix for a while."""
+    """Loss of the autopilot's position fix for a while."""
 
     kind: Literal["gps_loss"]
     for_s: Duration
 
 
 class GpsJump(_Fault):
-    """The autopilot's position fix is ``offset`` (m, ENU) off for a while."""
+    """Offset of the autopilot's position fix by ``offset`` (m, ENU) for a while."""
 
     kind: Literal["gps_jump"]
     for_s: Duration
@@ -46,7 +46,7 @@ class GpsJump(_Fault):
 
 
 class MotorFailure(_Fault):
-    """A rotor delivers only ``left`` of its thrust from then on."""
+    """Failure of a rotor, which delivers only ``left`` of its thrust from then on."""
 
     kind: Literal["motor"]
     rotor: int = Field(ge=0, le=15, description="index in the vehicle's file")
@@ -54,9 +54,9 @@ class MotorFailure(_Fault):
 
 
 class ClockFault(_OfVehicle):
-    """The companion's clock is ``late_ms`` late (negative: early) from the start, and ``drift_ppm`` fast.
+    """Clock error of the companion: ``late_ms`` late (negative: early) from the start, ``drift_ppm`` fast.
 
-    It does not step in flight: a companion reads the time once and then uses its monotonic clock.
+    The clock does not step in flight: a companion reads the time once and then uses its monotonic clock.
     """
 
     kind: Literal["clock"]

@@ -98,7 +98,7 @@ class AllLinks(Part):
 
 
 class PartitionPart(Part):
-    """For a while nothing passes on the swarm link between ``members`` and all others."""
+    """Partition of the swarm link: for a while nothing passes between ``members`` and all others."""
 
     at_s: Seconds = Field(description="after the goal event")
     for_s: Duration

@@ -16,7 +16,7 @@ class _What(NamedTuple):
 
 
 class _Spell(NamedTuple):
-    """``what`` happens from ``begin`` until before ``end`` (s); ``name`` is its name in the file."""
+    """Period in which ``what`` happens, from ``begin`` until before ``end`` (s); ``name`` as in the file."""
 
     name: str
     what: _What

@@ -84,7 +84,7 @@ class Bystander(Part):
 
 
 class Jump(Part):
-    """The target jumps to another place, ``after_s`` seconds after the goal event."""
+    """Jump of the target to another place, ``after_s`` seconds after the goal event."""
 
     after_s: Seconds
     to: Position
@@ -108,7 +108,7 @@ class FixedTarget(Part):
 
 
 class Pace(Part):
-    """The target moves at this speed from ``after_s`` seconds after the goal event on."""
+    """Change of the target's speed, ``after_s`` seconds after the goal event."""
 
     after_s: Seconds
     speed: float = Field(ge=0.0, le=20.0, description="m/s")

@@ -1,0 +1,1 @@
+"""Data of a 3D view: takes scenarios, states and commands, gives scenes, snapshots and changes."""

@@ -1,4 +1,4 @@
-"""What was changed by hand while a simulation flew: each change once, and a record of it."""
+"""Changes made by hand during a simulated flight: each change once, and a record of it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import NamedTuple
 from outrider.scene.view_commands import Wishes
 
 FILE = "orders.json"
-"""In the run directory, if there were any."""
+"""Name of the record in the run directory; it exists only if there were changes."""
 
 
 class Change(NamedTuple):
-    """Those of ``Wishes`` that are new, None for the others."""
+    """The values of ``Wishes`` that are new; None for the others."""
 
     methods: str | None = None
     loss: float | None = None
@@ -21,14 +21,14 @@ class Change(NamedTuple):
 
 
 class Orders:
-    """Of one flight; ``given``: (s after the goal event or None before it, the change)."""
+    """Changes of one flight; ``given``: (s after the goal event or None before it, the change)."""
 
     def __init__(self) -> None:
         self.given: list[tuple[float | None, Change]] = []
         self._last = Wishes()
 
     def new(self, wishes: Wishes, seconds: float | None) -> Change | None:
-        """What of ``wishes`` is new; None if nothing is."""
+        """Return what is new in ``wishes``, and record it; None if nothing is."""
         last, self._last = self._last, wishes
         change = Change(
             wishes.methods if wishes.methods != last.methods else None,
@@ -41,7 +41,7 @@ class Orders:
         return change
 
     def write(self, directory: Path) -> None:
-        """Leave them in ``directory``, if there are any."""
+        """Write the changes to ``directory``, if there are any."""
         if self.given:
             rows = [
                 {"time_s": None if seconds is None else round(seconds, 3)}

@@ -1,4 +1,4 @@
-"""What is to be seen of a companion, without touching it."""
+"""Snapshot of a companion, without a change of its state."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from outrider.scene.snapshot import NO_PLAN, Single, State, padded
 
 _HELD = {Holding.HELD: ", old plan", Holding.BRAKING: ", braking"}
 MODES = tuple(phase.value + held for phase in Phase for held in ("", *_HELD.values()))
-"""All that a companion may be doing, in words."""
+"""All possible modes of a companion, in words."""
 
 
 class Glimpse(NamedTuple):
-    """Its ``state``, and the plan (KNOTS, 6) that it flies."""
+    """State of a companion, and the plan (KNOTS, 6) that it flies."""
 
     state: State
     plan: Single
 
 
 def glimpse(companion: Companion, now: int) -> Glimpse:
-    """Of ``companion`` at ``now`` (µs)."""
+    """Return the snapshot of ``companion`` at ``now`` (µs)."""
     horizon, phase = companion.flown, companion.pilot.phase
     ages = companion.world.neighbours.ages(now)
     mode = phase.value + (_HELD.get(companion.guard.state, "") if phase is Phase.ESCORT else "")

@@ -1,4 +1,4 @@
-"""Datagrams between who flies and who looks on: bounded, and neither end ever waits for the other."""
+"""Datagrams between a flight and its view: bounded, and neither end ever waits for the other."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ _LARGEST = 1 << 20
 
 
 class Line:
-    """One ``end``, with ``room`` (bytes). ``dropped``: datagrams that there was no room for, or nobody left
-    to take."""
+    """One ``end`` of the channel, with ``room`` (bytes).
+
+    ``dropped``: datagrams for which there was no room or no receiver.
+    """
 
     def __init__(self, end: socket.socket, room: int = ROOM) -> None:
         end.setblocking(False)
@@ -21,21 +23,21 @@ class Line:
         self.dropped = 0
 
     def fileno(self) -> int:
-        """Of the socket."""
+        """Return the file descriptor of the socket."""
         return self._end.fileno()
 
     def send(self, data: bytes) -> bool:
-        """Pass ``data`` on if that is possible at once; whether it was."""
+        """Send ``data`` if that is possible at once; return whether it was sent."""
         try:
             self._end.send(data)
         except OSError:
-            # Full, or too large for the system, or the other end is gone: nobody who flies may mind.
+            # Full, or too large for the system, or the other end is gone: the flight must not be affected.
             self.dropped += 1
             return False
         return True
 
     def receive(self) -> list[bytes]:
-        """All that has come."""
+        """Return all datagrams that have arrived."""
         found = []
         try:
             while True:
@@ -44,10 +46,10 @@ class Line:
             return found
 
     def close(self) -> None:
-        """This end."""
+        """Close this end."""
         self._end.close()
 
 
 def pair() -> tuple[socket.socket, socket.socket]:
-    """Both ends; give each to a ``Line``."""
+    """Return both ends, each for a ``Line``."""
     return socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)

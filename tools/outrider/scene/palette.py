@@ -1,4 +1,4 @@
-"""The colours of the report, as RGB."""
+"""Colours of the report, as RGB."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ RGB = tuple[int, int, int]
 
 
 def rgb(code: str) -> RGB:
-    """Of #rrggbb."""
+    """Return the RGB values of #rrggbb."""
     return int(code[1:3], 16), int(code[3:5], 16), int(code[5:7], 16)
 
 
-# They stay apart for the colour-blind too (M. Petroff, Accessible Color Sequences, 2021).
+# Distinguishable with colour blindness, too (M. Petroff, Accessible Color Sequences, 2021).
 VEHICLES = (
     "#3f90da",
     "#ffa90e",
@@ -32,18 +32,21 @@ INK, SOFT, LINE, GRID, BAD, ACCENT, SOLID = map(
 
 
 def hex_of(k: int) -> str:
-    """Of vehicle ``k``."""
+    """Return the colour of vehicle ``k`` as #rrggbb."""
     return VEHICLES[k % len(VEHICLES)]
 
 
 def colours(count: int) -> NDArray[np.uint8]:
-    """(count, 3) of so many vehicles."""
+    """Return the colours (count, 3) of ``count`` vehicles."""
     return np.array([rgb(hex_of(k)) for k in range(count)], dtype=np.uint8).reshape(-1, 3)
 
 
 def linear(colour: RGB | NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """sRGB (…, 3) as intensities: what the browser takes for colours of points and of single meshes
-    among many; one colour for all is sRGB."""
+    """Return sRGB (…, 3) as linear intensities.
+
+    The browser expects these for colours of points and of single meshes among many; one colour for all is
+    sRGB.
+    """
     share = np.asarray(colour) / 255.0
     found = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.rint(255.0 * found).astype(np.uint8)

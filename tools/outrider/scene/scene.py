@@ -1,4 +1,4 @@
-"""What a picture is made of before anything moves: who flies, what stands around, what may be changed."""
+"""Static content of a 3D view: vehicles, obstacles, and what the view may change."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from outrider.scenarios.starts import starts
 Array = NDArray[np.float64]
 Lever = Literal["pace", "methods", "loss", "target"]
 SPAN = 0.63
-"""m from tip to tip where nothing says otherwise: the firefly's."""
+"""m from tip to tip where nothing else is configured: the firefly's."""
 LEAST_REACH = 4.0
-"""m: no picture shows less."""
+"""m: smallest reach of a view."""
 
 
 class Solid(NamedTuple):
@@ -30,15 +30,15 @@ class Solid(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """Lengths in m, fleet-local ENU.
+    """Static content of a view; lengths in m, fleet-local ENU.
 
     ``systems`` (K): ids of the vehicles, of which the first ``tasked`` fly the task. ``d_min``, ``d_safe``
     between centres, ``d_min_target`` to the target, ``d_min_solid`` to a surface; None where it is not known.
-    ``movers`` (M): shapes of what moves. ``goals`` (k, 3). ``surfaces``: closed lines (n, 3) as offsets from
-    the target. ``centre`` (3,) and ``reach``: where to look at first, and how far from there something
-    is. ``follows``: whether the picture goes along with the vehicles. ``step_s``: of plans with planes
-    between them; None for a fleet without. ``levers``: what the view may change, ``methods`` and ``loss`` as
-    they are at first.
+    ``movers`` (M): shapes of the moving obstacles. ``goals`` (k, 3). ``surfaces``: closed lines (n, 3) as
+    offsets from the target. ``centre`` (3,) and ``reach``: the initial centre of the view, and the distance
+    from there within which the content lies. ``follows``: whether the view moves along with the vehicles.
+    ``step_s``: step of plans with separating planes; None for a fleet without them. ``levers``: what the view
+    may change, ``methods`` and ``loss`` as they are at first.
     """
 
     title: str
@@ -63,7 +63,7 @@ class Scene(NamedTuple):
 
 
 def staged(scenario: Scenario, seed: int, span: float, levers: frozenset[Lever]) -> Scene:
-    """The scene of ``scenario`` for a seed; ``span`` (m) of its vehicles from tip to tip."""
+    """Return the scene of ``scenario`` for a seed; ``span`` (m) is the vehicles' size from tip to tip."""
     companion = scenario.companion
     begin = starts(scenario, seed, companion.planar)
     goals = np.empty((0, 3)) if begin.goals is None else np.asarray(begin.goals, dtype=np.float64)
@@ -108,7 +108,7 @@ def _solid(obstacle: Obstacle) -> Solid:
 
 
 def _surfaces(scenario: Scenario) -> tuple[Array, ...]:
-    """The fleet's, and those of vehicles that have their own; to a goal there is none."""
+    """Return the fleet's surface, and those of vehicles that have their own; empty unless escorting."""
     companion = scenario.companion
     if companion.task != "escort":
         return ()

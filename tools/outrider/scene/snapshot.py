@@ -1,4 +1,4 @@
-"""What a picture shows at one time."""
+"""Snapshot of a flight for a view: what it shows at one time."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 KNOTS = 17
-"""Rows of a plan at most."""
+"""Largest number of rows of a plan."""
 
 
 class State(NamedTuple):
-    """Of one vehicle: what it does, the age (s) of what it knows of the neighbour unheard of for longest, the
-    CPU time (ms) of its last plan, and how often an old plan was kept. NaN and None for what is not known."""
+    """State of one vehicle.
+
+    What it does, the age (s) of the oldest data among its neighbours, the CPU time (ms) of its last plan, and
+    how often an old plan was kept. NaN and None for unknown values.
+    """
 
     mode: str = ""
     age_s: float = nan
@@ -25,12 +28,11 @@ class State(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """K vehicles and M moving obstacles ``time`` s after the goal event, fleet-local ENU, SI; NaN where there
-    is nothing.
+    """Snapshot at ``time`` s after the goal event: K vehicles, M moving obstacles, fleet-local ENU, SI.
 
-    ``position`` (K, 3); ``attitude`` (K, 4): w x y z of bodies with x forward, y left, z up; ``plan``
-    (K, KNOTS, 6): position and velocity at the knots, the last one repeated; ``target`` (3,); ``moving``
-    (M, 3); ``states`` (K).
+    Missing values are NaN. ``position`` (K, 3); ``attitude`` (K, 4): w x y z of bodies with x forward, y
+    left, z up; ``plan`` (K, KNOTS, 6): position and velocity at the knots, the last one repeated; ``target``
+    (3,); ``moving`` (M, 3); ``states`` (K).
     """
 
     time: float
@@ -44,7 +46,7 @@ class Moment(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """The two vehicles, by their index, that are nearest to each other, and their ``distance`` (m)."""
+    """The two vehicles, by index, that are nearest to each other, and their ``distance`` (m)."""
 
     distance: float
     one: int
@@ -52,7 +54,10 @@ class Pair(NamedTuple):
 
 
 def nearest(position: Single) -> Pair:
-    """Of the vehicles at ``position`` (K, 3); an infinite distance if there are no two."""
+    """Return the nearest pair of vehicles at ``position`` (K, 3).
+
+    The distance is infinite if there are fewer than two.
+    """
     count = len(position)
     if count < 2:
         return Pair(inf, 0, 0)
@@ -65,7 +70,7 @@ def nearest(position: Single) -> Pair:
 
 
 def padded(plan: Array) -> Single:
-    """A plan's positions and velocities (n, 6) as (KNOTS, 6): what is missing at its end is its last knot."""
+    """Return a plan's positions and velocities (n, 6) as (KNOTS, 6), filled up with the last knot."""
     result = np.empty((KNOTS, 6), dtype=np.float32)
     count = min(len(plan), KNOTS)
     result[:count] = plan[:count]
@@ -84,12 +89,12 @@ _OF_BODY = np.array([0.0, 1.0, 0.0, 0.0])
 
 
 def enu_attitude(attitude: Array) -> Array:
-    """Bodies FRD in NED as bodies FLU in ENU: quaternions (…, 4), w x y z."""
+    """Convert attitudes of FRD bodies in NED to FLU bodies in ENU: quaternions (…, 4), w x y z."""
     return _product(_product(_TO_ENU, attitude), _OF_BODY)
 
 
 def euler_attitude(roll: float, pitch: float, yaw: float) -> Array:
-    """FLU in ENU (4,) of the angles (rad) of ATTITUDE, which are those of a FRD body in NED."""
+    """Return the attitude (4,) of FLU in ENU for the angles (rad) of ATTITUDE, those of FRD in NED."""
     result = np.array([1.0, 0.0, 0.0, 0.0])
     for axis, angle in ((3, yaw), (2, pitch), (1, roll)):
         turn = np.zeros(4)
@@ -99,7 +104,7 @@ def euler_attitude(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Hamilton's, of (…, 4)."""
+    """Return the Hamilton product of (…, 4)."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     parts = (

@@ -1,7 +1,7 @@
-"""What somebody at the view wishes of a simulation.
+"""Commands of the view's user to a simulation.
 
-All of it is said again and again: whatever is lost on the way is said once more, and what is no longer said
-no longer counts.
+All commands are sent again and again: a lost message is repeated, and a command that is no longer sent no
+longer applies.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from companion.config.planning import MethodName
 from outrider.scenarios.options import METHODS
 
 FASTEST = 100.0
-"""Times real time; beyond, a flight just goes as fast as it can."""
+"""Largest speed as a multiple of real time; beyond it, a flight just runs as fast as it can."""
 LOSSY = ("swarm", "target")
-"""The links that lose what is wished, as those of ``--loss``."""
+"""Links on which the commanded loss applies, as with ``--loss``."""
 _FAR = 10_000.0
 """m"""
 _MOST = 1 << 31
@@ -25,9 +25,12 @@ _LARGEST = 4096
 
 
 class Wishes(NamedTuple):
-    """``speed``: times real time, None for as fast as it goes; ``paused``; ``steps``: how often a single step
-    was asked for. ``methods`` joined by + and ``loss`` (0…1): None leaves what is. ``target`` (3,) m,
-    fleet-local ENU: where it shall go, for the ``moves``-th time."""
+    """Commands of the view's user.
+
+    ``speed``: multiple of real time, None for as fast as possible; ``paused``; ``steps``: number of requested
+    single steps. ``methods`` joined by + and ``loss`` (0…1): None leaves the present value. ``target`` (3,)
+    m, fleet-local ENU: new position of the target, for the ``moves``-th time.
+    """
 
     speed: float | None = None
     paused: bool = False
@@ -45,12 +48,12 @@ class Wishes(NamedTuple):
 
 
 def encoded(wishes: Wishes) -> bytes:
-    """For ``decoded``."""
+    """Encode ``wishes`` for ``decoded``."""
     return json.dumps(wishes._asdict()).encode()
 
 
 def decoded(data: bytes) -> Wishes | None:
-    """What ``encoded`` made; None for anything else."""
+    """Decode the result of ``encoded``; return None for anything else."""
     if len(data) > _LARGEST:
         return None
     try:

@@ -1,4 +1,4 @@
-"""What a rehearsal comes to, as numbers for scripts and as files."""
+"""Results of a shadow run, as numbers for scripts and as files."""
 
 from __future__ import annotations
 
@@ -19,8 +19,11 @@ _COLUMNS = (
 
 
 def document_of(found: Rehearsed) -> dict[str, object]:
-    """What a script reads: of the set-points that would have been sent, and under ``sent`` of those that
-    were; ``apart_m`` between the two."""
+    """Return the results for scripts.
+
+    They describe the set-points that would have been sent and, under ``sent``, those that were; ``apart_m``
+    is the distance between the two.
+    """
     would, sent = facts(found.would), facts(found.sent)
     off = apart(course(found.would), course(found.sent))
     document: dict[str, object] = dict(would._asdict())
@@ -35,7 +38,7 @@ def document_of(found: Rehearsed) -> dict[str, object]:
 
 
 def leave(directory: Path, name: str, found: Rehearsed, document: dict[str, object]) -> None:
-    """``setpoints.csv``, ``replay.json`` and ``replay.png`` in ``directory``."""
+    """Write ``setpoints.csv``, ``replay.json`` and ``replay.png`` to ``directory``."""
     (directory / "replay.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     with (directory / "setpoints.csv").open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)

@@ -1,4 +1,4 @@
-"""The picture of a rehearsal: what would have been sent, what was, and where the vehicle flew."""
+"""Figure of a shadow run: set-points that would have been sent, those that were, and the flown path."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _WOULD, _SENT, _FLOWN = "C0", "C1", "0.55"
 
 
 def draw(name: str, found: Rehearsed, path: Path) -> None:
-    """Write the PNG: the paths from above, position and speed over time, in the vehicle's local NED."""
+    """Write the PNG: paths from above, position and speed over time, in the vehicle's local NED."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -57,14 +57,14 @@ def draw(name: str, found: Rehearsed, path: Path) -> None:
 
 
 def _curve(axes: Axes, of: Course, start: int, values: np.ndarray, colour: str) -> None:
-    """``values`` (n,) over the time since ``start`` (µs)."""
+    """Plot ``values`` (n,) over the time since ``start`` (µs)."""
     if len(of.times):
         times, (line,) = _broken(of, values[:, None])
         axes.plot((times - start) * 1e-6, line, color=colour, lw=0.9)
 
 
 def _broken(of: Course, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times (m,) and columns (c, m) of ``values`` (n, c), with a break in the line at every gap."""
+    """Return times (m,) and columns (c, m) of ``values`` (n, c), with a break in the line at every gap."""
     gaps = np.flatnonzero(np.diff(of.times) > TOGETHER) + 1
     times = np.insert(of.times.astype(np.float64), gaps, np.nan)
     return times, np.insert(values.astype(np.float64), gaps, np.nan, axis=0).T

@@ -1,4 +1,4 @@
-"""Who plays whom in a log: own vehicle, neighbours, target; what each record is to the companion."""
+"""Assignment of a log's systems to roles: own vehicle, neighbours, target; and the use of each record."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ _SURVEYED = {LOCAL, GLOBAL, ORIGIN}
 
 
 class Part(Enum):
-    """What a record is."""
+    """Use of a record by the companion."""
 
     AUTOPILOT = "autopilot"
     SWARM = "swarm"
     TARGET = "target"
     SENT = "sent"
-    """A set-point for the own vehicle, from whoever steered it."""
+    """A set-point for the own vehicle, from any sender."""
     NOTHING = ""
 
 
 @dataclass(frozen=True)
 class Cast:
-    """System ids. ``neighbours`` None: everybody else that says where it is."""
+    """System ids of the roles; ``neighbours`` None: all others that report their position."""
 
     own: int
     neighbours: frozenset[int] | None = None
     target: int | None = None
 
     def part(self, frame: bytes) -> Part:
-        """What the record of ``frame`` is to the companion."""
+        """Return the companion's use of the record of ``frame``."""
         system, component, message_id = header(frame)
         if message_id == SETPOINT and (system, component) != (self.own, AUTOPILOT):
             return Part.SENT
@@ -58,11 +58,13 @@ class Cast:
 
 
 class Survey(NamedTuple):
-    """What a first look at the own vehicle's records shows: its first place (°, °, m above mean sea level)
-    and how high above its home that is, its GPS_GLOBAL_ORIGIN, and whether it says LOCAL_POSITION_NED.
-    ``systems`` are all that speak, ``placed`` those that say where they are; ``begin`` and ``end``, µs, of
-    the log; ``reach``: how far (m, horizontally) it ever was from its first place, of what is within 5
-    km."""
+    """Result of a first pass over the own vehicle's records.
+
+    ``place``: its first position (°, °, m above mean sea level); ``above_home``: the height of that above its
+    home; ``origin``: its GPS_GLOBAL_ORIGIN; ``local``: whether it sends LOCAL_POSITION_NED. ``systems`` are
+    all senders, ``placed`` those that report their position; ``begin`` and ``end`` of the log, µs; ``reach``:
+    its largest horizontal distance (m) from its first position, of those within 5 km.
+    """
 
     place: tuple[float, float, float]
     above_home: float
@@ -76,19 +78,21 @@ class Survey(NamedTuple):
 
     @property
     def seconds(self) -> float:
-        """How long the log is."""
+        """Length of the log, s."""
         return (self.end - self.begin) * 1e-6
 
     @property
     def fleet(self) -> FleetFrame:
-        """A fleet frame at the foot of the own first place."""
+        """Fleet frame at the foot of the vehicle's first position."""
         latitude, longitude, altitude = self.place
         return FleetFrame(latitude, longitude, altitude - self.above_home)
 
 
 def survey(records: Iterable[Record], own: int, name: str) -> Survey:
-    """A look at all ``records`` of the log ``name``. InputError if the vehicle ``own`` is not in it or does
-    not say where it is."""
+    """Examine all ``records`` of the log ``name``.
+
+    Raises InputError if the vehicle ``own`` is not in it or does not report its position.
+    """
     codec = Codec(lambda identifier, _system, _component: identifier in _SURVEYED)
     systems: set[int] = set()
     placed: set[int] = set()
@@ -111,7 +115,8 @@ def survey(records: Iterable[Record], own: int, name: str) -> Survey:
                 continue
             match message:
                 case GlobalPosition():
-                    # Without a fix it is all zeros: that counts only where there is nothing better.
+                    # Without a fix the position is all zeros, which are used only where there is nothing
+                    # better.
                     if place is None or not (place.latitude or place.longitude):
                         place, here = message, _frame(message)
                     elif here is not None and (message.latitude or message.longitude):
@@ -152,21 +157,21 @@ def _frame(place: GlobalPosition) -> FleetFrame:
 
 
 def _apart(here: FleetFrame, place: GlobalPosition) -> float:
-    """Horizontally, m; 0 for what is too far to be true."""
+    """Return the horizontal distance, m; 0 if it is implausibly large."""
     east, north, _ = here.to_enu(place.latitude, place.longitude, place.altitude)
     far = float(np.hypot(east, north))
     return far if far < _FAR else 0.0
 
 
 def _origin(place: GlobalPosition, local: LocalPosition) -> tuple[float, float, float]:
-    """Where the own local frame begins, from one place in both."""
+    """Return the origin of the own local frame, from one position in both frames."""
     here = _frame(place)
     north, east, down = local.position_ned
     return here.to_geodetic((-east, -north, down))
 
 
 def check(log: Path, cast: Cast, seen: Survey) -> None:
-    """InputError for somebody who says nothing of where it is."""
+    """Raise InputError for a selected system that is the own vehicle or never reports its position."""
     asked = {"--target": () if cast.target is None else (cast.target,), "--neighbours": cast.neighbours or ()}
     allowed = ", ".join(map(str, sorted(seen.placed - {cast.own}))) or "nobody"
     for option, systems in asked.items():

@@ -1,4 +1,4 @@
-"""What a row of set-points is like, and how it differs from another."""
+"""Properties of a sequence of set-points, and its distance from another."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ from mavlink_bridge.messages import SetpointLocal
 Array = NDArray[np.float64]
 _LOCAL_NED = 1
 TOGETHER = 100_000
-"""µs. What is further apart is no step but a gap."""
+"""µs. A longer interval is a gap, not a step."""
 _TRIPLES = {"position": 0x007, "velocity": 0x038, "acceleration": 0x1C0}
-"""Bits of the type mask that say *ignored*."""
+"""Bits of the type mask that mean *ignored*."""
 
 
 class Course(NamedTuple):
-    """A row of n set-points: ``times`` (n,) µs; ``positions``, ``velocities``, ``accelerations`` (n, 3) NED,
-    SI, NaN where the mask ignores them, and positions where they are of another frame than LOCAL_NED; ``yaw``
-    (n,) rad, ``masks`` and ``frames`` (n,)."""
+    """A sequence of n set-points.
+
+    ``times`` (n,) µs; ``positions``, ``velocities``, ``accelerations`` (n, 3) NED, SI, NaN where the mask
+    ignores them; positions are also NaN in frames other than LOCAL_NED; ``yaw`` (n,) rad, ``masks`` and
+    ``frames`` (n,).
+    """
 
     times: NDArray[np.int64]
     positions: Array
@@ -34,8 +37,11 @@ class Course(NamedTuple):
 
 
 class Facts(NamedTuple):
-    """``finite``: whether all that is not ignored is; ``max_step_m``: between two that follow each other
-    within 0.1 s; ``gaps``: where longer passed. None where there is nothing to measure."""
+    """Properties of a sequence of set-points; None where there is nothing to measure.
+
+    ``finite``: whether all values that are not ignored are finite; ``max_step_m``: between two that follow
+    each other within 0.1 s; ``gaps``: number of longer intervals.
+    """
 
     setpoints: int
     finite: bool
@@ -48,7 +54,7 @@ class Facts(NamedTuple):
 
 
 def course(told: Sequence[tuple[int, SetpointLocal]]) -> Course:
-    """Set-points with their times, as arrays."""
+    """Return set-points with their times as arrays."""
     count = len(told)
     values = np.array(
         [(*m.position, *m.velocity, *m.acceleration, m.yaw) for _, m in told], dtype=np.float64
@@ -58,7 +64,7 @@ def course(told: Sequence[tuple[int, SetpointLocal]]) -> Course:
         values[(masks & bits) != 0, 3 * k : 3 * k + 3] = np.nan
     values[(masks & 0x400) != 0, 9] = np.nan
     frames = np.array([m.frame for _, m in told], dtype=np.int64)
-    # Offsets, and axes of the body, are no places.
+    # Offsets, and axes of the body, are no positions.
     values[frames != _LOCAL_NED, 0:3] = np.nan
     return Course(
         np.array([time for time, _ in told], dtype=np.int64),
@@ -72,7 +78,7 @@ def course(told: Sequence[tuple[int, SetpointLocal]]) -> Course:
 
 
 def facts(told: Sequence[tuple[int, SetpointLocal]]) -> Facts:
-    """Of set-points with their times, in order."""
+    """Return the properties of set-points with their times, in order."""
     of = course(told)
     return Facts(
         len(told),
@@ -87,15 +93,18 @@ def facts(told: Sequence[tuple[int, SetpointLocal]]) -> Facts:
 
 
 def steps(of: Course) -> Array:
-    """How far (n − 1,) m each position is from the one before; NaN over a gap."""
+    """Return the distance (n − 1,) m of each position from the previous one; NaN over a gap."""
     far: Array = np.linalg.norm(np.diff(of.positions, axis=0), axis=1)
     far[np.diff(of.times) > TOGETHER] = np.nan
     return far
 
 
 def apart(would: Course, sent: Course) -> Array:
-    """Distances (k,) m of set-points that were ``sent`` from the newest that ``would`` have been at that
-    time, where both have a position."""
+    """Return the distances (k,) m between the set-points of ``sent`` and ``would``.
+
+    Each set-point of ``sent`` is compared with the newest of ``would`` at its time, where both have a
+    position.
+    """
     if not len(would.times) or not len(sent.times):
         return np.zeros(0)
     newest = np.searchsorted(would.times, sent.times, side="right") - 1
@@ -106,7 +115,7 @@ def apart(would: Course, sent: Course) -> Array:
 
 
 def _finite(message: SetpointLocal) -> bool:
-    """Whether all that the mask does not ignore is finite."""
+    """Return whether all values that the mask does not ignore are finite."""
     parts = {"position": message.position, "velocity": message.velocity, "acceleration": message.acceleration}
     used = [v for name, triple in parts.items() if not message.type_mask & _TRIPLES[name] for v in triple]
     if not message.type_mask & 0x400:

@@ -1,4 +1,4 @@
-"""A companion listens to a log, and what it would have sent is kept beside what was sent."""
+"""Shadow run: a companion receives a log, and its set-points are compared with those of the log."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from outrider.supervision.supervised_node import Cockpit
 _NEVER = 1 << 60
 """µs, 36,000 years after 1970: damage."""
 STEP = 10_000
-"""µs."""
+"""µs"""
 _RATE_HZ = 5.0
 
 Told = tuple[int, SetpointLocal]
@@ -41,9 +41,12 @@ Told = tuple[int, SetpointLocal]
 
 @dataclass
 class Rehearsed:
-    """``would``: set-points that the companion would have sent; ``sent``: those that were, each with its time
+    """Results of a shadow run.
+
+    ``would``: set-points that the companion would have sent; ``sent``: those that were, each with its time
     (µs of the log); ``places``: (time, position (3,)) NED of the vehicle itself, local as the set-points are.
-    ``reasons``: steps of 10 ms without a set-point, by what was missing; ``holds``: plans that were held."""
+    ``reasons``: steps of 10 ms without a set-point, by what was missing; ``holds``: plans that were held.
+    """
 
     would: list[Told] = field(default_factory=list)
     sent: list[Told] = field(default_factory=list)
@@ -62,11 +65,16 @@ def rehearse(
     fleet: FleetFrame | None = None,
     follow: bool = False,
 ) -> Rehearsed:
-    """Step an understudy every 10 ms of the log's time with what was recorded until then. Without a target in
-    ``cast`` it is a point that stands where the own vehicle was first. ``on_step`` hears the time (µs) and
-    how many records have been read. The ``fleet`` frame is the log's own unless there is another. With
-    ``follow`` the understudy lives by the vehicle's clock, as ``outrider fly`` does: one that is a hundredth
-    slower than the recorder's would be believed ever older, and the plans begin ever further ahead of it."""
+    """Step a shadow companion every 10 ms of the log's time with the records up to then.
+
+    Without a target in ``cast``, a fixed target stands at the own vehicle's first position. ``on_step`` is
+    called with the time (µs) and the number of records read. The ``fleet`` frame is the log's own unless one
+    is given.
+
+    With ``follow`` the companion uses the vehicle's clock, as ``outrider fly`` does. Otherwise the data of a
+    vehicle whose clock is a hundredth slower than the recorder's would appear ever older, and the plans would
+    begin ever further ahead of it.
+    """
     fleet = seen.fleet if fleet is None else fleet
     system = next(n for n in (TARGET_SYSTEM, 1, 2, 3) if n not in seen.systems and n != cast.own)
     target = system if cast.target is None else cast.target
@@ -96,8 +104,11 @@ def rehearse(
 
 
 def steps(records: Iterable[Record]) -> Iterator[tuple[int, list[Record]]]:
-    """Times (µs, multiples of 4) every 10 ms, each with the records since the last one, on one time line (see
-    ``timeline``); long silence is skipped, and so are records with a time that no clock shows."""
+    """Yield times (µs, multiples of 4) every 10 ms, each with the records since the last one.
+
+    The records are on one time line (see ``timeline``). Long silences are skipped, and so are records with a
+    time that no clock shows.
+    """
     now: int | None = None
     batch: list[Record] = []
     for record in on_one_line(one for one in records if one.time < _NEVER):
@@ -116,7 +127,10 @@ def steps(records: Iterable[Record]) -> Iterator[tuple[int, list[Record]]]:
 
 
 def _given(part: Part, record: Record, reader: Codec, found: Rehearsed, stand_in: _StandIn) -> list[Datagram]:
-    """What the companion gets of a record; set-points of others are kept, and where the vehicle is."""
+    """Return the datagrams that the companion receives for a record.
+
+    Set-points from other senders and the vehicle's positions are collected in ``found``.
+    """
     if part is Part.NOTHING:
         return []
     if part is Part.SENT:
@@ -137,8 +151,10 @@ def _given(part: Part, record: Record, reader: Codec, found: Rehearsed, stand_in
 
 
 class _StandIn:
-    """Says in the own autopilot's place what the log lacks: its origin, once, and its local position from its
-    global one."""
+    """Substitute for messages of the own autopilot that the log lacks.
+
+    It adds the origin, once, and local positions, derived from the global ones.
+    """
 
     def __init__(self, own: int, seen: Survey, fleet: FleetFrame) -> None:
         self.own = Source(own, 1)
@@ -149,7 +165,7 @@ class _StandIn:
         self._origin: Message | None = GpsGlobalOrigin(self.own, latitude, longitude, altitude, 0)
 
     def frames(self, frame: bytes) -> list[bytes]:
-        """``frame``, and what has to be said besides."""
+        """Return ``frame`` and the messages to add to it."""
         found = [frame]
         if self._origin is not None:
             found.insert(0, self._codec.encode(self._origin))

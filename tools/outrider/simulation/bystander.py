@@ -11,7 +11,10 @@ DEAF_TO = "swarm"
 
 
 class Bystander(Companion):
-    """Companion that receives nothing on the swarm link; it hovers or flies through, and does not give way."""
+    """Companion that receives nothing on the swarm link.
+
+    It hovers or flies through, and does not give way.
+    """
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Step as every companion, without the datagrams of the swarm link."""

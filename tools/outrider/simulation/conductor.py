@@ -49,8 +49,8 @@ class Sight(NamedTuple):
     """Observed state at ``now`` (µs).
 
     True positions and velocities (K, 3), the target's position or None, ENU; ``ready``: whether all
-    companions that can be are under way; ``waiting``: what the others wait for; ``armed``: whether any motor
-    may turn.
+    companions that can be under way are; ``waiting``: the conditions for which the others wait; ``armed``:
+    whether any motor may turn.
     """
 
     now: int

@@ -1,5 +1,7 @@
-"""Somebody else who speaks with the own ids: then two vehicles have one system id and none sees the other, or
-two companions have one vehicle."""
+"""Detector of another sender with the own ids.
+
+Either two vehicles have one system id, and each ignores the other, or two companions have one vehicle.
+"""
 
 from __future__ import annotations
 
@@ -12,36 +14,42 @@ from mavlink_bridge.wire.framing import leading_frames
 from mavlink_bridge.wire.header import Header
 
 REMEMBERED: Final = 4096
-"""Frames; more than a link says until its echo is back."""
+"""Number of frames; more than a link sends until its echo is back."""
 _LASTS, _FORGOTTEN = 2_000_000, 10_000_000
-"""µs over which it must be heard, longer than what a companion before this one said is on its way; and after
-which it counts as gone."""
+"""Times, µs.
+
+A duplicate must be received over the first time, which is longer than messages of a previous companion remain
+under way. After the second time without messages it counts as gone.
+"""
 
 
 class Twin:
-    """Looked for among all that is heard on the links of the companion of ``system``: what has its ids, and
-    is not, byte by byte, what it said itself. ``clock``: of the wall."""
+    """Detector of a duplicate on the links of the companion of ``system``.
+
+    A duplicate is a sender that has the companion's ids, and whose frames are not, byte by byte, frames that
+    the companion sent itself. ``clock``: wall clock.
+    """
 
     def __init__(self, system: int, clock: Clock) -> None:
         self._own = (system, COMPONENT)
         self._clock = clock
         self._said: OrderedDict[int, None] = OrderedDict()
-        """Marks, what was said last at the end."""
+        """Hashes of sent frames, the latest at the end."""
         self._first: int | None = None
         self._last: int | None = None
 
     def said(self, data: bytes) -> None:
-        """Frames that leave."""
+        """Record frames that leave."""
         for frame in leading_frames(data)[0]:
             mark = hash(frame.data)
-            # What is said again byte by byte is remembered from then on.
+            # A frame that is sent again byte by byte is remembered from then on.
             self._said[mark] = None
             self._said.move_to_end(mark)
             if len(self._said) > REMEMBERED:
                 self._said.popitem(last=False)
 
     def heard(self, header: Header, frame: bytes) -> None:
-        """A frame that arrives."""
+        """Check a frame that arrives."""
         if (header.system, header.component) != self._own or hash(frame) in self._said:
             return
         now = self._clock.now()
@@ -51,7 +59,7 @@ class Twin:
 
     @property
     def seen(self) -> bool:
-        """Whether there is one."""
+        """Whether there is a duplicate."""
         first, last = self._first, self._last
         if first is None or last is None:
             return False

@@ -1,9 +1,8 @@
-"""The companion as the loop runs it: its clock follows the autopilot's, and if it is told to give up, the
-last word is what it says.
+"""Companion under supervision: its clock follows the autopilot's, and it can be replaced by a hold on exit.
 
-Until it is known how fast that clock runs, nothing is heard or told of others, as what they say is dated by
-their clocks against the own one, and no go is taken; nor while another has the own ids, when one that waits
-is taken back.
+Until the rate of that clock is known, nothing is received from or sent to the swarm and the target, because
+their messages are dated by their clocks relative to the own one, and no order to take off is accepted. Orders
+are not accepted either while another sender has the own ids; then a pending order is withdrawn.
 """
 
 from __future__ import annotations
@@ -24,17 +23,23 @@ from outrider.supervision.takeoff_inhibit import Gate
 
 CLOCK = "the rate of the autopilot's clock"
 TWIN = "the other companion with this system id to fall silent"
-"""What any go has to wait for."""
+"""Conditions for which any order to take off has to wait."""
 OURS = (Phase.PREPARE, *STEERED, Phase.LAND)
-"""The phases in which we have the vehicle: before and after, and when somebody took it, it is no business of
-ours, in whatever mode it flies."""
+"""Phases in which the companion controls the vehicle.
+
+Before and after these phases, and when another controller took the vehicle, the companion does not interfere,
+in whatever mode the vehicle flies.
+"""
 _OTHERS = ("swarm", "target")
 
 
 class Cockpit:
-    """A ``Node``. ``followed``: shown the autopilot's stamps, as far as the companion believes them; None for
-    a companion that lives by the wall's time. ``signing``: the companion's. ``twin``: looked for on its
-    links; none is, of a dry run, which has other ids, as the companion may be there as well."""
+    """``Node`` that supervises a companion.
+
+    ``followed``: clock that receives the autopilot's stamps, as far as the companion accepts them; None for a
+    companion on wall time. ``signing``: the companion's. ``twin``: detector of duplicates on its links; not
+    used for a dry run, which has other ids, because the real companion may be present as well.
+    """
 
     def __init__(
         self,
@@ -52,29 +57,32 @@ class Cockpit:
         self._warned = False
         self._stamp = 0
         self.settled = followed is None or followed.known
-        """Whether the own clock's rate is known."""
+        """Whether the rate of the own clock is known."""
 
     @property
     def name(self) -> str:
-        """The companion's."""
+        """The companion's name."""
         return self.companion.name
 
     @property
     def barred(self) -> str:
-        """What any go has to wait for, whatever the companion says; empty for nothing."""
+        """The condition for which any order to take off has to wait; empty for none."""
         if self._twin is not None and self._twin.seen:
             return TWIN
         return "" if self.settled else CLOCK
 
     def give_up(self) -> None:
-        """Nobody looks after this process any more: no set-points from now on, but the last word."""
+        """Stop the set-points and send the hold on exit from now on.
+
+        Called when the process is no longer supervised.
+        """
         if self.last is None:
             pilot = self.companion.pilot
             ours = pilot.phase in OURS and not isinstance(self.companion, DryRun)
             self.last = LastWord(self.companion.system, pilot.vehicle.heartbeat, self._signing, steered=ours)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """As the companion's."""
+        """Step the companion, or the hold on exit after ``give_up``."""
         wall = self._wall.now()
         if self.last is not None:
             return self.last.step(wall, [datagram for datagram in inbox if datagram.link == "autopilot"])
@@ -84,7 +92,7 @@ class Cockpit:
         if (barred := self.barred) and not isinstance(self.companion, DryRun):
             inbox, answers = self._gate.closed(inbox)
         if barred == TWIN:
-            # Who gave it did not know of the other.
+            # The duplicate was unknown when the order was given.
             self.companion.pilot.take_back()
         if (barred == TWIN) != self._warned:
             self._warned = barred == TWIN

@@ -1,4 +1,4 @@
-"""Where orders to take off end while something speaks against any: they are answered there."""
+"""Take-off inhibit: orders to take off are answered and dropped while a condition is not met."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _DENIED: Final = 2
 
 
 class Gate:
-    """Of the companion of ``system``; ``signing``: its own."""
+    """Filter of orders to the companion of ``system``; ``signing``: the companion's."""
 
     def __init__(self, system: int, signing: Signing | None) -> None:
         self._own = Source(system, COMPONENT)
         self._codec = Codec(None, signing, LINKS.index("ground"))
 
     def closed(self, inbox: Sequence[Datagram]) -> tuple[list[Datagram], list[Datagram]]:
-        """``inbox`` without the goes for this companion, and the answers to these (COMMAND_ACK)."""
+        """Return ``inbox`` without orders to take off for this companion, and the answers (COMMAND_ACK)."""
         passed, answers = [], []
         for datagram in inbox:
             frames, end = leading_frames(datagram.data) if datagram.link == "ground" else ((), 0)

@@ -1,0 +1,1 @@
+"""Command ``outrider swarm``: takes a prepared scenario and a seed, gives a run directory."""

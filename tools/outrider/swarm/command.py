@@ -1,4 +1,4 @@
-"""``outrider swarm``: a scenario, changed by options, flown, summarised and drawn into a run directory."""
+"""``outrider swarm``: flies a scenario and writes its logs, summary and figure into a run directory."""
 
 from __future__ import annotations
 
@@ -34,7 +34,10 @@ __all__ = [
 
 
 class Pace(NamedTuple):
-    """In lock-step, or in real time with one process per node, and those with real-time ``priority``."""
+    """Pace of a flight: lock-step, or real time with one process per node.
+
+    With ``priority`` these processes have real-time priority.
+    """
 
     real_time: bool = False
     priority: bool = False
@@ -51,8 +54,11 @@ def fly(
     pace: Pace = LOCK_STEP,
     show: Show | None = None,
 ) -> dict[str, Value]:
-    """Fly it, and leave logs, the resolved configuration, the summary and the picture in ``directory``;
-    ``show`` it meanwhile. OutriderError if somebody stops it."""
+    """Fly the scenario, and return the summary.
+
+    Logs, the resolved configuration, the summary and the figure are written to ``directory``; ``show``
+    displays the flight meanwhile. Raises OutriderError if the flight is interrupted.
+    """
     with interruptible(f"{directory} keeps the configuration and the logs up to there, but no summary"):
         scenario = prepared.scenario
         resolved = {"seed": seed, "scenario": scenario.model_dump(mode="json")}
@@ -112,14 +118,16 @@ def _flown_in_real_time(
 
 
 def _cpu_of_all() -> float:
-    """CPU time (s) of this process and of its children that have ended."""
+    """Return the CPU time (s) of this process and of its children that have ended."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 
 
 def run_directory(out: Path | None, scenario: Scenario, seed: int) -> Path:
-    """A new, empty directory: ``out``, or the first free ``runs/NAME-METHOD-seedN[-k]``. Nothing is
-    overwritten."""
+    """Return a new, empty directory: ``out``, or the first free ``runs/NAME-METHOD-seedN[-k]``.
+
+    Nothing is overwritten. Raises InputError if ``out`` is not empty.
+    """
     certified = scenario.companion.avoidance == "certified"
     way = "certified" if certified else "+".join(scenario.companion.methods)
     return new_directory(out, f"{scenario.name}-{way}-seed{seed}")

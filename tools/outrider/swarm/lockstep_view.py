@@ -1,4 +1,4 @@
-"""A lock-step flight for the view: its moments as they come, and what is wished of it."""
+"""View of a lock-step flight: sends its snapshots, and applies commands of the view."""
 
 from __future__ import annotations
 
@@ -17,12 +17,11 @@ from outrider.simulation.flight import EPOCH, Flight
 from outrider.swarm.pace import Pace
 
 PICTURE = 0.04
-"""s of wall time between two moments that are told."""
+"""s of wall time between two snapshots."""
 
 
 class LockStepView:
-    """The ``Onlooker`` of one flight, at one end of ``line``; what is changed by hand goes into
-    ``orders``."""
+    """``Onlooker`` of one flight, at one end of ``line``; changes by hand are recorded in ``orders``."""
 
     def __init__(self, line: Line, pace: Pace | None = None) -> None:
         self._line = line
@@ -31,6 +30,7 @@ class LockStepView:
         self.orders = Orders()
 
     def __call__(self, flight: Flight, now: int) -> None:
+        """Send a snapshot if one is due, apply commands, and keep the pace."""
         wall = time.monotonic()
         if wall >= self._next:
             self._next = wall + PICTURE
@@ -51,7 +51,7 @@ class LockStepView:
 
 
 def moment(flight: Flight, now: int) -> Moment:
-    """What is to be seen of ``flight`` at ``now`` (µs). Nothing in it is touched."""
+    """Return the snapshot of ``flight`` at ``now`` (µs) without changing its state."""
     start, autopilots = flight.conductor.clock_start, flight.autopilots
     seen = [glimpse(companion, now) for companion in flight.companions]
     _, _, target = flight.truth.latest()
@@ -69,7 +69,7 @@ def moment(flight: Flight, now: int) -> Moment:
 
 
 def obey(flight: Flight, now: int, change: Change) -> None:
-    """Let ``change`` happen at ``now`` (µs)."""
+    """Apply ``change`` at ``now`` (µs)."""
     if change.methods is not None:
         for companion in flight.companions[: flight.scenario.vehicles]:
             companion.use(Wishes(methods=change.methods).method_names)

@@ -1,4 +1,4 @@
-"""How fast a simulation goes: as fast as it can, but for what a view that is still there wishes."""
+"""Pace of a simulation: as fast as possible, unless a live view commands otherwise."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Callable
 from outrider.scene.view_commands import Wishes
 
 LEASE = 2.0
-"""s for which a wish counts after it was said."""
+"""s for which a command applies after it was received."""
 STEP = 100_000
 """µs of a single step."""
 _NAP = 0.02
 
 
 class Pace:
-    """``clock`` (s) and ``nap`` are the wall's."""
+    """Pace by the commands of a view; ``clock`` (s) and ``nap`` are those of wall time."""
 
     def __init__(
         self, clock: Callable[[], float] = time.monotonic, nap: Callable[[float], None] = time.sleep
@@ -28,7 +28,7 @@ class Pace:
         self._anchor: tuple[float, int, float | None] | None = None
 
     def receive(self, wishes: Wishes, now: int) -> None:
-        """A wish, while the simulation is at ``now`` (µs)."""
+        """Take commands, while the simulation is at ``now`` (µs)."""
         if self._steps is None:
             self._steps = wishes.steps
         if wishes.steps > self._steps:
@@ -37,14 +37,16 @@ class Pace:
         self._wishes, self._said = wishes, self._clock()
 
     def wait(self, now: int, listen: Callable[[], None]) -> None:
-        """Before the simulation goes on from ``now`` (µs): as long as is wished. ``listen`` takes in what is
-        wished meanwhile."""
+        """Wait before the simulation continues from ``now`` (µs), for as long as is commanded.
+
+        ``listen`` receives the commands that arrive meanwhile.
+        """
         while (rest := self._rest(now)) > 0.0:
             self._nap(min(rest, _NAP))
             listen()
 
     def _rest(self, now: int) -> float:
-        """s to wait, by what is wished at present."""
+        """Return the time to wait (s) by the present commands."""
         clock, wishes = self._clock(), self._wishes
         if clock - self._said > LEASE:
             self._anchor = None
@@ -61,6 +63,6 @@ class Pace:
         since, begin, speed = self._anchor
         due = since + 1e-6 * (now - begin) / wishes.speed
         if due < clock - 0.5:
-            # A simulation that cannot keep up is not hurried afterwards.
+            # A simulation that cannot keep up does not catch up afterwards.
             self._anchor = clock, now, speed
         return due - clock

@@ -1,4 +1,4 @@
-"""``--view``: a flight of ``outrider swarm`` with a view beside it."""
+"""``--view``: a flight of ``outrider swarm`` with a live view."""
 
 from __future__ import annotations
 
@@ -22,29 +22,32 @@ _CHANGES: frozenset[Lever] = frozenset({"methods", "loss", "target"})
 
 
 class Show:
-    """One flight for ``attendant``. ``watched``: whether somebody is at a terminal, for whom a lock-step
-    flight goes at the pace of time from the beginning."""
+    """View of one flight by ``attendant``.
+
+    ``watched``: whether a user is at a terminal; then a lock-step flight runs in real time from the
+    beginning.
+    """
 
     def __init__(self, attendant: Attendant, watched: bool) -> None:
         self._attendant, self._watched = attendant, watched
         self.orders = Orders()
 
     def lock_step(self, prepared: Prepared, seed: int) -> LockStepView:
-        """The onlooker of a lock-step flight."""
+        """Return the onlooker of a lock-step flight."""
         self._begin(prepared, seed, _CHANGES | {"pace"}, Wishes(speed=1.0 if self._watched else None))
         view = LockStepView(self._attendant.line)
         self.orders = view.orders
         return view
 
     def real_time(self, prepared: Prepared, seed: int) -> RealTimeView:
-        """The same of one in real time."""
+        """Return the view of a flight in real time."""
         self._begin(prepared, seed, _CHANGES, Wishes())
         view = RealTimeView(self._attendant.line)
         self.orders = view.orders
         return view
 
     def stay(self, directory: Path) -> None:
-        """After the flight: for somebody at a terminal the run in ``directory`` is played until Ctrl-C."""
+        """After the flight, play the run in ``directory`` until Ctrl-C if a user is at a terminal."""
         if self.orders.given:
             sys.stderr.write(f"changed by hand {len(self.orders.given)} times: {directory / 'orders.json'}\n")
         if self._watched:
@@ -59,7 +62,7 @@ class Show:
 
 @contextmanager
 def showing() -> Iterator[Show]:
-    """A view on this machine, which ends afterwards. InputError if it cannot be."""
+    """Open a view on this machine, and close it afterwards; raise InputError if that is impossible."""
     attendant = Attendant()
     try:
         sys.stderr.write(f"{attendant.url} shows the flight\n")

@@ -36,7 +36,7 @@ class Backlog:
         return self._waiting.popleft()
 
     def lost(self, task: Task) -> None:
-        """Add a started task whose worker is gone, unless it has been tried again already."""
+        """Schedule a started task whose worker is gone for a second attempt, unless it was lost before."""
         if task.run not in self._tried:
             self._tried.add(task.run)
             self._again.append(task)

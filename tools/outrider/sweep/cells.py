@@ -145,7 +145,11 @@ def _drawn(scene: Scene, seed: int) -> Scenario:
 
 
 def _flyable(scenario: Scenario) -> str:
-    """Return the vehicle as JSON, after loading the scenario as ``outrider swarm`` does when a run is replayed."""
+    """Return the scenario's vehicle as JSON.
+
+    The scenario is loaded from a file as ``outrider swarm`` does when a run is replayed. Raises InputError if
+    it does not come back unchanged.
+    """
     with tempfile.TemporaryDirectory(prefix="outrider-") as folder:
         path = Path(folder) / "scenario.yaml"
         path.write_text(scenario_text(scenario), encoding="utf-8")

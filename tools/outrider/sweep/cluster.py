@@ -1,7 +1,8 @@
-"""Workers of a Dask scheduler, with the rules of the local `Pool`: a lost run is reported and tried once more.
+"""Workers of a Dask scheduler, with the rules of the local `Pool`.
 
-Each task is bound to one worker. A worker that joins later, or after a restart, must first report its
-versions; if they differ, it gets no tasks. And no run is started a second time unnoticed, as Dask would do.
+A run whose worker is lost is reported and tried once more at the end. Each task is bound to one worker. A
+worker that joins later, or after a restart, must first report its identity and versions; if the versions
+differ, it gets no tasks. No run is started a second time unnoticed, as Dask would do.
 """
 
 from __future__ import annotations
@@ -37,7 +38,10 @@ _TICK_S, _LOOK_S, _FETCH_S, _GOODBYE_S, _REPLY_S = 0.5, 1.0, 2.0, 3.0, 20.0
 
 @dataclass
 class _Site:
-    """Dask worker. ``me`` is None until it has reported its identity; ``refused`` is the reason why it gets no tasks."""
+    """Dask worker.
+
+    ``me`` is None until it has reported its identity; ``refused`` is the reason why it gets no tasks.
+    """
 
     address: str
     threads: int
@@ -180,7 +184,7 @@ class Cluster:
         return answer is not None
 
     def _fetched(self, future: Future[Any]) -> dict[str, Any] | None:
-        """Return the answer of a worker; None if it is slow or was lost with its worker, which `_look` finds."""
+        """Return the answer of a worker; None if it is slow, or was lost with a dead worker (see `_look`)."""
         try:
             answer: dict[str, Any] = future.result(timeout=_FETCH_S)
         except FutureCancelledError:

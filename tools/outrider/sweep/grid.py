@@ -1,4 +1,4 @@
-"""Sweep file: scenarios or scenes, values by dotted keys, and the number of runs; and the cells of its grid."""
+"""Sweep file: scenarios or scenes, values by dotted keys, the number of runs, and the cells of the grid."""
 
 from __future__ import annotations
 
@@ -126,7 +126,10 @@ def overlay(document: Mapping[str, JsonValue], changes: Mapping[str, JsonValue])
 
 
 def leaves(document: Mapping[str, JsonValue], prefix: str = "") -> dict[str, JsonValue]:
-    """Return the values of nested mappings by dotted key: the inverse of `overlay`. Empty mappings are dropped."""
+    """Return the values of nested mappings by dotted key; empty mappings are dropped.
+
+    This is the inverse of `overlay`.
+    """
     found: dict[str, JsonValue] = {}
     for key, value in document.items():
         if isinstance(value, dict):

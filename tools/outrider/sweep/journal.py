@@ -25,7 +25,10 @@ SYNC_S = 1.0
 
 
 class Header(NamedTuple):
-    """First line of a journal: the name of the sweep, the hash of all its cells, and the versions of the software."""
+    """First line of a journal.
+
+    It has the name of the sweep, the hash of all its cells, and the versions that it was flown with.
+    """
 
     name: str
     sweep: str

@@ -1,6 +1,6 @@
 """Random positions with distance from each other: of vehicles, of a jumping target, of obstacles.
 
-Each is drawn clear of those before it (random sequential addition); if there is no room, InputError says so.
+Each is drawn clear of those before it (random sequential addition). Without enough room InputError is raised.
 All values are whole millimetres, so that a file holds exactly what was checked.
 """
 
@@ -35,9 +35,10 @@ class Circles(NamedTuple):
 
 
 def scatter(random: np.random.Generator, scene: Scene, count: int, half: float, what: str) -> Array:
-    """Return positions (count, 3), m, in a square of ± ``half`` m, with horizontal distances of at least ``apart``.
+    """Return positions (count, 3), m, in a square of ± ``half`` m.
 
-    Raises InputError if there is no room; ``what`` names the positions in its message.
+    The horizontal distance of any two is at least ``apart``. Raises InputError if there is no room; ``what``
+    names the positions in its message.
     """
     placed = np.empty((count, 3))
     heights = _mm(random.uniform(*scene.height, size=count))

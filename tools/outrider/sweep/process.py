@@ -101,7 +101,7 @@ class Process:
         return Entry(*task.run, "lost", what, None, round(time.monotonic() - self.since, 3))
 
     def end(self) -> int:
-        """Kill the process if it is alive, and return its exit status. Afterwards it is dead and gets no task."""
+        """Kill the process if it is alive, and return its exit status. It gets no task afterwards."""
         self.dead = True
         self.process.kill()
         self.output.close()

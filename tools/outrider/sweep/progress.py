@@ -15,7 +15,7 @@ from outrider.terminal.progress_lines import ProgressLines
 
 
 class Watch:
-    """Counter of the runs' results, with display. ``lost`` holds every loss of this attempt, retried or not."""
+    """Counter and display of the runs' results. ``lost`` holds every loss of this attempt, retried or not."""
 
     def __init__(self, total: int, finished: int, bar: Progress | None) -> None:
         self._total, self._before, self._left = total, finished, total - finished

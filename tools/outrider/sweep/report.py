@@ -128,7 +128,7 @@ def exit_status(cells: Iterable[CellReport]) -> int:
 
 
 def document(name: str, first_seed: int, cells: Sequence[CellReport]) -> dict[str, Any]:
-    """Return the summary for scripts: values of JSON, the same for the same runs. Infinite values are null."""
+    """Return the summary for scripts: JSON values, the same for the same runs. Infinite values are null."""
     total = {
         field: sum(getattr(cell, field) for cell in cells)
         for field in ("runs", "ended", "violations", "stuck", "failed", "faults", "lost")

@@ -12,8 +12,8 @@ from outrider.sweep.tasks import Entry
 class Ending(Enum):
     """Result of a run, the worst first.
 
-    ``STUCK``: not converged within the time limit, without a violation. ``FAILED``: the flight did not take
-    place as intended. ``FAULT``: it raised an error. ``LOST``: its worker died or was too slow.
+    ``STUCK``: not converged within the time limit, without a violation. ``FAILED``: the flight failed or a
+    vehicle fell. ``FAULT``: it raised an error. ``LOST``: its worker died or was too slow.
     """
 
     VIOLATION = "violation"

@@ -101,7 +101,7 @@ def plain(values: Sequence[float], level: float) -> float | None:
 
 
 def _binomial(count: int, probability: float) -> NDArray[np.float64]:
-    """Return the probabilities (count + 1,) of 0…count successes, by logarithms so that no factor overflows."""
+    """Return the probabilities (count + 1,) of 0…count successes, by logarithms to avoid overflow."""
     k = np.arange(count + 1)
     choose = np.array([lgamma(count + 1) - lgamma(i + 1) - lgamma(count - i + 1) for i in range(count + 1)])
     return np.asarray(np.exp(choose + k * log(probability) + (count - k) * log(1.0 - probability)))

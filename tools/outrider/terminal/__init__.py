@@ -1,0 +1,1 @@
+"""Terminal output: takes lines and shares of progress, writes them to standard error."""

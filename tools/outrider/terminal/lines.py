@@ -7,11 +7,14 @@ import sys
 
 
 def say(line: str) -> None:
-    """Unless nobody reads: who only starts vehicles shall not hold them up by a pipe that is full."""
+    """Write a line to standard error, or drop it if that would block.
+
+    A full pipe without a reader must not hold up the vehicles.
+    """
     try:
         room = select.select([], [sys.stderr], [], 0)[1]
     except (OSError, ValueError):
-        room = [sys.stderr]  # no file of the system's
+        room = [sys.stderr]  # not a file of the system
     if room:
         sys.stderr.write(f"{line}\n")
         sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""Progress where standard error is no terminal: a line now and then, for who reads a file or a pipe."""
+"""Progress where standard error is no terminal: a line now and then, for files and pipes."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ LINE_S = 20.0
 
 
 class ProgressLines:
-    """Nothing in the first ``LINE_S`` seconds: what is that quick needs no progress. And nothing more once
-    nobody reads it."""
+    """Progress lines that begin after ``LINE_S`` seconds and end once the reader is gone.
+
+    Work that ends sooner needs no progress.
+    """
 
     def __init__(self) -> None:
         self._said = time.monotonic()
         self._read = True
 
     def say(self, words: Callable[[], str]) -> None:
-        """A line of its own, if it is time for one."""
+        """Write a line if one is due."""
         if not self._read or time.monotonic() - self._said < LINE_S:
             return
         self._said = time.monotonic()
@@ -26,5 +28,5 @@ class ProgressLines:
             sys.stderr.write(words() + "\n")
             sys.stderr.flush()
         except (OSError, ValueError):
-            # A pipe whose reader is gone ends no flight.
+            # A pipe whose reader is gone must not end a flight.
             self._read = False

@@ -1,4 +1,4 @@
-"""A bar on standard error for what is no flight; without a terminal a line now and then."""
+"""Progress bar on standard error for work other than flights; without a terminal a line now and then."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from outrider.terminal.progress_lines import ProgressLines
 
 @contextmanager
 def share_progress() -> Iterator[Callable[[str, float], None]]:
-    """A bar for what is no flight; the callable takes what is done now and the share that is done."""
+    """Show a progress bar; the yielded function takes the current work and the share that is done."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:

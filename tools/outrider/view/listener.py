@@ -69,7 +69,7 @@ class _Heard:
 class Listener:
     """``Source`` that receives from ``links``.
 
-    ``whole`` tells for each link whether it delivers whole datagrams. ``target`` is the system id of the
+    ``whole`` states for each link whether it delivers whole datagrams. ``target`` is the system id of the
     escorted target.
     """
 
@@ -92,7 +92,7 @@ class Listener:
         self._scene_at = self._begun = self._next = -np.inf
 
     def poll(self, wall: float) -> Sequence[Scene | Moment]:
-        """Return a scene when the set of vehicles changes, and snapshots at the rate of the picture."""
+        """Return a scene when the shown vehicles change, and snapshots at the rate of the picture."""
         for link, datagrams, codec in self._links:
             for data in link.receive():
                 for message in codec.feed(data, whole=datagrams):

@@ -77,7 +77,7 @@ class Panel:
             gui.add_markdown(hint)
 
     def watch(self, watched: bool) -> None:
-        """Report whether any browser shows the page.
+        """Set whether any browser shows the page.
 
         A flight runs in real time while it is watched. When no browser is left that could resume it, it
         returns to its initial speed.

@@ -20,7 +20,7 @@ AZIMUTH, ELEVATION, FIELD = -1.15, 0.5, np.radians(40.0)
 """Initial view direction, as in the report, and field of view (rad)."""
 _AWAY = (0.0, 0.0, -1e4)
 _LARGER, _SHARE = 3.0, 0.09
-"""Limits of a vehicle's drawn size: at most this multiple of its span, and at most this share of the view."""
+"""Drawn size of a vehicle: this share of the visible range, but at most this multiple of the span."""
 _TARGET = rgb("#17202a")
 _UNTURNED = (1.0, 0.0, 0.0, 0.0)
 _NO_LINE = np.zeros((1, 2, 3))

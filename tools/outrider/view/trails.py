@@ -20,7 +20,7 @@ CHUNK = 40
 LENGTH = 25.0
 """Time (s) for which a trail is shown; chunks make it slightly longer."""
 GAP = 1.0
-"""Time (s) without a snapshot after which the trail is interrupted."""
+"""Time (s) without a snapshot after which a new trail starts."""
 
 
 class Trails:

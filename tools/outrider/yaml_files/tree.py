@@ -92,7 +92,7 @@ class _Sized(NamedTuple):
     height: int
 
 
-class _Stop(Exception):  # noqa: N818 — not an error of ours: it ends the reading of a text that cannot go on
+class _Stop(Exception):  # noqa: N818 — no error for callers: it ends the parsing of an unusable text
     def __init__(self, flaw: Flaw) -> None:
         super().__init__(flaw.what)
         self.flaw = flaw

@@ -1,5 +1,7 @@
-"""Ways out of the field's local minima (Sec. III-C): interchangeable strategies that see a scene and add
-influence."""
+"""Methods against the field's local minima (Sec. III-D): each takes a scene and adds to the influence.
+
+They are interchangeable strategies.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +13,13 @@ from companion.values.obstacles import Obstacles
 
 
 class Scene(NamedTuple):
-    """What one plan is made from: own state and prediction, target and obstacles, fleet-local ENU, SI.
+    """Inputs of one plan: own state and prediction, target and obstacles, fleet-local ENU, SI.
 
-    ``prediction`` (N + 1, 3) is the previous plan at n = 0…N from now; ``gradient`` the last ∇J (3,), zero at
-    first. ``to_go`` (3,) leads from the vehicle to where its destination is *now*: in a moving formation what
-    flies along with everybody is in nobody's way. ``target_end`` (3,) is where the target will be when the
-    horizon ends, ``surface`` what the destination lies on around it, None for a goal of its own.
+    ``prediction`` (N + 1, 3) is the previous plan at n = 0…N from now; ``gradient`` (3,) is the last ∇J, zero
+    at first. ``to_go`` (3,) leads from the vehicle to where its destination is *now*: in a moving formation,
+    what moves along with all vehicles is in no vehicle's way. ``target_end`` (3,) is the target's position at
+    the end of the horizon. ``surface`` is the surface around the target that the destination lies on, None
+    for a goal of its own.
     """
 
     position: Array
@@ -33,7 +36,7 @@ class Scene(NamedTuple):
 
 
 class Influence(NamedTuple):
-    """What a method changes: the field f (N + 1, 3), the factor on Ω_t, and the destination x̌ (3,)."""
+    """Changes by the methods: the field f (N + 1, 3), m/s², the factor on Ω_t, the destination x̌ (3,), m."""
 
     force: Array
     omega_scale: float
@@ -41,8 +44,8 @@ class Influence(NamedTuple):
 
 
 class Method(Protocol):
-    """One strategy; it may remember (latches), and belongs to one vehicle."""
+    """Strategy of one vehicle; it may keep state (latches)."""
 
     def influence(self, scene: Scene, influence: Influence) -> Influence:
-        """The influence with this method's share added."""
+        """Return the influence with this method's share added."""
         ...

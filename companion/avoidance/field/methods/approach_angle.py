@@ -1,16 +1,16 @@
-"""Approach angle (Sec. III-C.2): a force around the target keeps vehicles from approaching it at the same
-angle.
+"""Approach angle (Sec. III-D.2): a force around the target separates the vehicles' angles of approach.
 
 F_ang(n) = ‖∇J‖ F_hyp((θ_k(n) − θ_j(n))²) β̂,  β̂ ⊥ β = (x_R(n) − x_P)/‖x_R(n) − x_P‖,  horizontal.
+Eq. (15) adds it to the repulsion.
 
-Settled against the text. The gradient is its norm divided by Ω_t. θ is the bearing from the target; a
-difference of two is wrapped before it is squared, and F_hyp has thresholds of its own in rad². β̂ points to
-where the difference grows, so β is taken from the target: taken from the destination, as printed, it turns
-round where the vehicle passes the circle, and inside it points to where the difference shrinks. The sense
-is latched for as long as the encounter lasts, otherwise it chatters between two at one angle. Only others
-that may be met count: not those that are further off than ``reach``, nor those behind (further from the
-destination) by more than d_safe. The sum is clamped to ``force_max``, above u_max, or the input would
-cancel it; who is fast across already is not pushed further.
+These are eqs. (13) and (14), with deviations from the paper. The gradient is its norm divided by Ω_t. θ is
+the bearing from the target; a difference of two is wrapped before it is squared, and F_hyp has thresholds of
+its own in rad². β̂ points to where the difference grows, so β is taken from the target: taken from the
+destination, as printed, it reverses where the vehicle passes the circle, and inside the circle it points to
+where the difference shrinks. The sense is latched for as long as the encounter lasts; otherwise it chatters
+between two vehicles at one angle. Only others that may be met count: not those further off than ``reach``,
+and not those behind (further from the destination) by more than d_safe. The sum is clamped to ``force_max``,
+above u_max, or the input would cancel it. A vehicle that already moves across fast is not pushed further.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _NEAR = 1e-6
 
 
 class ApproachAngle:
-    """The field of angles; latches one sense per obstacle id."""
+    """Field of angles; latches one sense per obstacle id."""
 
     def __init__(self, config: ApproachAngleConfig, turning: TurningSense) -> None:
         self._config = config
@@ -41,7 +41,7 @@ class ApproachAngle:
         self._sense: dict[int, float] = {}
 
     def influence(self, scene: Scene, influence: Influence) -> Influence:
-        """Adds Σ_j F_ang(n) on the predicted positions."""
+        """Return the influence with Σ_j F_ang(n) on the predicted positions added."""
         config, obstacles = self._config, scene.obstacles
         if not obstacles.ids:
             self._sense.clear()
@@ -55,7 +55,7 @@ class ApproachAngle:
         reach = np.hypot(out[:, 0], out[:, 1])
         beta = out / np.maximum(reach, _NEAR)[:, None]
         total = (senses @ strength) * np.minimum(reach / FADING, 1.0)
-        # Who is under way across already is not made faster still, or it never comes round.
+        # A vehicle that already moves across is not made faster, or it never comes round.
         across = scene.velocity[1] * beta[:, 0] - scene.velocity[0] * beta[:, 1]
         total *= shares(reserve(np.sign(total) * across, config.pass_speed))
         force = np.zeros_like(influence.force)
@@ -63,7 +63,10 @@ class ApproachAngle:
         return influence._replace(force=influence.force + limit(force, config.force_max))
 
     def _met(self, scene: Scene) -> Array:
-        """1 for those that may still be met, 0 for those left behind, fading between, (M, 1)."""
+        """Return (M, 1): 1 for those that may still be met, 0 for those left behind or too far off.
+
+        The values fade between 0 and 1.
+        """
         obstacles = scene.obstacles
         left = sqrt(scene.to_go @ scene.to_go)
         goal = scene.position + scene.to_go
@@ -75,10 +78,12 @@ class ApproachAngle:
         return ahead[:, None]
 
     def _senses(self, obstacles: Obstacles, aside: Array, acts: NDArray[np.bool_]) -> Array:
-        """Per obstacle +1: to a larger bearing from the target, −1: to a smaller one. ``acts`` (M, N + 1):
-        where there is a force to be turned one way or the other."""
+        """Return +1 per obstacle for a larger bearing from the target, −1 for a smaller one.
+
+        ``acts`` (M, N + 1) is true where a force acts that needs a sense.
+        """
         if self._turning != "own":
-            # Who comes to the target has ẑ × β on its right.
+            # A vehicle that approaches the target has ẑ × β on its right.
             return np.full(len(obstacles.ids), 1.0 if self._turning == "right" else -1.0)
         latched = self._sense
         met: NDArray[np.bool_] = np.asarray(acts.any(axis=1))
@@ -86,12 +91,12 @@ class ApproachAngle:
             del latched[name]
         for j in np.flatnonzero(met):
             latched.setdefault(obstacles.ids[j], 1.0 if aside[j, acts[j].argmax()] >= 0.0 else -1.0)
-        # No force acts where nothing is latched: any sense will do.
+        # No force acts where nothing is latched: any sense is correct.
         return np.array([latched.get(name, 1.0) for name in obstacles.ids])
 
 
 def _aside(out: Array, scene: Scene) -> Array:
-    """θ_k(n) − θ_j(n), (M, N + 1), with the own way ``out`` (N + 1, 2) from the target."""
+    """Return θ_k(n) − θ_j(n), (M, N + 1), rad, with ``out`` (N + 1, 2) the own way relative to the target."""
     other = scene.obstacles.positions[:, :, :2] - scene.target[:2]
     return wrapped(np.arctan2(out[:, 1], out[:, 0]) - np.arctan2(other[..., 1], other[..., 0]))
 

@@ -1,15 +1,16 @@
-"""Swivelling destination (Sec. III-C.1): the destination moves along the surface, the further the more is
-left of the way.
+"""Swivelling destination (Sec. III-D.1): the destination moves along the surface.
 
-x̌ = x_P + [d cos(ψ ± k_s‖∇J‖), d sin(ψ ± k_s‖∇J‖), h],  and so on any surface: the destination is turned about
-the vertical through the target, and the nearest point of the surface is taken. A goal that is one point is
-turned alike; either way it is back when nothing is left of the way.
+x̌ = x_P + [d cos(ψ ± k_s‖∇J‖), d sin(ψ ± k_s‖∇J‖), h], eq. (12): it moves the further, the more is left of
+the way. On any other surface the destination is likewise turned about the vertical through the target, and
+the nearest point of the surface is taken. A goal that is one point is turned alike. In all cases the
+destination is back when nothing is left of the way.
 
-Settled against the text. The gradient is its norm divided by Ω_t, for which k_s = 0.05 is meant, and it turns
-the destination by a quarter at most. The paper turns by the sign of ψ, which spreads vehicles that come
-from the west, gathers those that come from the east, and so depends on where north is. Here a vehicle turns
-away from the side on which the others are, as seen from the target; who has nobody beside it need not swivel.
-The sense is latched until the vehicle has all but arrived, otherwise two that are abreast chatter.
+Deviations from the paper. The gradient is its norm divided by Ω_t, for which k_s = 0.05 is meant, and it
+turns the destination by a quarter turn at most. The paper turns by the sign of ψ. That spreads vehicles that
+come from the west and gathers those that come from the east, and so depends on where north is. Here a vehicle
+turns away from the side on which the others are, as seen from the target; a vehicle without others beside it
+need not swivel. The sense is latched until the vehicle has almost arrived; otherwise two vehicles abreast
+chatter.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ from companion.values.bearings import turned, wrapped
 
 _MOST = 0.5 * pi
 _BESIDE = 0.3
-"""rad: how fast those further aside count less."""
+"""Angle (rad) over which the weight of others falls by 1/e with their distance aside."""
 _ABOVE = 0.1
-"""m, horizontally: what is so near to the target's vertical has no bearing."""
+"""Horizontal distance (m) from the target's vertical below which there is no bearing."""
 
 
 class Swivel:
-    """Turns the destination; latches one sense from the start to the arrival."""
+    """Turn of the destination; latches one sense from the start to the arrival."""
 
     def __init__(self, config: SwivelConfig, turning: TurningSense) -> None:
         self._config = config
@@ -38,14 +39,14 @@ class Swivel:
         self._sense = 0.0
 
     def influence(self, scene: Scene, influence: Influence) -> Influence:
-        """The influence with its destination turned."""
+        """Return the influence with its destination turned."""
         steepness = sqrt(scene.gradient @ scene.gradient)
         if steepness < self._config.arrived:
             self._sense = 0.0
         elif self._sense == 0.0:
             self._sense = _away(scene)
             if self._sense and self._turning != "own":
-                # Who passes a target on its right goes round it counter-clockwise.
+                # A vehicle that passes to the right of a target goes round it counter-clockwise.
                 self._sense = 1.0 if self._turning == "right" else -1.0
         if self._sense == 0.0:
             return influence
@@ -57,7 +58,7 @@ class Swivel:
 
 
 def _away(scene: Scene) -> float:
-    """+1 to turn counter-clockwise as seen from above, −1 clockwise, 0 for no reason to turn."""
+    """Return +1 to turn counter-clockwise as seen from above, −1 clockwise, 0 without a reason to turn."""
     obstacles = scene.obstacles
     if not obstacles.ids:
         return 0.0

@@ -1,17 +1,19 @@
-"""Tangential band (Sec. III-C.3): inside a band around an obstacle a force about its centre acts, and Ω_t is
-lowered.
+"""Tangential band (Sec. III-D.3): inside a band around an obstacle a force about its centre acts.
 
-F_tang(0) = k_tang ‖∇J‖ α̂,  α̂ ⊥ α, the same for the whole horizon.
+Ω_t is lowered there, eq. (17).
 
-Settled against the text. The gradient is its norm divided by Ω_t. The band reaches from the obstacle to
-d_safe + d_band and further for one that comes fast (``reach_s`` times the closing speed): turning aside
-takes time, not distance. The force grows from zero at the band's edge, quickly up to u_max − the input
-cancels so much of it − and then up to ``force_max`` at ``d_full``. It acts only about obstacles that stand
-in the way: ahead, fading out from 60° off the bow to abeam, so that the band is left once the obstacle is
-passed; and not beyond the destination, fading out over d_safe; and not when the vehicle has all but
-arrived. The sense is latched per obstacle for as long as the encounter lasts, otherwise it chatters when
-the bearing crosses zero. Obstacles with no way between them (``gap``) are passed as one, with one sense:
-about each with its own, a vehicle before a U would be sent between its ends.
+F_tang(0) = k_tang ‖∇J‖ α̂,  α̂ ⊥ α, eq. (16), the same for the whole horizon. Eq. (18) adds
+it to the repulsion.
+
+Deviations from the paper. The gradient is its norm divided by Ω_t. The band reaches from the obstacle to
+d_safe + d_band, and further for an obstacle that closes fast (``reach_s`` times the closing speed): turning
+aside takes time, not distance. The force grows from zero at the band's edge, quickly up to u_max − the input
+cancels so much of it − and then up to ``force_max`` at ``d_full``. It acts only about obstacles that are in
+the way: ahead, fading out from 60° off the bow to abeam, so that the band is left once the obstacle is
+passed; not beyond the destination, fading out over d_safe; and not when the vehicle has almost arrived. The
+sense is latched per obstacle for as long as the encounter lasts; otherwise it chatters when the bearing
+crosses zero. Obstacles with no way between them (``gap``) are passed as one, with one sense: with a sense for
+each, a vehicle before a U would be sent between its ends.
 """
 
 from __future__ import annotations
@@ -27,23 +29,26 @@ from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
 
 _ABEAM = 0.5
-"""Cosine of the bearing off the bow at which the force is whole; it vanishes abeam."""
+"""Cosine of the bearing off the bow up to which the force is whole; it vanishes abeam."""
 _STEEP = 2.0
 """One over the cosine of the elevation up to which the force is whole; it vanishes overhead."""
 _QUICK = 10.0
-"""How much faster the force grows up to u_max than beyond."""
+"""Factor by which the force grows faster up to u_max than beyond."""
 _NEAR = 1e-6
 _THERE, _ON_THE_WAY = 0.5, 1.5
-"""m to go: who has less than the first goes round nobody, from the second on the force is whole. In a moving
-formation the way to go is tenths of a metre in any direction, and a force across it flings a vehicle out."""
+"""Remaining distance (m) at which the force starts, and at which it is whole.
+
+In a moving formation the remaining way is tenths of a metre in any direction, and a force across it throws a
+vehicle out of the formation.
+"""
 _SLOW, _SOON = 0.5, 3.0
-"""m/s and s: slower than that nobody is on the way; what happens later does not count."""
+"""Relative speed (m/s) below which no obstacle closes, and time (s) beyond which nothing counts."""
 _RIGHT: Array = np.array([1.0])
 _LEFT: Array = np.array([-1.0])
 
 
 class Tangential:
-    """The band around every obstacle; latches one turning sense per obstacle id."""
+    """Band around every obstacle; latches one turning sense per obstacle id."""
 
     def __init__(self, config: TangentialConfig, turning: TurningSense, u_max: float, dt: float) -> None:
         self._config = config
@@ -53,7 +58,7 @@ class Tangential:
         self._sense: dict[int, float] = {}
 
     def influence(self, scene: Scene, influence: Influence) -> Influence:
-        """Adds F_tang of every obstacle whose band holds the vehicle and that lies ahead."""
+        """Return the influence with F_tang of every obstacle ahead whose band holds the vehicle added."""
         obstacles = scene.obstacles
         if not obstacles.ids:
             self._sense.clear()
@@ -62,7 +67,7 @@ class Tangential:
         square = away * away
         flat = np.sqrt(square[:, 0] + square[:, 1]) + _NEAR
         distance = np.sqrt(square.sum(axis=1)) + _NEAR
-        # What is right above or below can be passed on no side.
+        # An obstacle straight above or below can be passed on no side.
         weight = self._weights(scene, away, distance) * shares(_STEEP * flat / distance)
         self._release(obstacles, weight)
         # α̂ = ± ẑ × α, horizontal: passing never costs height.
@@ -78,8 +83,8 @@ class Tangential:
             u_max * min(1.0, _QUICK * whole) + (config.force_max - u_max) * whole,
         )
         direction = total / norm
-        # Who is under way sideways already is not made faster still, or it is flung out: no faster than half
-        # of u_max stops within what there is to go.
+        # A vehicle that already moves sideways is not made faster, or it would be thrown out: its speed stays
+        # one that half of u_max stops within the remaining distance.
         sideways = float((scene.velocity - scene.destination_velocity) @ direction)
         most = min(config.pass_speed, sqrt(u_max * sqrt(scene.to_go @ scene.to_go)) + _NEAR)
         strength *= share(reserve(sideways, most))
@@ -88,7 +93,10 @@ class Tangential:
         )
 
     def _weights(self, scene: Scene, away: Array, distance: Array) -> Array:
-        """How much each obstacle's band acts, (M,) in 0…1; ``away`` (M, 3) and its norms ``distance``."""
+        """Return how much each obstacle's band acts, (M,) in 0…1.
+
+        ``away`` (M, 3), m, leads from the obstacles to the vehicle; ``distance`` (M,) are its norms.
+        """
         config, obstacles = self._config, scene.obstacles
         moving = (obstacles.positions[:, 1] - obstacles.positions[:, 0]) / self._dt
         closing = np.maximum(np.vecdot(away, moving - scene.velocity) / distance, 0.0)
@@ -104,8 +112,10 @@ class Tangential:
         return weights
 
     def _meeting(self, obstacles: Obstacles, away: Array, velocity: Array) -> Array:
-        """How near (0…1) each obstacle comes if both go on as they do; ``velocity`` (M, 3) is relative to the
-        own."""
+        """Return how near (0…1) each obstacle comes if both keep their velocities.
+
+        ``velocity`` (M, 3), m/s, is relative to the own velocity.
+        """
         config = self._config
         square = np.vecdot(velocity, velocity) + _SLOW**2
         time = np.minimum(np.maximum(np.vecdot(away, velocity) / square, 0.0), _SOON)
@@ -122,8 +132,10 @@ class Tangential:
             del self._sense[name]
 
     def _senses(self, obstacles: Obstacles, weight: Array, away: Array, to_go: Array) -> Array:
-        """Per obstacle +1: counter-clockwise about it as seen from above (it stays on the left), −1:
-        clockwise."""
+        """Return +1 per obstacle for counter-clockwise about it as seen from above, −1 for clockwise.
+
+        An obstacle passed counter-clockwise stays on the left.
+        """
         config = self._config
         if self._turning != "own":
             return _RIGHT if self._turning == "right" else _LEFT
@@ -142,7 +154,10 @@ class Tangential:
     def _latch(
         self, group: list[int], obstacles: Obstacles, weight: Array, away: Array, to_go: Array
     ) -> None:
-        """The sense of those that are new in a group: that of the group, or on which side most of it is."""
+        """Latch the sense of the obstacles that are new in a group.
+
+        It is the sense of the group, or else follows from the side on which most of the group is.
+        """
         names = [obstacles.ids[j] for j in group]
         known = [
             (weight[j], self._sense[name])
@@ -154,7 +169,7 @@ class Tangential:
         if len(senses) == 1:
             sense = senses.pop()
         else:
-            # What is to the left of the course is left on the left.
+            # A group to the left of the course stays on the left.
             x, y = (weight[group, None] * away[group, :2]).sum(axis=0)
             sense = 1.0 if to_go[1] * x - to_go[0] * y >= 0.0 else -1.0
         for name in names:
@@ -162,8 +177,10 @@ class Tangential:
 
 
 def groups(places: Array, radius: Array, gap: float) -> list[list[int]]:
-    """Indices of places (m, 2), those in one group that are connected by gaps of less than ``gap`` between
-    their surfaces."""
+    """Return groups of indices of ``places`` (m, 2), m.
+
+    Places belong to one group if they are connected by gaps of less than ``gap`` (m) between their surfaces.
+    """
     count = len(places)
     off = places[:, None] - places[None, :]
     size = np.broadcast_to(radius, count)

@@ -1,0 +1,217 @@
+"""A swarm of points that are where their plans say, each with the certified mode of a companion, on a channel
+that loses, delays, repeats and reorders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from heapq import heappop, heappush
+from itertools import combinations, count
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.avoidance.certified.committed import carried_on, controls, horizon_of, resting
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.certified.margins import between
+from companion.avoidance.certified.separating_planes import hull_distance
+from companion.avoidance.field.planner import standing
+from companion.config import CompanionConfig
+from companion.config.certified import CertifiedConfig
+from companion.values.components import COMPONENT
+from companion.values.horizon import Array
+from companion.world import View, World
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import Source, Tunnel
+from mavlink_bridge.wire.plan import WirePlan, pack
+from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
+from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS, curves
+
+FLEET = FleetFrame(47.397742, 8.545594, 488.0)
+TICK = 20_000
+NEVER = 1 << 62
+_NOTHING = View(None, None, None, None)
+
+
+def within(since: int, spans: tuple[tuple[int, int], ...]) -> bool:
+    return any(begin <= since < end for begin, end in spans)
+
+
+class Rough(NamedTuple):
+    """How a channel treats messages: share lost, longest delay (µs), share sent twice; who is cut off from
+    all others from when till when (µs of the run); who hears nothing; from when till when nobody hears whom,
+    or only its plans."""
+
+    loss: float = 0.0
+    delay: int = 0
+    twice: float = 0.0
+    cuts: tuple[tuple[int, int, frozenset[int]], ...] = ()
+    deaf: frozenset[int] = frozenset()
+    mute: tuple[tuple[int, int, int], ...] = ()
+    alone: tuple[tuple[int, int, int], ...] = ()
+
+
+class Habits(NamedTuple):
+    """Of one vehicle, µs of the run: when it is switched on, when it steers from, when it leaves; when it is
+    not called, and when it may not steer (from, till); how far its clock is ahead. Until it steers it wanders
+    about its place by ``wanders`` m. When it ``returns`` it joins again where it is."""
+
+    on: int = 0
+    steers: int = 0
+    leaves: int = NEVER
+    frozen: tuple[tuple[int, int], ...] = ()
+    released: tuple[tuple[int, int], ...] = ()
+    ahead: int = 0
+    wanders: float = 0.0
+    returns: int = NEVER
+
+
+class Made(NamedTuple):
+    """A plan that was made, or tried to be made, at ``since`` (µs of the run) in ``epoch``, and the plans it
+    was made beside."""
+
+    system: int
+    since: int
+    epoch: int
+    beside: Mapping[int, WirePlan]
+    found: bool
+
+
+class Vehicle:
+    """One of the swarm, as ``Companion`` handles its certified flight. ``plans``: what it flies, by epoch."""
+
+    def __init__(self, system: int, config: CompanionConfig, place: Array, habits: Habits) -> None:
+        self.system, self.place, self.habits = system, place, habits
+        self.flight = CertifiedFlight(config, Source(system, COMPONENT), FLEET)
+        self.world = World(config, system, 0, FLEET)
+        self.plans: dict[int, WirePlan] = {}
+        self.believed: dict[tuple[int, int], WirePlan] = {}
+        """What it took for the plan of whom (system) in which epoch."""
+        self.contradictions = 0
+        """Plans that it flew or told and that were not the one it had told or flown for that epoch."""
+        self.inbox: list[tuple[int, int, Tunnel]] = []
+        self.made: list[Made] = []
+        self._flying = False
+
+    def step(self, since: int, goal: Array) -> list[Tunnel]:
+        now = EPOCH + since + self.habits.ahead
+        flight, peers, commitment = self.flight, self.flight.peers, self.flight.commitment
+        while self.inbox and self.inbox[0][0] <= since:
+            flight.receive(now, heappop(self.inbox)[2])
+        for system, filed in peers.plans(commitment.epoch(now)).items():
+            self.believed[system, commitment.epoch(now)] = filed.plan
+        leaving = self.habits.leaves <= since < self.habits.returns
+        if leaving or within(since, self.habits.released):
+            self._flying = False
+        else:
+            self._fly(now, since, goal)
+        messages = flight.messages(now, farewell=leaving)
+        for plan in (commitment.current, commitment.following):
+            if plan is not None and (self.plans or messages):
+                self.contradictions += self.plans.setdefault(plan.epoch, plan) != plan
+        return [message for message in messages if isinstance(message, Tunnel)]
+
+    def _fly(self, now: int, since: int, goal: Array) -> None:
+        flight, steers = self.flight, since >= self.habits.steers
+        if not (self._flying and steers):
+            flight.stand(now, self._here(now, since))
+        self._flying = True
+        if steers and flight.due(now):
+            epoch = flight.commitment.epoch(now)
+            beside = {system: filed.plan for system, filed in flight.peers.plans(epoch).items()}
+            found = flight.plan(now, standing(goal, None), self.world, _NOTHING)
+            self.made.append(Made(self.system, since, epoch, beside, found))
+
+    def _here(self, now: int, since: int) -> Array:
+        epoch = self.flight.commitment.epoch(now)
+        there = horizon_of(self.plan(epoch)).at(now).position if self.plans else self.place
+        result: Array = there + self.habits.wanders * np.sin(1e-6 * since * np.array([7.0, 5.0, 3.0]))
+        return result
+
+    def plan(self, epoch: int) -> WirePlan:
+        """What it flies in ``epoch``, called or not: its last plan goes on."""
+        if not self.plans:
+            # Never steered, never said anything: it stands there.
+            return resting(epoch, DT, STEPS, self.place, FLEET.fingerprint)
+        last = max((known for known in self.plans if known <= epoch), default=min(self.plans))
+        plan = self.plans[last]
+        return carried_on(plan, max(epoch - last, 0) // plan.dt)
+
+
+class Swarm:
+    """``starts`` (k, 3) m; systems are 1…k, and all expect each other unless ``strangers``."""
+
+    def __init__(
+        self,
+        starts: Array,
+        rough: Rough,
+        habits: Sequence[Habits],
+        seed: int,
+        *,
+        epoch: int = 200_000,
+        strangers: bool = False,
+    ) -> None:
+        fleet = tuple(range(1, len(starts) + 1))
+        certified = CertifiedConfig(epoch_us=epoch, fleet=() if strangers else fleet)
+        self.config = CompanionConfig(
+            task="goto", avoidance="certified", turning_sense="right", certified=certified
+        )
+        self.d = between(self.config.certified, self.config.field, self.config.limits)
+        self.vehicles = [
+            Vehicle(system, self.config, np.array(place), habit)
+            for system, place, habit in zip(fleet, starts, habits, strict=True)
+        ]
+        self._rng, self._rough, self._serial = np.random.default_rng(seed), rough, count()
+        self._phases = self._rng.integers(0, TICK, len(starts)).tolist()
+        self.sent: list[bytes] = []
+
+    def run(self, until: int, goals: Callable[[int, int], Array]) -> None:
+        """From the beginning until ``until`` µs; ``goals`` by time and system."""
+        order = sorted(zip(self._phases, self.vehicles, strict=True), key=lambda one: one[0])
+        for tick in range(0, until, TICK):
+            for phase, vehicle in order:
+                since, habits = tick + phase, vehicle.habits
+                if since < habits.on or within(since, habits.frozen):
+                    continue
+                for message in vehicle.step(since, goals(since, vehicle.system)):
+                    self.sent.append(message.payload)
+                    self._carry(since, vehicle, message)
+
+    def _carry(self, since: int, sender: Vehicle, message: Tunnel) -> None:
+        rough, rng = self._rough, self._rng
+        unheard = rough.mute + (rough.alone if message.payload_type == ROSTER else ())
+        mute = any(begin <= since < end and sender.system == whom for begin, end, whom in unheard)
+        for receiver in self.vehicles:
+            if receiver is sender or receiver.system in rough.deaf:
+                continue
+            ends = {sender.system, receiver.system}
+            cut = any(begin <= since < end and len(ends & whom) == 1 for begin, end, whom in rough.cuts)
+            for _ in range(1 + bool(rng.random() < rough.twice)):
+                arrives = since + 1 + int(rng.random() * rough.delay)
+                if rng.random() >= rough.loss and not (cut or mute):
+                    heappush(receiver.inbox, (arrives, next(self._serial), message))
+
+    def epochs(self) -> range:
+        """All that anybody flew in."""
+        step = self.config.certified.epoch_us
+        known = [EPOCH, *(epoch for vehicle in self.vehicles for epoch in vehicle.plans)]
+        return range(min(known), max(known) + 1, step)
+
+    def least(self) -> float:
+        """The least distance (m) of any two plans as they are flown, by hulls and by places along them."""
+        steps = self.config.certified.epoch_us // self.config.certified.dt_us
+        least = np.inf
+        for epoch in self.epochs():
+            flown = [controls(vehicle.plan(epoch))[:steps] for vehicle in self.vehicles]
+            pairs = np.concatenate([a - b for a, b in combinations(flown, 2)])
+            least = min(least, hull_distance(pairs).min())
+            least = min(least, np.linalg.norm(curves(pairs), axis=-1).min())
+        return float(least)
+
+    def made(self) -> list[Made]:
+        """By all, each in its own order."""
+        return [made for vehicle in self.vehicles for made in vehicle.made]
+
+    def digest(self) -> bytes:
+        """All that was flown and told."""
+        flown = [pack(vehicle.plan(epoch)) for vehicle in self.vehicles for epoch in self.epochs()]
+        return b"".join(flown + self.sent)

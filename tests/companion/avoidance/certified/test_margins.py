@@ -1,0 +1,102 @@
+"""Balls about those that share no plan hold whatever they do within their bounds; margins add up."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.avoidance.certified.margins import between, margin, stranger
+from companion.config.certified import CertifiedConfig
+from companion.config.planning import FieldConfig, LimitsConfig
+from companion.values.horizon import Array
+from tests.companion.avoidance.certified.plans import curves
+
+STEPS, DT, FINE = 8, 0.2, 20
+SECONDS = DT * np.arange(STEPS + 1.0)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def any_motion(rng: np.random.Generator, velocity: Array, age: float, speed: float, most: float) -> Array:
+    """Places (n, FINE + 1, 3) on the segments of one that begins at the origin ``age`` s before the first of
+    them, in some mood: straight away, back and forth, or anyhow."""
+    mood, heading = rng.integers(0, 3), rng.normal(size=3)
+    places, place = [], np.zeros(3)
+    h = DT / FINE
+    before = int(np.ceil(age / h))
+    for step in range(before + STEPS * FINE + 1):
+        if step >= before:
+            places.append(place)
+        if mood == 2 or (mood == 1 and step % 30 == 0):
+            heading = rng.normal(size=3)
+        wanted = velocity + (age / before if step < before else h) * most * heading / np.linalg.norm(heading)
+        # To the nearest allowed speed: that asks for no more acceleration.
+        after = wanted * min(1.0, speed / max(float(np.linalg.norm(wanted)), 1e-9))
+        place = place + (age / before if step < before else h) * 0.5 * (velocity + after)
+        velocity = after
+    flown = np.array(places)
+    return np.stack([flown[n * FINE : (n + 1) * FINE + 1] for n in range(STEPS)])
+
+
+@given(seeds, st.floats(0.0, 3.0), st.sampled_from([0.3, 1.0, 5.0]), st.sampled_from([0.1, 1.0, 4.0]))
+def test_the_balls_hold_every_motion_within_the_bounds(
+    seed: int, age: float, speed: float, acceleration: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    direction = rng.normal(size=3)
+    velocity = rng.uniform() ** 0.3 * speed * direction / np.linalg.norm(direction)
+    centres, radii = stranger(np.zeros(3), velocity, age, SECONDS, speed, acceleration)
+    flown = any_motion(rng, velocity, age, speed, acceleration)
+    off = np.linalg.norm(flown - curves(centres, FINE + 1), axis=-1)
+    assert (off <= radii[:, None] + 1e-9).all()
+
+
+@given(seeds, st.floats(0.0, 5.0))
+def test_who_was_heard_longer_ago_may_be_further_off(seed: int, age: float) -> None:
+    velocity = np.random.default_rng(seed).normal(size=3)
+    radii = [stranger(np.zeros(3), velocity, a, SECONDS, 1.0, 1.0)[1] for a in (age, age + 0.1)]
+    assert (radii[1] > radii[0]).all()
+    assert (np.diff(radii[0]) > 0.0).all()
+    assert (radii[0] <= age + SECONDS[1:]).all()
+
+
+def distance(field: dict[str, float] | None = None, **settings: float) -> float:
+    config = CertifiedConfig.model_validate({"tube": 0.2, "sigmas": 2.0, "clock_us": 2_000} | settings)
+    given = FieldConfig.model_validate({"d_min": 0.5, "position_sigma": 0.1} | (field or {}))
+    return between(config, given, LimitsConfig())
+
+
+@pytest.mark.parametrize(
+    "growing",
+    [
+        [distance(tube=tube) for tube in (0.01, 0.2, 1.0)],
+        [distance(sigmas=sigmas) for sigmas in (0.0, 1.0, 3.0)],
+        [distance(clock_us=clock) for clock in (0, 1_000, 50_000)],
+        [distance({"position_sigma": sigma}) for sigma in (0.0, 0.02, 0.5)],
+        [distance({"d_min": d}) for d in (0.2, 0.5, 2.0)],
+    ],
+    ids=["tube", "sigmas", "clock", "estimate", "d_min"],
+)
+def test_plans_are_further_apart_for_each_thing_that_may_be_off(growing: list[float]) -> None:
+    assert all(less < more for less, more in pairwise(growing))
+
+
+@given(st.floats(0.01, 2.0), st.floats(0.0, 6.0), st.floats(0.0, 1.0), st.integers(0, 100_000), seeds)
+def test_plans_that_far_apart_leave_d_min_whatever_is_off(
+    tube: float, sigmas: float, sigma: float, clock: int, seed: int
+) -> None:
+    """By tube and clock each in full; by their estimates together by k times the σ of their difference."""
+    config = CertifiedConfig(tube=tube, sigmas=sigmas, clock_us=clock)
+    field, limits = FieldConfig(position_sigma=sigma), LimitsConfig()
+    rng = np.random.default_rng(seed)
+    aims = rng.normal(size=(5, 3)) - rng.choice([0.0, 5.0]) * np.array([1.0, 0.0, 0.0])
+    ways = aims / np.linalg.norm(aims, axis=1, keepdims=True)
+    late = 1e-6 * clock * np.array(limits.v_max)
+    off = tube * (ways[0] + ways[1]) + np.linalg.norm(late) * (ways[2] + ways[3])
+    off += sigmas * np.sqrt(2.0) * sigma * ways[4]
+    apart = np.array([between(config, field, limits), 0.0, 0.0]) + off
+    assert np.linalg.norm(apart) >= field.d_min - 1e-9
+    assert between(config, field, limits) <= field.d_min + 2.0 * margin(config, field, limits) + 1e-9

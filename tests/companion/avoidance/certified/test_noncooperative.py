@@ -1,0 +1,131 @@
+"""Those that share no plan: plans keep clear of what they may do, and yield to what they are likely to do."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.avoidance.certified.committed import controls, resting
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.certified.noncooperative import NonCooperative
+from companion.avoidance.field.planner import standing
+from companion.config import CompanionConfig
+from companion.estimation.tracks import State
+from companion.values.horizon import Array
+from companion.world import View, World
+from mavlink_bridge.messages import GlobalPosition, Source
+from tests.companion.avoidance.certified.plans import EPOCH, STEPS
+from tests.companion.avoidance.certified.swarm import FLEET
+
+OWN, OTHER = 11, 190
+NOW = EPOCH
+HERE = np.array([0.0, 0.0, 5.0])
+angles = st.floats(0.0, 2.0 * np.pi)
+
+
+def config(kind: str | None = None, **certified: float) -> CompanionConfig:
+    moving = [] if kind is None else [{"system": OTHER, "kind": kind, "radius": 0.4}]
+    given = {"stranger_speed": 3.0} | certified
+    return CompanionConfig.model_validate(
+        {"task": "goto", "avoidance": "certified", "moving": moving, "certified": given}
+    )
+
+
+def told(world: World, place: Array, velocity: Array, link: str = "swarm") -> None:
+    """The other says where it is, and how fast."""
+    latitude, longitude, altitude = FLEET.to_geodetic(place)
+    ned = (float(velocity[1]), float(velocity[0]), float(-velocity[2]))
+    message = GlobalPosition(Source(OTHER, 1), NOW // 1000, latitude, longitude, altitude, 0.0, ned, None)
+    world.receive(NOW, link, message)
+
+
+def hovering(of: CompanionConfig, place: Array, velocity: Array) -> Array:
+    """Where the next plan of one that hovers, and wants to, ends, with the other at ``place``."""
+    flight, world = CertifiedFlight(of, Source(OWN, 195), FLEET), World(of, OWN, 10, FLEET)
+    told(world, place, velocity)
+    flight.stand(NOW, HERE)
+    flight.commitment.following = None
+    assert flight.plan(NOW, standing(HERE), world, world.at(NOW))
+    assert flight.commitment.following is not None
+    return controls(flight.commitment.following)[-1, 2]
+
+
+@given(angles, st.floats(2.5, 4.5), st.floats(0.8, 3.0))
+def test_who_comes_straight_at_one_that_hovers_is_yielded_to(angle: float, far: float, speed: float) -> None:
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    place = HERE + far * direction
+    stayed = hovering(config(omega_field=0.0), place, -speed * direction)
+    yielded = hovering(config(), place, -speed * direction)
+    # The planes alone ask for nothing: the place is kept.
+    assert np.linalg.norm(stayed - HERE) < 0.05
+    assert (yielded - HERE) @ direction < -0.05
+
+
+@given(angles, st.floats(15.0, 40.0))
+def test_who_is_far_and_slow_changes_nothing(angle: float, far: float) -> None:
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    ends = hovering(config(), HERE + far * direction, -0.2 * direction)
+    assert np.linalg.norm(ends - HERE) < 0.01
+
+
+@given(angles, st.floats(-4.0, 30.0))
+def test_a_walking_post_is_as_near_at_every_height(angle: float, height: float) -> None:
+    of = config("post")
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    place = HERE + 4.0 * direction
+    found = [hovering(of, place * (1, 1, 0) + (0, 0, z), -direction) for z in (5.0, height)]
+    np.testing.assert_allclose(found[0], found[1], atol=1e-3)
+
+
+def test_a_thing_is_where_it_says_and_a_vehicle_only_nearly() -> None:
+    """Of a thing only the own margin counts and its size; a vehicle has a margin of its own."""
+    least = []
+    for of in (config("sphere"), config()):
+        world = World(of, OWN, 10, FLEET)
+        told(world, HERE, np.zeros(3))
+        strangers = NonCooperative(of, STEPS)
+        least.append(strangers.seen(NOW + 200_000, frozenset(), world)[0].least)
+    own = config().certified
+    clock = 1e-6 * own.clock_us * np.linalg.norm(config().limits.v_max)
+    sigma = own.sigmas * config().field.position_sigma
+    assert np.isclose(least[0], 0.5 + 0.4 + own.tube + clock + sigma)
+    assert np.isclose(least[1], 0.5 + 2.0 * (own.tube + clock) + np.sqrt(2.0) * sigma)
+
+
+def test_a_target_that_falls_silent_is_kept_clear_of_where_it_was_last() -> None:
+    of = config().model_copy(update={"target_d_min": 1.0, "target_d_safe": 4.0})
+    world, place = World(of, OWN, OTHER, FLEET), HERE + np.array([3.0, 0.0, 0.0])
+    told(world, place, np.zeros(3), "target")
+    strangers, silence = NonCooperative(of, STEPS), 10 * of.guard.target_stale_us
+    (heard,), (silent,) = (
+        strangers.target(now, now + 200_000, world.at(now)) for now in (NOW, NOW + silence)
+    )
+    assert world.at(NOW + silence).target is None
+    for before, after in zip(heard, silent, strict=True):
+        np.testing.assert_allclose(after, before, atol=1e-6)
+    np.testing.assert_allclose(silent[0], np.broadcast_to(place, (STEPS, 3, 3)), atol=0.02)
+
+
+def test_a_member_is_no_stranger() -> None:
+    world = World(config(), OWN, 10, FLEET)
+    told(world, HERE, np.zeros(3))
+    strangers = NonCooperative(config(), STEPS)
+    assert strangers.seen(NOW, frozenset({OTHER}), world) == []
+    own = controls(resting(NOW, 200_000, STEPS, HERE, FLEET.fingerprint))
+    assert (strangers.field([], own) == 0.0).all()
+
+
+@given(st.integers(0, 999_999), st.floats(0.0, 8.0))
+def test_the_target_is_where_it_will_be_whenever_in_an_epoch_it_is_asked_for(late: int, speed: float) -> None:
+    """It is seen where it is then, and what is kept clear of begins with the next epoch."""
+    of = CompanionConfig.model_validate(
+        {"task": "goto", "avoidance": "certified", "target_d_min": 1.0, "target_d_safe": 3.0}
+    )
+    velocity = np.array([speed, 0.0, 0.0])
+    seen = State(HERE + 1e-6 * late * velocity, velocity, 0)
+    view = View(None, None, seen, None, seen)
+    (centres, _), *others = NonCooperative(of, STEPS).target(NOW + late, NOW + 1_000_000, view)
+    knots = 1.0 + 1e-6 * of.certified.dt_us * np.arange(STEPS)
+    np.testing.assert_allclose(centres[:, 0], HERE + knots[:, None] * velocity, atol=1e-9)
+    assert not others

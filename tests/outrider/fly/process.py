@@ -1,0 +1,189 @@
+"""``outrider fly`` and ``outrider sitl`` as processes, a target that circles, and what is seen of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import yaml
+
+from mavlink_bridge.clocks.clock import WallClock
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.wire.codec import Codec
+from outrider.resources import find
+from outrider.simulation.beacon import Beacon
+from outrider.simulation.paths import Motion
+from tests.outrider.sitl_server.test_command import free_base, sitl
+
+HOST: Final = "127.0.0.1"
+PATIENCE: Final = 60.0
+"""s until a test gives up; what is waited for comes within seconds."""
+FLEET: Final = FleetFrame(47.397742, 8.545594, 488.0)
+ORBIT, TURN = 8.0, 0.1
+"""m and rad/s of the target's circle."""
+GUIDED: Final = {"ardupilot": 4, "px4": 6 << 16}
+HELD: Final = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
+
+
+class Target:
+    """Circles and says so five times a second of a time that is ``speed`` times as fast as the wall's."""
+
+    def __init__(self, link: Link, speed: float) -> None:
+        self._link, self._speed = link, speed
+        self._beacon = Beacon(100, "target", 5.0, FLEET)
+        self._began = time.monotonic()
+
+    def pump(self) -> None:
+        """Say what is due."""
+        t = (time.monotonic() - self._began) * self._speed
+        if self._beacon.due(round(t * 1e6)):
+            place = ORBIT * np.array([np.sin(TURN * t), np.cos(TURN * t) - 1.0, 0.0])
+            velocity = ORBIT * TURN * np.array([np.cos(TURN * t), -np.sin(TURN * t), 0.0])
+            for datagram in self._beacon.say(round(t * 1e6), Motion(place, velocity)):
+                self._link.send(datagram.data)
+
+
+class Flying:
+    """A running ``outrider fly`` in ``directory``."""
+
+    def __init__(self, directory: Path, *options: str) -> None:
+        self.directory = directory / "run"
+        command = [sys.executable, "-m", "outrider", "fly", "--json", f"--out={self.directory}", *options]
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        self.pump: list[Callable[[], None]] = []
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """So far."""
+        path = self.directory / "events.jsonl"
+        if not path.exists():
+            return []
+        return [
+            json.loads(line)
+            for line in path.read_text(encoding="utf-8").splitlines(keepends=True)
+            if line.endswith("\n")
+        ]
+
+    def until(self, is_so: Callable[[], object]) -> None:
+        """Wait, and let the target speak meanwhile."""
+        end = time.monotonic() + PATIENCE
+        while not is_so():
+            assert time.monotonic() < end, self.events
+            assert self.process.poll() is None, self.process.communicate()
+            for pump in self.pump:
+                pump()
+            time.sleep(0.01)
+
+    def sees(self, what: str, text: str) -> None:
+        """Wait for an event."""
+        self.until(lambda: any(event["what"] == what and text in event["text"] for event in self.events))
+
+    def wait(self, seconds: float) -> None:
+        """So long."""
+        end = time.monotonic() + seconds
+        self.until(lambda: time.monotonic() > end)
+
+    def order(self, word: str) -> None:
+        """As typed."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(f"{word}\n")
+        self.process.stdin.flush()
+
+    @property
+    def pilot(self) -> int:
+        """The process that flies."""
+        last = [event["text"] for event in self.events if event["what"] == "process"][-1]
+        return int(last.rpartition(" ")[2])
+
+    def end(self, which: signal.Signals | None = None) -> tuple[int, dict[str, Any]]:
+        """Status and summary; with a signal first, or by itself."""
+        if which is not None:
+            self.process.send_signal(which)
+        end = time.monotonic() + PATIENCE
+        while self.process.poll() is None:
+            assert time.monotonic() < end, self.events
+            for pump in self.pump:
+                pump()
+            time.sleep(0.01)
+        out, err = self.process.communicate()
+        assert out, err
+        return self.process.returncode, json.loads(out)
+
+
+class Ear:
+    """Hears the modes that a vehicle of the SITL tells, by another of its ports."""
+
+    def __init__(self, link: Link) -> None:
+        self._link, self._codec = link, Codec()
+        self.beats: list[Heartbeat] = []
+
+    def mode(self) -> int | None:
+        """The last."""
+        for data in self._link.receive():
+            self.beats += [m for m in self._codec.feed(data, whole=True) if isinstance(m, Heartbeat)]
+        return self.beats[-1].custom_mode if self.beats else None
+
+
+@contextmanager
+def flight(
+    tmp_path: Path, flavour: str, speed: float, *options: str, clock: str = "autopilot"
+) -> Iterator[tuple[Flying, Ear]]:
+    """One vehicle of the SITL, its companion, a target, and an ear."""
+    with ExitStack() as files:
+        base = free_base(flavour, 1)
+        files.enter_context(sitl(f"--flavour={flavour}", f"--speedup={speed}", f"--port-base={base}"))
+        group = f"mcast:239.255.{random.randrange(1, 250)}.{random.randrange(1, 250)}:{base},{HOST}"
+        autopilot = f"tcp:{HOST}:{base}" if flavour == "ardupilot" else f"udpin:{HOST}:{base}"
+        other = f"tcp:{HOST}:{base + 2}" if flavour == "ardupilot" else f"udpin:{HOST}:{base + 10}"
+        heard, said = open_link(other, WallClock()), open_link(group, WallClock())
+        files.callback(heard.close)
+        files.callback(said.close)
+        document = yaml.safe_load(find("companions", flavour).read_text(encoding="utf-8"))
+        (tmp_path / "own.yaml").write_text(yaml.safe_dump(document | {"system": 1, "clock": clock}))
+        config = f"--config={tmp_path / 'own.yaml'}"
+        flying = Flying(tmp_path, f"--autopilot={autopilot}", f"--swarm={group}", config, *options)
+        ear = Ear(heard)
+        flying.pump += [Target(said, speed).pump, ear.mode]
+        try:
+            yield flying, ear
+        finally:
+            if flying.process.poll() is None:
+                flying.process.kill()
+                flying.process.communicate()
+
+
+def is_gone(process: int) -> bool:
+    """Whether there is no such process any more."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def free_port() -> int:
+    """Of UDP."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])

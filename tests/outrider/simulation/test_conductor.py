@@ -1,0 +1,152 @@
+"""The stages of a flight, led by what is seen of it: when the clock starts, what counts as converged, when it
+ends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mavlink_bridge.frames import FleetFrame
+from outrider.runs.ground_truth import SAMPLE
+from outrider.scenarios.scenario import Scenario
+from outrider.scenarios.starts import starts
+from outrider.simulation.conductor import HOLD, Conductor, Sight, Stage
+from outrider.simulation.operator import Operator
+from tests.outrider.shipped import scenario
+
+EPOCH = 1_000_000
+FLEET = FleetFrame(47.397742, 8.545594, 488.0)
+AIRBORNE = scenario("antipodal-8", vehicles=2, airborne=True, cap_s=10.0)
+GROUNDED = scenario("antipodal-8", vehicles=2, cap_s=10.0)
+
+
+class Run:
+    """A conductor that is shown a sight every 20 ms."""
+
+    def __init__(self, of: Scenario) -> None:
+        self.starts = starts(of, 1, False)
+        self.operator = Operator(FLEET)
+        self.conductor = Conductor(of, self.starts, self.operator, EPOCH)
+        self.now = EPOCH
+        self.target = np.zeros(3)
+
+    def show(
+        self, seconds: float, positions: Any, speed: float = 0.0, *, ready: bool = True, armed: bool = True
+    ) -> bool:
+        over = False
+        for _ in range(round(seconds * 1e6 / SAMPLE)):
+            self.now += SAMPLE
+            velocities = np.zeros((len(positions), 3))
+            velocities[0, 0] = speed
+            waiting = () if ready else ("companion-11 waits for a heartbeat",)
+            sight = Sight(self.now, np.asarray(positions), velocities, self.target, ready, waiting, armed)
+            over = self.conductor.see(sight)
+            if over:
+                break
+        return over
+
+    def orders(self) -> set[int]:
+        """Commands that the operator has open."""
+        return {command for _, command in self.operator._open}
+
+
+def test_the_clock_starts_when_all_have_hovered_for_a_while() -> None:
+    run = Run(GROUNDED)
+    there = run.starts.positions
+    run.show(5.0, there, ready=False)
+    run.show(2.0, there, speed=0.2)
+    assert run.conductor.stage is Stage.PREPARE
+    run.show(0.4, there)
+    run.show(0.1, there, speed=0.2)
+    run.show(0.5, there)
+    assert run.conductor.stage is Stage.PREPARE
+    run.show(0.1, there)
+    assert run.conductor.stage is Stage.CLOCK
+    assert run.conductor.clock_start is not None
+    assert EPOCH < run.conductor.clock_start <= run.now
+
+
+def test_converged_is_near_and_slow_and_both_for_a_second() -> None:
+    run = Run(AIRBORNE)
+    goals = run.starts.goals
+    assert goals is not None
+    run.show(1.0, run.starts.positions)
+    assert run.conductor.stage is Stage.CLOCK
+    run.show(0.9, goals)
+    run.show(0.1, goals, speed=0.31)
+    run.show(0.9, goals + np.array([0.0, 0.0, 0.29]))
+    run.show(0.1, goals + np.array([0.0, 0.0, 0.31]))
+    assert run.conductor.converged_at is None
+    began = run.now + SAMPLE
+    assert run.show(20.0, goals + np.array([0.29, 0.0, 0.0]), speed=0.29)
+    assert run.conductor.converged_at == began
+    assert run.conductor.clock_end == began + HOLD + 5_000_000
+    assert run.conductor.failure is None
+
+
+def test_who_does_not_converge_is_flown_to_the_cap() -> None:
+    run = Run(AIRBORNE)
+    assert run.show(30.0, run.starts.positions)
+    assert run.conductor.converged_at is None
+    assert run.conductor.clock_start is not None
+    assert run.conductor.clock_end == run.conductor.clock_start + 10_000_000
+
+
+def test_after_the_clock_all_are_told_to_land_unless_they_began_in_the_air() -> None:
+    run = Run(GROUNDED)
+    assert not run.show(15.0, run.starts.positions)
+    assert run.conductor.stage is Stage.LAND
+    assert run.orders() >= {21}
+    assert run.show(1.0, run.starts.positions, armed=False)
+    assert run.conductor.failure is None
+    run = Run(AIRBORNE)
+    run.show(15.0, run.starts.positions)
+    assert 21 not in run.orders()
+
+
+@pytest.mark.parametrize(
+    ("ready", "said"), [(False, "waits for a heartbeat"), (True, "do not come to a hover")]
+)
+def test_who_never_hovers_is_brought_down_and_it_is_said_why(ready: bool, said: str) -> None:
+    run = Run(GROUNDED)
+    run.show(91.0, run.starts.positions, speed=1.0, ready=ready)
+    assert run.conductor.stage is Stage.LAND
+    assert said in (run.conductor.failure or "")
+    assert run.conductor.clock_start is None
+
+
+def test_who_does_not_land_is_not_waited_for_for_ever() -> None:
+    run = Run(GROUNDED)
+    assert run.show(90.0, run.starts.positions)
+    assert "not all vehicles were down" in (run.conductor.failure or "")
+
+
+def test_an_abort_lands_and_keeps_the_first_reason() -> None:
+    run = Run(GROUNDED)
+    run.show(2.0, run.starts.positions)
+    run.conductor.abort(run.now, "interrupted")
+    run.conductor.abort(run.now, "again")
+    assert run.conductor.stage is Stage.LAND
+    assert run.conductor.failure == "interrupted"
+    assert run.conductor.clock_end == run.now
+    assert run.show(1.0, run.starts.positions, armed=False)
+
+
+def test_only_after_the_last_jump_of_the_target_can_it_be_converged() -> None:
+    of = scenario(
+        "scenario-1",
+        vehicles=2,
+        airborne=True,
+        target={"jumps": [{"after_s": 4.0, "to": [0.0, 0.0, 0.0]}]},
+    )
+    run = Run(of)
+    on_circle = np.array([[4.0, 0.0, 5.0], [-4.0, 0.0, 5.0]])
+    run.show(3.0, on_circle)
+    assert run.conductor.stage is Stage.CLOCK
+    assert run.conductor.converged_at is None
+    run.show(4.0, on_circle)
+    assert run.conductor.converged_at is not None
+    assert run.conductor.clock_start is not None
+    assert run.conductor.converged_at - run.conductor.clock_start == pytest.approx(4_000_000, abs=SAMPLE)

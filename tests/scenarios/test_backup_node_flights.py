@@ -1,0 +1,53 @@
+"""Certified flights in which a companion hangs or ends: its vehicle keeps to its plan all the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.scenarios.lockstep_flights import fly, scenario
+
+SWAP: dict[str, Any] = {
+    "vehicles": 3,
+    "airborne": True,
+    "sensors": "rtk",
+    "cap_s": 12.0,
+    "companion": {"avoidance": "certified", "turning_sense": "right"},
+}
+"""At 1.5 s all are under way at 4 m/s or so."""
+
+
+@pytest.mark.parametrize(
+    "fault", [{"kind": "freeze", "for_s": 3.0}, {"kind": "vanish"}], ids=["hangs", "ends"]
+)
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_a_plan_is_kept_whose_companion_is_silent(
+    fault: dict[str, Any], flavour: str, tmp_path: Path
+) -> None:
+    struck = {"vehicle": 12, "at_s": 1.5, **fault}
+    of = scenario(
+        "antipodal-8", {**SWAP, "flavour": flavour, "faults": [struck], "autopilot": {"guided_timeout": 0.3}}
+    )
+    flown = fly(of, 1, tmp_path)
+    flight = flown.flight
+    silent = flight.helms[1]
+    # Only the helm of the one that was silent had anything to do.
+    assert silent.carried > 40
+    assert [helm.carried for helm in flight.helms if helm is not silent] == [0, 0]
+    assert flown.summary["d_min_violations"] == 0
+    assert flown.summary["anchored_anew"] == 0
+    separation = flown.summary["min_separation_m"]
+    assert isinstance(separation, float)
+    assert separation > 1.0
+    assert flown.summary["converged"] is (fault["kind"] == "freeze")
+
+
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_in_a_sound_flight_it_never_speaks(flavour: str, tmp_path: Path) -> None:
+    """From the ground to the ground: nor while its companion lands."""
+    of = scenario("antipodal-8", {**SWAP, "vehicles": 2, "airborne": False, "flavour": flavour})
+    flown = fly(of, 1, tmp_path)
+    assert [helm.carried for helm in flown.flight.helms] == [0, 0]
+    assert flown.summary["converged"] is True
