@@ -19,18 +19,18 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_TYPE
 from mavlink_bridge.wire.packing import parcels
 from mavlink_bridge.wire.signing import Signing
-from sitl.autopilot.autonomous_modes import Journeys
+from sitl.autopilot.autonomous_modes import AutonomousModes
 from sitl.autopilot.command_protocol import Orders
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.failsafes import Failsafes
 from sitl.autopilot.failures import Failures
 from sitl.autopilot.fences import Fences
-from sitl.autopilot.firmware import Flavour, Mode
+from sitl.autopilot.firmware import Firmware, Mode
 from sitl.autopilot.firmware.ardupilot import ArduPilot
 from sitl.autopilot.firmware.px4 import Px4
 from sitl.autopilot.following import Following
 from sitl.autopilot.guidance import Guidance
-from sitl.autopilot.home_commands import Homing
+from sitl.autopilot.home_commands import HomeCommands
 from sitl.autopilot.maneuvers import Maneuvers
 from sitl.autopilot.missions.itinerary import Itinerary
 from sitl.autopilot.missions.plans import Plans
@@ -43,15 +43,15 @@ from sitl.autopilot.reception import Reception
 from sitl.autopilot.returning import Returning
 from sitl.autopilot.saved import Saved
 from sitl.autopilot.services import Services
-from sitl.autopilot.setpoint_reception import Steering
+from sitl.autopilot.setpoint_reception import SetpointReception
 from sitl.autopilot.trust import Trust
 from sitl.config.autopilot import AutopilotConfig
 from sitl.environment.weather import WeatherConfig
 from sitl.estimation.sensors import Estimate
-from sitl.snapshot import Gauges
+from sitl.snapshot import SnapshotReader
 from sitl.telemetry.reports import HEARTBEAT, ORIGIN
 from sitl.telemetry.schedule import Telemetry
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 from sitl.telemetry.streams import usual_rates
 from sitl.values.home import Home
 from sitl.values.origin import Origin
@@ -107,7 +107,7 @@ class Autopilot:
         self.config = config = self._values.configured(config)
         self._source = Source(config.system_id, _COMPONENT)
         self._origin = Origin(site, config.latitude, config.longitude, config.altitude)
-        self._flavour: Flavour = _FLAVOURS[config.flavour](config)
+        self._flavour: Firmware = _FLAVOURS[config.flavour](config)
         self._telemetry = Telemetry(usual_rates(config), self._flavour.reports_ekf)
         self._guidance = Guidance(config)
         self._home = Home(self._origin)
@@ -121,8 +121,8 @@ class Autopilot:
             seed,
         )
         self._outbox: list[Message] = []
-        voice = Voice(self._source, self._outbox)
-        steering = Steering(self._flavour, self._guidance, self._origin, self._home, voice)
+        voice = StatusReporter(self._source, self._outbox)
+        steering = SetpointReception(self._flavour, self._guidance, self._origin, self._home, voice)
         self._plans = Plans(saved.plans)
         bytewise = self._flavour.bytewise
         itinerary = Itinerary(
@@ -136,7 +136,7 @@ class Autopilot:
         )
         following = Following(self._guidance, self._origin, self._home, config.follow, px4=bytewise)
         returning = Returning(self._guidance, self._home, config)
-        self._journeys = Journeys(itinerary, returning, following, self._guidance)
+        self._autonomous_modes = AutonomousModes(itinerary, returning, following, self._guidance)
         self._commander = Commander(
             config,
             self._flavour,
@@ -144,7 +144,7 @@ class Autopilot:
             steering,
             self._plant.estimate,
             self._home,
-            self._journeys,
+            self._autonomous_modes,
             voice,
         )
         self._battery = None
@@ -159,7 +159,7 @@ class Autopilot:
             voice,
         )
         self._commander.doubts = self._failsafes.doubts
-        homing = Homing(
+        home_commands = HomeCommands(
             self._home,
             self._origin,
             self._telemetry,
@@ -182,14 +182,14 @@ class Autopilot:
             self._flavour,
             self._values,
             self._telemetry,
-            homing,
+            home_commands,
             self._missions,
             Failures(self._plant, self._battery, lambda: self.config),
             self._outbox,
             voice,
             self._configure,
         )
-        self._gauges = Gauges(
+        self._gauges = SnapshotReader(
             config,
             vehicle,
             self._source,
@@ -330,7 +330,7 @@ class Autopilot:
         """
         changed = self._values.configured(self._configured)
         self.config = changed.model_copy(update={"system_id": self.config.system_id})
-        for part in (self._flavour, self._guidance, self._commander, self._journeys, self._gauges):
+        for part in (self._flavour, self._guidance, self._commander, self._autonomous_modes, self._gauges):
             part.configure(self.config)
 
     @property

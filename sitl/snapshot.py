@@ -8,7 +8,7 @@ from typing import Final
 from mavlink_bridge.messages import MissionCurrent, Source
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.failsafes import Failsafes
-from sitl.autopilot.firmware import ARMED, Flavour, Mode
+from sitl.autopilot.firmware import ARMED, Firmware, Mode
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.plant import Plant
 from sitl.config.autopilot import AutopilotConfig
@@ -28,7 +28,7 @@ _LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, A
 _GEOFENCE: Final = 0x100000
 
 
-class Gauges:
+class SnapshotReader:
     """Reader that makes snapshots for ``Telemetry``."""
 
     def __init__(
@@ -38,7 +38,7 @@ class Gauges:
         source: Source,
         origin: Origin,
         home: Home,
-        flavour: Flavour,
+        flavour: Firmware,
         commander: Commander,
         guidance: Guidance,
         plant: Plant,

@@ -13,8 +13,8 @@ from typing import Literal, NamedTuple, Protocol
 
 from mavlink_bridge.clocks.node_clock import QUANTUM, NodeClock
 from mavlink_bridge.errors import ScheduleError
-from mavlink_bridge.loops.schedule import Slot
-from mavlink_bridge.network.simulated import Ether
+from mavlink_bridge.loops.schedule import Schedule
+from mavlink_bridge.network.simulated import SimulatedNetwork
 from mavlink_bridge.node import Datagram, Node
 
 __all__ = ["BUFFER", "QUANTUM", "Direction", "LockStep", "Scheduled", "Tap"]
@@ -56,7 +56,7 @@ class Tap(Protocol):
 
 
 class LockStep:
-    """Loop that steps ``scheduled`` nodes over ``ether`` in simulated time.
+    """Loop that steps ``scheduled`` nodes over ``network`` in simulated time.
 
     All times are µs; periods and phases are whole multiples of ``base_tick``, which is a multiple of 4 µs.
     For a hung node up to ``buffer`` datagrams wait.
@@ -73,13 +73,13 @@ class LockStep:
     def __init__(
         self,
         scheduled: Iterable[Scheduled],
-        ether: Ether,
+        network: SimulatedNetwork,
         base_tick: int,
         taps: Sequence[Tap] = (),
         buffer: int = BUFFER,
     ) -> None:
         entries = sorted(scheduled, key=lambda entry: entry.node.name)
-        self._ether = ether
+        self._network = network
         self._taps = tuple(taps)
         self._buffer = buffer
         self._now = 0
@@ -95,7 +95,7 @@ class LockStep:
         for one, following in pairwise(entries):
             if one.node.name == following.node.name:
                 raise ScheduleError(f"two nodes are named {one.node.name!r}")
-        self._slots = [Slot(*entry, base_tick) for entry in entries]
+        self._slots = [Schedule(*entry, base_tick) for entry in entries]
         # Remaining buffer capacity of each hung node.
         self._hanging: dict[str, int] = {}
         self._vanished: set[str] = set()
@@ -157,7 +157,7 @@ class LockStep:
             raise ScheduleError(f"no node is named {name!r}; there are {', '.join(names)}")
         return names.index(name)
 
-    def _pop_due(self, now: int) -> list[Slot]:
+    def _pop_due(self, now: int) -> list[Schedule]:
         due, slots = self._due, []
         while due[0][0] == now:
             index = due[0][1]
@@ -166,12 +166,12 @@ class LockStep:
             slots.append(slot)
         return slots
 
-    def _tick(self, now: int, slots: list[Slot]) -> None:
-        ether = self._ether
+    def _tick(self, now: int, slots: list[Schedule]) -> None:
+        network = self._network
         if self._hanging:
             slots = self._awake(now, slots)
         times = [slot.told(now) for slot in slots]
-        inboxes = [ether.receive(now, slot.name) for slot in slots]
+        inboxes = [network.receive(now, slot.name) for slot in slots]
         if self._taps:
             self._show(times, slots, "in", inboxes)
         outboxes = [slot.step(time, inbox) for slot, time, inbox in zip(slots, times, inboxes, strict=True)]
@@ -179,18 +179,18 @@ class LockStep:
             self._show(times, slots, "out", outboxes)
         for slot, outbox in zip(slots, outboxes, strict=True):
             if outbox:
-                ether.send(now, slot.name, outbox)
+                network.send(now, slot.name, outbox)
 
-    def _awake(self, now: int, slots: list[Slot]) -> list[Slot]:
+    def _awake(self, now: int, slots: list[Schedule]) -> list[Schedule]:
         """Return those of ``slots`` that are not hung; for the others, buffer what has arrived."""
         for slot in slots:
             room = self._hanging.get(slot.name)
             if room is not None:
-                self._ether.keep(now, slot.name, room)
+                self._network.keep(now, slot.name, room)
         return [slot for slot in slots if slot.name not in self._hanging]
 
     def _show(
-        self, times: list[int], slots: list[Slot], direction: Direction, boxes: list[list[Datagram]]
+        self, times: list[int], slots: list[Schedule], direction: Direction, boxes: list[list[Datagram]]
     ) -> None:
         for tap in self._taps:
             for time, slot, box in zip(times, slots, boxes, strict=True):

@@ -7,7 +7,7 @@ from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.node import Node
 
 
-class Slot:
+class Schedule:
     """A node's deadlines: ``phase`` + k ``period`` (µs) on its own ``clock`` (None: true time).
 
     Each deadline is met at the first multiple of ``tick`` (µs, true time) at which the clock shows it or

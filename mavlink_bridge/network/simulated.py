@@ -17,10 +17,10 @@ from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.network.channel import Channel, Faults
 from mavlink_bridge.node import Datagram
 
-__all__ = ["Channel", "Ether", "EtherCounters", "Faults"]
+__all__ = ["Channel", "Faults", "NetworkCounters", "SimulatedNetwork"]
 
 
-class EtherCounters(NamedTuple):
+class NetworkCounters(NamedTuple):
     """Counts of datagrams; each datagram counts once per receiver.
 
     The sum sent + duplicated equals delivered + dropped + still under way. ``dropped``: lost, cut off, or
@@ -106,7 +106,7 @@ class _Buffer(NamedTuple):
     waiting: list[Datagram]
 
 
-class Ether:
+class SimulatedNetwork:
     """All channels of a run.
 
     ``seed`` is that of the faults. ``tick`` (µs): nothing arrives earlier than one tick after it was sent.
@@ -139,9 +139,9 @@ class Ether:
                 )
 
     @property
-    def counters(self) -> EtherCounters:
+    def counters(self) -> NetworkCounters:
         """Counts since the beginning."""
-        return EtherCounters(self._sent, self._delivered, self._dropped, self._duplicated, self._unrouted)
+        return NetworkCounters(self._sent, self._delivered, self._dropped, self._duplicated, self._unrouted)
 
     @property
     def under_way(self) -> int:

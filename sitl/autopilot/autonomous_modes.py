@@ -15,7 +15,7 @@ from sitl.estimation.sensors import Estimate
 MODES: Final = frozenset((Mode.MISSION, Mode.RETURN, Mode.FOLLOW))
 
 
-class Journeys:
+class AutonomousModes:
     """Executor of the modes in ``MODES``."""
 
     def __init__(

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from mavlink_bridge.messages import CommandInt, CommandLong
 from sitl.autopilot.commander import Commander
-from sitl.autopilot.firmware import ACCEPTED, CUSTOM, DENIED, UNSUPPORTED, Denial, Flavour, Mode
+from sitl.autopilot.firmware import ACCEPTED, CUSTOM, DENIED, UNSUPPORTED, Denial, Firmware, Mode
 
 # MAV_CMD
 LAND: Final = 21
@@ -62,7 +62,7 @@ Handler = Callable[[Order], Denial | None]
 class Orders:
     """Executor of commands. A retried command finds its effect already in place and changes nothing."""
 
-    def __init__(self, commander: Commander, flavour: Flavour, more: Mapping[int, Handler]) -> None:
+    def __init__(self, commander: Commander, flavour: Firmware, more: Mapping[int, Handler]) -> None:
         """``more`` maps further MAV_CMDs, which do not concern flight, to their handlers."""
         self._commander = commander
         self._flavour = flavour

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from sitl.autopilot.autonomous_modes import MODES, Journeys
-from sitl.autopilot.firmware import FAILED, TEMPORARILY_REJECTED, Denial, Flavour, Mode, Status
+from sitl.autopilot.autonomous_modes import MODES, AutonomousModes
+from sitl.autopilot.firmware import FAILED, TEMPORARILY_REJECTED, Denial, Firmware, Mode, Status
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.missions.itinerary import Event
-from sitl.autopilot.setpoint_reception import Steering
+from sitl.autopilot.setpoint_reception import SetpointReception
 from sitl.config.autopilot import AutopilotConfig
 from sitl.estimation.sensors import Estimate
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 from sitl.values.home import Home
 
 # Sink speed of PX4's position mode without sticks (m/s).
@@ -34,13 +34,13 @@ class Commander:
     def __init__(
         self,
         config: AutopilotConfig,
-        flavour: Flavour,
+        flavour: Firmware,
         guidance: Guidance,
-        steering: Steering,
+        steering: SetpointReception,
         estimate: Callable[[], Estimate],
         home: Home,
-        journeys: Journeys,
-        voice: Voice,
+        autonomous_modes: AutonomousModes,
+        voice: StatusReporter,
     ) -> None:
         """``estimate`` returns the present estimate."""
         self._config = config
@@ -49,7 +49,7 @@ class Commander:
         self._steering = steering
         self._estimate = estimate
         self._home = home
-        self._journeys = journeys
+        self._autonomous_modes = autonomous_modes
         self._voice = voice
         self._takeoff_height = config.takeoff_height
         self._ready_at = 0 if config.start_height else round(config.ready_after * 1e6)
@@ -106,7 +106,7 @@ class Commander:
         self._postpone(now)
         self._voice.inform("Armed")
         if self.mode is Mode.MISSION:
-            self._journeys.begin(self.mode, self._estimate())
+            self._autonomous_modes.begin(self.mode, self._estimate())
         if self.mode is Mode.TAKEOFF:
             self._guidance.takeoff(self._takeoff_height + self._home.height, self._estimate().pose)
         return None
@@ -140,7 +140,7 @@ class Commander:
         return self._config.waypoint_speed
 
     def take_off(self, altitude: float, relative: bool | None, now: int) -> Denial | None:
-        """Execute NAV_TAKEOFF (22); the arguments are those of ``Flavour.takeoff``."""
+        """Execute NAV_TAKEOFF (22); the arguments are those of ``Firmware.takeoff``."""
         verdict = self._flavour.takeoff(altitude, relative, self._home.altitude, self.status(now))
         if isinstance(verdict, Denial):
             return verdict
@@ -158,7 +158,7 @@ class Commander:
             return None
         status = self.status(now)
         if mode is Mode.MISSION:
-            itinerary = self._journeys.itinerary
+            itinerary = self._autonomous_modes.itinerary
             status = status._replace(items=itinerary.total, takes_off=itinerary.takes_off)
         if denial := self._flavour.mode_denial(mode, status):
             return denial
@@ -224,7 +224,7 @@ class Commander:
         return denial
 
     def _journey(self, now: int) -> None:
-        event = self._journeys.advance(self.mode, now, self._estimate())
+        event = self._autonomous_modes.advance(self.mode, now, self._estimate())
         if event is Event.RETURNS:
             self._switch(Mode.RETURN, now)
         elif event is Event.FINISHED:
@@ -236,7 +236,7 @@ class Commander:
         self.mode = mode
         self._lost = False
         if self.armed and mode is Mode.MISSION:
-            self._journeys.begin(mode, self._estimate())
+            self._autonomous_modes.begin(mode, self._estimate())
             return
         if self.landed or not self.armed:
             self._guidance.idle()
@@ -249,7 +249,7 @@ class Commander:
             case Mode.LAND:
                 self._guidance.land(self._config.land_speed)
             case Mode.RETURN | Mode.FOLLOW:
-                self._journeys.begin(mode, self._estimate())
+                self._autonomous_modes.begin(mode, self._estimate())
             case Mode.GUIDED:
                 self._steering.resume(self._estimate().pose, now)
             case _:
@@ -296,7 +296,7 @@ class Commander:
     def _stop(self, why: str) -> None:
         self.armed = False
         self._guidance.idle()
-        self._journeys.end()
+        self._autonomous_modes.end()
         if self._flavour.keeps_choice:
             self.mode = self._chosen
         elif self.mode is Mode.LAND:

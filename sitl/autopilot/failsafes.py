@@ -9,9 +9,9 @@ from typing import Final
 from mavlink_bridge.messages import FenceStatus, Source
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.fences import Breach, Fences
-from sitl.autopilot.firmware import Flavour, Mode, Worry
+from sitl.autopilot.firmware import Firmware, Mode, Worry
 from sitl.estimation.sensors import Estimate
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 from sitl.vehicle.battery import Battery, Charge
 
 _PERIOD: Final = 100_000
@@ -30,12 +30,12 @@ class Failsafes:
 
     def __init__(
         self,
-        flavour: Flavour,
+        flavour: Firmware,
         commander: Commander,
         fences: Fences,
         battery: Battery | None,
         estimate: Callable[[], Estimate],
-        voice: Voice,
+        voice: StatusReporter,
     ) -> None:
         self._flavour = flavour
         self._commander = commander

@@ -13,7 +13,7 @@ from sitl.estimation.sensors import Estimate
 from sitl.telemetry.reports import ORIGIN
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_reports import HOME
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 
@@ -22,7 +22,7 @@ SET_HOME: Final = 179
 _FAR: Final = 100_000.0
 
 
-class Homing:
+class HomeCommands:
     """Handler that moves ``home``, and reports it after every change.
 
     The origin of a filter that has one is fixed, as on a real ArduPilot; a request to set it is answered with
@@ -36,7 +36,7 @@ class Homing:
         telemetry: Telemetry,
         estimate: Callable[[], Estimate],
         ready: Callable[[], bool],
-        voice: Voice,
+        voice: StatusReporter,
     ) -> None:
         """``ready`` returns whether there is a position."""
         self._home = home

@@ -8,7 +8,7 @@ from typing import Final
 
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.commander import Commander
-from sitl.autopilot.firmware import DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Denial, Flavour, Mode
+from sitl.autopilot.firmware import DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Denial, Firmware, Mode
 from sitl.autopilot.following import Following
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.missions.itinerary import Itinerary
@@ -44,7 +44,7 @@ class Maneuvers:
     def __init__(
         self,
         commander: Commander,
-        flavour: Flavour,
+        flavour: Firmware,
         guidance: Guidance,
         origin: Origin,
         home: Home,

@@ -8,7 +8,7 @@ from typing import Final
 
 from mavlink_bridge.messages import Message, MessageInterval, RequestDataStream, Source
 from sitl.autopilot.command_protocol import Handler, Order
-from sitl.autopilot.firmware import DENIED, FAILED, UNSUPPORTED, Denial, Flavour
+from sitl.autopilot.firmware import DENIED, FAILED, UNSUPPORTED, Denial, Firmware
 from sitl.telemetry import status_reports as q
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.streams import members
@@ -32,7 +32,9 @@ class Requests:
     and 520, and REQUEST_DATA_STREAM (66).
     """
 
-    def __init__(self, source: Source, flavour: Flavour, telemetry: Telemetry, outbox: list[Message]) -> None:
+    def __init__(
+        self, source: Source, flavour: Firmware, telemetry: Telemetry, outbox: list[Message]
+    ) -> None:
         self._source = source
         self._flavour = flavour
         self._telemetry = telemetry

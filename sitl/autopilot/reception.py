@@ -23,9 +23,9 @@ from mavlink_bridge.messages import (
 from sitl.autopilot.command_protocol import Orders
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.following import Following
-from sitl.autopilot.setpoint_reception import Steering
+from sitl.autopilot.setpoint_reception import SetpointReception
 from sitl.estimation.sensors import Estimate
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 
 
 class Reception:
@@ -39,10 +39,10 @@ class Reception:
         self,
         source: Source,
         outbox: list[Message],
-        voice: Voice,
+        voice: StatusReporter,
         commander: Commander,
         orders: Orders,
-        steering: Steering,
+        steering: SetpointReception,
         following: Following,
         services: Mapping[type[Any], Callable[[Any, int], None]],
         set_mode_ack: int,

@@ -22,15 +22,15 @@ from mavlink_bridge.messages import (
 from sitl.autopilot import files
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.failures import Failures
-from sitl.autopilot.firmware import DENIED, Denial, Flavour
-from sitl.autopilot.home_commands import Homing
+from sitl.autopilot.firmware import DENIED, Denial, Firmware
+from sitl.autopilot.home_commands import HomeCommands
 from sitl.autopilot.message_requests import Requests
 from sitl.autopilot.missions.service import MissionService
 from sitl.autopilot.parameters.ardupilot import STREAMS
 from sitl.autopilot.parameters.protocol import ParameterProtocol
 from sitl.autopilot.parameters.values import Values
 from sitl.telemetry.schedule import Telemetry
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 
 # MAV_CMD_PREFLIGHT_STORAGE, DO_FENCE_ENABLE; first parameter of the former
 STORAGE: Final = 245
@@ -47,14 +47,14 @@ class Services:
     def __init__(
         self,
         source: Source,
-        flavour: Flavour,
+        flavour: Firmware,
         values: Values,
         telemetry: Telemetry,
-        homing: Homing,
+        home_commands: HomeCommands,
         missions: MissionService,
         failures: Failures,
         outbox: list[Message],
-        voice: Voice,
+        voice: StatusReporter,
         configure: Callable[[], None],
     ) -> None:
         """``configure`` is called when a parameter has changed."""
@@ -75,13 +75,13 @@ class Services:
             ParamSet: self._set_parameter,
             RequestDataStream: self._requests.stream,
             FileTransfer: self._refuse_file,
-            SetHomePosition: homing.set_home,
-            SetGpsGlobalOrigin: homing.set_origin,
+            SetHomePosition: home_commands.set_home,
+            SetGpsGlobalOrigin: home_commands.set_origin,
             **missions.handlers,
         }
         self.commands: dict[int, Handler] = {
             **self._requests.commands,
-            **homing.commands,
+            **home_commands.commands,
             **missions.commands,
             **failures.commands,
             STORAGE: self._store,

@@ -10,10 +10,10 @@ import math
 from typing import Final, NamedTuple
 
 from mavlink_bridge.messages import SetpointAttitude, SetpointGlobal, SetpointLocal
-from sitl.autopilot.firmware import Flavour, Status
+from sitl.autopilot.firmware import Firmware, Status
 from sitl.autopilot.global_setpoints import localised
 from sitl.autopilot.guidance import Activity, Guidance
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 from sitl.values.setpoints import POSITION, Pose, Reading, Setpoint, Stop
@@ -43,11 +43,11 @@ class Stream(NamedTuple):
         return gap / _SECOND if gap < _PAUSE else 0.0
 
 
-class Steering:
+class SetpointReception:
     """Converter of set-point messages into set-points for the guidance."""
 
     def __init__(
-        self, flavour: Flavour, guidance: Guidance, origin: Origin, home: Home, voice: Voice
+        self, flavour: Firmware, guidance: Guidance, origin: Origin, home: Home, voice: StatusReporter
     ) -> None:
         """``origin`` and ``home`` are the references of global positions and heights."""
         self._flavour = flavour

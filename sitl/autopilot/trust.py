@@ -7,7 +7,7 @@ from typing import Final, Literal
 
 from mavlink_bridge.messages import SetupSigning, Source
 from mavlink_bridge.wire.signing import LATEST, Signing
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 
 # µs between two warnings about rejected messages.
 _PAUSE: Final = 5_000_000
@@ -27,7 +27,7 @@ class Trust:
         signing: Signing | None,
         setup: Literal["refused", "obeyed"],
         armed: Callable[[], bool],
-        voice: Voice,
+        voice: StatusReporter,
     ) -> None:
         """Without ``signing`` every message is accepted, and no key."""
         self._source = source

@@ -44,7 +44,7 @@ class Errors(NamedTuple):
     drift: Vector = ZERO
 
 
-class Wandering:
+class RandomErrors:
     """Errors of one profile from one generator; ``advance`` to a sample, then read ``errors``."""
 
     def __init__(self, profile: SensorProfile, random: np.random.Generator) -> None:

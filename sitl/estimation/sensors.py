@@ -17,7 +17,7 @@ import numpy as np
 from mavlink_bridge.messages import Vector
 from sitl.estimation.gps_faults import Positioning
 from sitl.estimation.profiles import SensorProfile
-from sitl.estimation.random_errors import PERIOD, Errors, Wandering
+from sitl.estimation.random_errors import PERIOD, Errors, RandomErrors
 from sitl.values.origin import Origin
 from sitl.values.setpoints import ZERO, Pose
 from sitl.vehicle.airframe import FloatArray
@@ -82,7 +82,7 @@ class Sensors:
         self._origin = origin
         self._delay = profile.delay
         self._flawless = profile.exact
-        self._wandering = None if profile.exact else Wandering(profile, random)
+        self._random_errors = None if profile.exact else RandomErrors(profile, random)
         self._gaps = _Gaps(profile, gaps)
         self.gps = Positioning(patience, PERIOD * 1e-6, losses)
         self._sample = 0
@@ -118,8 +118,8 @@ class Sensors:
         for _ in range(sample - self._sample):
             self.gps.step()
         self._sample = sample
-        if self._wandering is not None:
-            self._wandering.advance(sample)
+        if self._random_errors is not None:
+            self._random_errors.advance(sample)
 
     def estimate(self, state: VehicleState) -> Estimate:
         """Return the present estimate; ``state`` is the truth."""
@@ -173,7 +173,7 @@ class Sensors:
 
     @property
     def _errors(self) -> Errors:
-        return _FLAWLESS if self._wandering is None else self._wandering.errors
+        return _FLAWLESS if self._random_errors is None else self._random_errors.errors
 
     @property
     def _delayed(self) -> VehicleState:

@@ -15,7 +15,7 @@ _SECOND: Final = 1_000_000
 _MOST: Final = 32
 
 
-class Voice:
+class StatusReporter:
     """Sender of texts, which it appends to ``outbox``."""
 
     def __init__(self, source: Source, outbox: list[Message]) -> None:

@@ -21,11 +21,11 @@ from mavlink_bridge.messages import (
     ParamSet,
     SetpointLocal,
 )
-from outrider.fly.status import News
-from outrider.fly.transmit_statistics import Departures
+from outrider.fly.status import StatusReports
+from outrider.fly.transmit_statistics import TransmitStatistics
 from outrider.resources import find
 from outrider.scenarios.fly_config import FlyConfig
-from outrider.supervision.supervised_node import Cockpit
+from outrider.supervision.supervised_node import SupervisedNode
 from outrider.yaml_files.yaml_file import load
 from tests.scenarios.single_vehicle import LAND, OPERATOR, SITE, SYSTEM, TAKEOFF, TARGET, SingleVehicle
 
@@ -236,8 +236,10 @@ def test_the_diary_of_fly_has_it_once():
     vehicle = SingleVehicle("ardupilot", shipped("ardupilot"))
     put(vehicle, {"PSC_JERK_XY": 2.0})
     told = []
-    cockpit = Cockpit(vehicle.companion, None, None, None)
-    news = News(cockpit, Departures(vehicle.config.limits), None, None, lambda **one: told.append(one))
+    supervised = SupervisedNode(vehicle.companion, None, None, None)
+    news = StatusReports(
+        supervised, TransmitStatistics(vehicle.config.limits), None, None, lambda **one: told.append(one)
+    )
     for _ in range(1000):
         vehicle.step()
         news.look(vehicle.now, vehicle.now)

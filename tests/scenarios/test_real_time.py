@@ -22,9 +22,9 @@ from outrider.realtime.view import RealTimeView
 from outrider.resources import config_root
 from outrider.runs.summary import Cost, exit_status, summarise
 from outrider.scene.changes import Change
-from outrider.scene.datagram_channel import Line, pair
-from outrider.scene.snapshot import Moment
-from outrider.scene.view_commands import Wishes, encoded
+from outrider.scene.datagram_channel import DatagramChannel, pair
+from outrider.scene.snapshot import Snapshot
+from outrider.scene.view_commands import ViewCommands, encoded
 from outrider.simulation.conductor import Stage
 from tests.scenarios.lockstep_flights import FIREFLY, scenario, setpoints
 
@@ -125,15 +125,15 @@ def test_an_interrupt_lands_and_leaves_whole_logs(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_flight_in_real_time_with_a_view(tmp_path: Path) -> None:
     """Somebody looks on, changes methods, loss and target in mid-flight, and is gone before the end."""
-    ours, theirs = (Line(end) for end in pair())
+    ours, theirs = (DatagramChannel(end) for end in pair())
     place = (1.0, 2.0, 4.0)
-    seen: list[Moment] = []
+    seen: list[Snapshot] = []
 
     class Watched(RealTimeView):
         def changes(self, seconds: float | None) -> Iterator[Change]:
             seen.extend(pickle.loads(data) for data in theirs.receive())
             if seconds is not None and seconds > 0.5:
-                theirs.send(encoded(Wishes(methods="swivel", loss=0.5, target=place, moves=1)))
+                theirs.send(encoded(ViewCommands(methods="swivel", loss=0.5, target=place, moves=1)))
             if seconds is not None and seconds > 1.5:
                 theirs.close()
             return super().changes(seconds)

@@ -69,7 +69,7 @@ def test_everything_did_go_wrong(first: Flown) -> None:
     samples, _ = clock(first)
     assert (np.linalg.norm(samples.estimate_error, axis=-1).max(axis=0) > 0.1).all()
     assert np.linalg.norm(first.flight.autopilots[0].wind) > 1.0
-    assert first.flight.ether.counters.dropped > 100
+    assert first.flight.network.counters.dropped > 100
     ends = [max(record.time for record in read_tlog(log)) for log in first.logs]
     assert ends[0] - ends[1] > 1_500_000
 

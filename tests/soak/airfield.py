@@ -16,7 +16,7 @@ from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.key import Key
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
 from mavlink_bridge.messages import SetpointLocal
-from mavlink_bridge.network.simulated import Channel, Ether, Faults
+from mavlink_bridge.network.simulated import Channel, Faults, SimulatedNetwork
 from mavlink_bridge.wire.signing import Signing
 from sitl.config.autopilot import AutopilotConfig
 from sitl.environment.weather import WeatherConfig
@@ -60,13 +60,13 @@ class Craft:
     system: int
     flavour: str
     radio: Radio
-    seat: Seat
+    slot: Seat
     pad: np.ndarray
     marks: dict[str, Any] = field(default_factory=dict)
 
     @property
     def companion(self) -> Companion:
-        return self.seat.companion
+        return self.slot.companion
 
     @property
     def autopilot(self) -> Autopilot:
@@ -102,13 +102,13 @@ class Airfield:
         self.target = Wanderer(self._signing())
         self.tower = Tower(self._signing())
         self.crafts = [self._craft(k, count, sent) for k in range(count)]
-        self.ether = Ether(self._channels(guests, deaf), seed, TICK // 2)
+        self.network = SimulatedNetwork(self._channels(guests, deaf), seed, TICK // 2)
         nodes = [Scheduled(craft.radio, TICK, EPOCH) for craft in self.crafts]
         for k, craft in enumerate(self.crafts):
             clock = NodeClock(250 * (k - 1) * 4, 15.0 * (k - 1), EPOCH)
-            nodes.append(Scheduled(craft.seat, TICK, EPOCH + TICK // 2 * (k % 2), clock))
+            nodes.append(Scheduled(craft.slot, TICK, EPOCH + TICK // 2 * (k % 2), clock))
         nodes += [Scheduled(node, TICK, EPOCH) for node in (self.target, self.tower, *guests)]
-        self.loop = LockStep(nodes, self.ether, TICK // 2)
+        self.loop = LockStep(nodes, self.network, TICK // 2)
 
     def _signing(self) -> Signing | None:
         return None if self._key is None else Signing(self._key)
@@ -135,21 +135,21 @@ class Airfield:
             ),
             self._signing,
         )
-        seat = Seat(
+        slot = Seat(
             lambda: Companion(self.config, system, TARGET, FLEET, lambda: 0, self._signing()),
             lambda now, message: sent(system, now, message),
         )
-        return Craft(system, flavour, radio, seat, pad)
+        return Craft(system, flavour, radio, slot, pad)
 
     def _channels(self, guests: Sequence[Any], deaf: Sequence[str]) -> list[Channel]:
         radio, lan = Faults(delay=20_000, jitter=10_000, loss=0.05), Faults(delay=5_000)
         members: dict[str, dict[str, str]] = {"swarm": {}, "target": {self.target.name: "target"}}
         for craft in self.crafts:
-            seat, system = craft.seat.name, craft.system
-            members["swarm"][seat] = "swarm"
-            members["target"][seat] = "target"
-            members[f"autopilot-{system}"] = {seat: "autopilot", craft.radio.name: "autopilot"}
-            members[f"ground-{system}"] = {seat: "ground", self.tower.name: "ground"}
+            slot, system = craft.slot.name, craft.system
+            members["swarm"][slot] = "swarm"
+            members["target"][slot] = "target"
+            members[f"autopilot-{system}"] = {slot: "autopilot", craft.radio.name: "autopilot"}
+            members[f"ground-{system}"] = {slot: "ground", self.tower.name: "ground"}
         for guest in guests:
             for channel, link in guest.places.items():
                 members[channel][guest.name] = link

@@ -188,24 +188,24 @@ def _plans_again(scene: Scene) -> None:
 
 
 def _hang(scene: Scene) -> None:
-    scene.field.loop.freeze(scene.craft.seat.name)
+    scene.field.loop.freeze(scene.craft.slot.name)
 
 
 def _go_on(scene: Scene) -> None:
-    scene.field.loop.thaw(scene.craft.seat.name)
+    scene.field.loop.thaw(scene.craft.slot.name)
 
 
 def _start_anew(scene: Scene) -> None:
     _go_on(scene)
-    scene.craft.seat.start()
+    scene.craft.slot.start()
 
 
 def _cut(channel: str) -> Callable[[Scene], None]:
-    return lambda scene: scene.field.ether.cut(channel.format(scene.craft.system), [scene.craft.seat.name])
+    return lambda scene: scene.field.network.cut(channel.format(scene.craft.system), [scene.craft.slot.name])
 
 
 def _heal(channel: str) -> Callable[[Scene], None]:
-    return lambda scene: scene.field.ether.heal(channel.format(scene.craft.system), [scene.craft.seat.name])
+    return lambda scene: scene.field.network.heal(channel.format(scene.craft.system), [scene.craft.slot.name])
 
 
 def _silence(scene: Scene) -> None:

@@ -243,7 +243,7 @@ class Siege:
         """Whoever was misled does not know it: its operator does."""
         for craft in self.field.crafts:
             craft.radio.boot()
-            craft.seat.start()
+            craft.slot.start()
 
     def _check_peace(self) -> None:
         """Up and around the target, whatever was before."""
@@ -259,7 +259,7 @@ class Siege:
         if not self.signed and craft.companion.pilot.phase is Phase.DONE:
             # It was told that it has landed, wherever it is: on with the next.
             craft.radio.boot()
-            craft.seat.start()
+            craft.slot.start()
         pilot = craft.companion.pilot
         waits = pilot.phase is Phase.CONNECT and pilot.waiting_for == OPERATORS_GO
         if (waits or pilot.phase is Phase.YIELDED) and now - self._asked.get(craft.system, 0) > 2 * SECOND:

@@ -204,14 +204,14 @@ class Sorties:
     # What follows
 
     def _promise(self, craft: Craft, after: float, what: str, holds: Callable[[], bool | None]) -> None:
-        age = craft.radio.boots, craft.seat.starts
+        age = craft.radio.boots, craft.slot.starts
         self._promises.append(Promise(self.field.loop.now + round(after * 1e6), craft, age, what, holds))
 
     def _ask(self, now: int) -> None:
         due = [promise for promise in self._promises if promise.at <= now]
         self._promises = [promise for promise in self._promises if promise.at > now]
         for _, craft, age, what, holds in due:
-            if (craft.radio.boots, craft.seat.starts) != age:
+            if (craft.radio.boots, craft.slot.starts) != age:
                 continue
             verdict = holds()
             if verdict is not None:
@@ -379,7 +379,7 @@ class Sorties:
         craft.marks.clear()
         craft.radio.boot()
         if craft.companion.pilot.phase is Phase.DONE:
-            craft.seat.start()
+            craft.slot.start()
 
     # What goes wrong
 

@@ -49,7 +49,13 @@ def parts(root: object) -> Iterator[object]:
 
 def weigh(flight: Flight, seconds: float) -> Weighed:
     """All but the truth, which is what a flight is for."""
-    nodes: list[Any] = [*flight.companions, *flight.autopilots, flight.target, flight.operator, flight.ether]
+    nodes: list[Any] = [
+        *flight.companions,
+        *flight.autopilots,
+        flight.target,
+        flight.operator,
+        flight.network,
+    ]
     held = sum(sys.getsizeof(part) for part in parts(nodes))
     return Weighed(seconds, held, sum(companion.tally.plans for companion in flight.companions))
 

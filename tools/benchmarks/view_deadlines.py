@@ -19,7 +19,7 @@ from outrider.simulation.preparation import prepare
 from outrider.swarm import command as swarm
 from outrider.swarm.command import Pace
 from outrider.swarm.show import Show
-from outrider.view.viewer_client import Attendant
+from outrider.view.viewer_client import ViewerClient
 
 VEHICLES = 4
 FLIGHTS = ("without", "with")
@@ -42,11 +42,11 @@ def flight(stack: ExitStack, options: set[str], view: bool, seed: int) -> Punctu
     directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     show = None
     if view:
-        attendant = Attendant(port=18300)
-        stack.callback(attendant.close)
-        show = Show(attendant, watched=False)
+        viewer = ViewerClient(port=18300)
+        stack.callback(viewer.close)
+        show = Show(viewer, watched=False)
         if "--browser" in options:
-            _open(stack, attendant.url)
+            _open(stack, viewer.url)
     pace = Pace(real_time=True, priority="--priority" in options)
     summary = swarm.fly(prepared, seed, directory, lambda _stage, _seconds: None, pace, show)
     misses, steps, late = summary["deadline_misses"], summary["deadline_steps"], summary["lateness_ms"]

@@ -99,7 +99,7 @@ class Denial(NamedTuple):
     reason: str
 
 
-class Flavour(Protocol):
+class Firmware(Protocol):
     """Dialect and rules of one firmware."""
 
     autopilot: int

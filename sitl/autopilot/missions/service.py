@@ -31,7 +31,7 @@ from sitl.autopilot.missions.plans import Plans
 from sitl.autopilot.missions.transfer import Transfer
 from sitl.telemetry import status_reports as q
 from sitl.telemetry.schedule import Telemetry
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 
 # MAV_CMD
 RETURN: Final = 20
@@ -54,7 +54,7 @@ class MissionService:
         commander: Commander,
         telemetry: Telemetry,
         outbox: list[Message],
-        voice: Voice,
+        voice: StatusReporter,
         *,
         asks_int: bool,
     ) -> None:

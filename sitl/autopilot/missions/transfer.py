@@ -36,7 +36,7 @@ from sitl.autopilot.missions.items import (
     whole_fault,
 )
 from sitl.autopilot.missions.plans import Plans
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 
 CAPACITY: Final = 724
 """Greatest number of items of a plan, the capacity of ArduCopter's mission."""
@@ -68,7 +68,7 @@ class Transfer:
     """
 
     def __init__(
-        self, source: Source, plans: Plans, outbox: list[Message], voice: Voice, *, asks_int: bool
+        self, source: Source, plans: Plans, outbox: list[Message], voice: StatusReporter, *, asks_int: bool
     ) -> None:
         self._source = source
         self._plans = plans

@@ -15,7 +15,7 @@ from mavlink_bridge.messages import (
 )
 from sitl.autopilot.parameters.encoding import decoded, encoded
 from sitl.autopilot.parameters.values import Values
-from sitl.telemetry.status_text import Voice
+from sitl.telemetry.status_text import StatusReporter
 
 HASH: Final = "_HASH_CHECK"
 """PX4's name for the hash of all names and values, which lets a client reuse a list that it has."""
@@ -39,7 +39,7 @@ class ParameterProtocol:
         source: Source,
         values: Values,
         outbox: list[Message],
-        voice: Voice,
+        voice: StatusReporter,
         changed: Callable[[], None],
         *,
         bytewise: bool,

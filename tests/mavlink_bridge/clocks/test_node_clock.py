@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
-from mavlink_bridge.network.simulated import Channel, Ether, Faults
+from mavlink_bridge.network.simulated import Channel, Faults, SimulatedNetwork
 from tests.mavlink_bridge.chatter import TICK, Chatter
 from tests.mavlink_bridge.watching import Event, Watcher
 
@@ -28,7 +28,7 @@ clocks = st.builds(NodeClock, offsets, drifts, st.just(EPOCH))
 def loop_of(*scheduled: Scheduled, tick: int = TICK) -> LockStep:
     names = {entry.node.name: "swarm" for entry in scheduled}
     faults = Faults(3000, 9000, 0.1, 0.1, 0.1)
-    return LockStep(scheduled, Ether([Channel("air", names, faults)], 3, tick), tick)
+    return LockStep(scheduled, SimulatedNetwork([Channel("air", names, faults)], 3, tick), tick)
 
 
 # The clock
@@ -115,7 +115,7 @@ def test_phases_of_two_clocks_wander() -> None:
             Scheduled(fast, PERIOD, EPOCH, NodeClock(0, 20.0, EPOCH)),
             Scheduled(slow, PERIOD, EPOCH, NodeClock(0, -20.0, EPOCH)),
         ],
-        Ether([], 1, TICK),
+        SimulatedNetwork([], 1, TICK),
         TICK,
         [clerk],
     )
@@ -135,8 +135,10 @@ def story(clock: NodeClock | None, reverse: bool = False) -> list[Event]:
         for index, name in enumerate(names)
     ]
     watcher = Watcher()
-    ether = Ether([Channel("air", dict.fromkeys(names, "swarm"), Faults(3000, 9000, 0.1, 0.1, 0.1))], 3, TICK)
-    loop = LockStep(scheduled[::-1] if reverse else scheduled, ether, TICK, [watcher])
+    network = SimulatedNetwork(
+        [Channel("air", dict.fromkeys(names, "swarm"), Faults(3000, 9000, 0.1, 0.1, 0.1))], 3, TICK
+    )
+    loop = LockStep(scheduled[::-1] if reverse else scheduled, network, TICK, [watcher])
     loop.run(EPOCH + 2 * SECOND)
     return watcher.events
 

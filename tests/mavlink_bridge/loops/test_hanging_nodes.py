@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
-from mavlink_bridge.network.simulated import Channel, Ether, Faults
+from mavlink_bridge.network.simulated import Channel, Faults, SimulatedNetwork
 from tests.mavlink_bridge.chatter import TICK, Chatter
 
 PERIOD = 2 * TICK
@@ -28,15 +28,15 @@ class Crew:
             Scheduled(self.nodes["c"], 3 * TICK, 0, NodeClock(4000, 5000.0)),
         ]
         channel = Channel("air", dict.fromkeys(NAMES, "swarm"), Faults() if faults is None else faults)
-        self.ether = Ether([channel], 3, TICK)
-        self.loop = LockStep(scheduled[::-1] if reverse else scheduled, self.ether, TICK, (), buffer)
+        self.network = SimulatedNetwork([channel], 3, TICK)
+        self.loop = LockStep(scheduled[::-1] if reverse else scheduled, self.network, TICK, (), buffer)
 
     def run(self, until: int) -> None:
         self.loop.run(until, self._balance)
 
     def _balance(self, _now: int) -> None:
-        sent, delivered, dropped, duplicated, _ = self.ether.counters
-        assert sent + duplicated == delivered + dropped + self.ether.under_way
+        sent, delivered, dropped, duplicated, _ = self.network.counters
+        assert sent + duplicated == delivered + dropped + self.network.under_way
         assert delivered == sum(len(node.heard) for node in self.nodes.values())
 
 
@@ -56,7 +56,7 @@ def test_who_hangs_is_not_called_and_goes_on_with_all_that_waited() -> None:
     first = [data for now, data in a.heard if now == 200 * TICK]
     late = [data for now, data in a_free.heard if 100 * TICK <= now <= 200 * TICK]
     assert [data[:8] for data in first] == [data[:8] for data in late]
-    assert crew.ether.counters.dropped == 0
+    assert crew.network.counters.dropped == 0
 
 
 @given(st.integers(0, 60), st.integers(0, 100))
@@ -66,9 +66,9 @@ def test_a_full_buffer_drops_the_newest(buffer: int, length: int) -> None:
     ears = []
     for hangs in (False, True):
         ear = Chatter("ear")
-        ether = Ether([Channel("air", {"mouth": "swarm", "ear": "swarm"})], 3, TICK)
+        network = SimulatedNetwork([Channel("air", {"mouth": "swarm", "ear": "swarm"})], 3, TICK)
         scheduled = [Scheduled(Chatter("mouth"), TICK), Scheduled(ear, 3 * TICK)]
-        loop = LockStep(scheduled, ether, TICK, (), buffer)
+        loop = LockStep(scheduled, network, TICK, (), buffer)
         loop.run(20 * TICK)
         if hangs:
             loop.freeze("ear")
@@ -84,7 +84,7 @@ def test_a_full_buffer_drops_the_newest(buffer: int, length: int) -> None:
     waited = [(back, data) for now, data in heard if now in missed or now == back]
     expected = [entry for entry in heard if entry[0] not in [*missed, back]] + waited[:buffer]
     assert [(now, data[:8]) for now, data in hung.heard] == sorted(expected)
-    assert ether.counters.dropped == max(len(waited) - buffer, 0) * bool(missed)
+    assert network.counters.dropped == max(len(waited) - buffer, 0) * bool(missed)
 
 
 def test_who_vanishes_is_silent_and_deaf_for_ever() -> None:
@@ -102,9 +102,9 @@ def test_who_vanishes_is_silent_and_deaf_for_ever() -> None:
     assert all(crew.nodes[name].steps == free.nodes[name].steps for name in "ab")
     # Two others talk every other tick; what reached c after its last call is dropped but for what is on its
     # way.
-    counters = crew.ether.counters
-    assert counters.dropped + crew.ether.under_way > 145
-    assert crew.ether.under_way < 12
+    counters = crew.network.counters
+    assert counters.dropped + crew.network.under_way > 145
+    assert crew.network.under_way < 12
     crew.loop.thaw("c")
     crew.loop.freeze("c")
     crew.loop.thaw("c")
@@ -121,8 +121,8 @@ def test_to_vanish_is_to_hang_for_ever_without_a_buffer() -> None:
     for until in range(61, 100):
         for crew in (gone, hung):
             crew.run(until * TICK)
-        assert gone.ether.counters == hung.ether.counters
-        assert gone.ether.under_way == hung.ether.under_way
+        assert gone.network.counters == hung.network.counters
+        assert gone.network.under_way == hung.network.under_way
 
 
 events = st.lists(
@@ -141,7 +141,7 @@ def flight(what: list[tuple[int, str, str]], reverse: bool) -> tuple[object, ...
         crew.run(tick * TICK)
         getattr(crew.loop, action)(name)
     crew.run(200 * TICK)
-    return [(node.steps, node.heard) for node in crew.nodes.values()], crew.ether.counters
+    return [(node.steps, node.heard) for node in crew.nodes.values()], crew.network.counters
 
 
 @given(events)

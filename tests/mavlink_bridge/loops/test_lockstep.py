@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mavlink_bridge.errors import ScheduleError
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
-from mavlink_bridge.network.simulated import Channel, Ether, Faults
+from mavlink_bridge.network.simulated import Channel, Faults, SimulatedNetwork
 from tests.mavlink_bridge.chatter import TICK, Chatter
 from tests.mavlink_bridge.watching import Event, Watcher
 
@@ -21,8 +21,10 @@ def crew(names: str, period: int = 4 * TICK) -> list[Scheduled]:
     return [Scheduled(Chatter(name), period, index * TICK) for index, name in enumerate(names)]
 
 
-def air(scheduled: list[Scheduled], faults: Faults = CLEAN) -> Ether:
-    return Ether([Channel("air", {entry.node.name: "swarm" for entry in scheduled}, faults)], 3, TICK)
+def air(scheduled: list[Scheduled], faults: Faults = CLEAN) -> SimulatedNetwork:
+    return SimulatedNetwork(
+        [Channel("air", {entry.node.name: "swarm" for entry in scheduled}, faults)], 3, TICK
+    )
 
 
 @given(
@@ -61,9 +63,9 @@ def flight(order: list[int]) -> tuple[list[Event], tuple[int, ...]]:
     ]
     scheduled = [everyone[index] for index in order]
     watcher = Watcher()
-    ether = air(scheduled, Faults(delay=3000, jitter=9000, loss=0.1, duplication=0.1, reordering=0.1))
-    LockStep(scheduled, ether, TICK, [watcher]).run(60 * TICK)
-    return watcher.events, tuple(ether.counters)
+    network = air(scheduled, Faults(delay=3000, jitter=9000, loss=0.1, duplication=0.1, reordering=0.1))
+    LockStep(scheduled, network, TICK, [watcher]).run(60 * TICK)
+    return watcher.events, tuple(network.counters)
 
 
 @given(st.permutations(range(6)))

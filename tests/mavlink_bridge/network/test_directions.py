@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.network.channel import Direction
-from mavlink_bridge.network.simulated import Channel, Ether, EtherCounters, Faults
+from mavlink_bridge.network.simulated import Channel, Faults, NetworkCounters, SimulatedNetwork
 from mavlink_bridge.node import Datagram
 
 TICK = 2500
@@ -34,22 +34,24 @@ def channel(
 
 
 def story(
-    of: Channel, steps: int = 100, meddle: Callable[[int, Ether], None] = lambda _step, _ether: None
-) -> tuple[Heard, EtherCounters]:
+    of: Channel,
+    steps: int = 100,
+    meddle: Callable[[int, SimulatedNetwork], None] = lambda _step, _network: None,
+) -> tuple[Heard, NetworkCounters]:
     """Everyone talks in every step; ``meddle`` then does what it likes. The books balance all the time."""
-    ether = Ether([of], 5, TICK)
+    network = SimulatedNetwork([of], 5, TICK)
     heard: Heard = {(a, b): [] for a in NAMES for b in NAMES if a != b}
     for step in range(steps):
         now = step * TICK
         for receiver in of.members:
-            for _, data in ether.receive(now, receiver):
+            for _, data in network.receive(now, receiver):
                 heard[data[:1].decode(), receiver].append((now, data))
         for sender in of.members:
-            ether.send(now, sender, [Datagram("swarm", f"{sender}{step}".encode())])
-        meddle(step, ether)
-        sent, delivered, dropped, duplicated, _ = ether.counters
-        assert sent + duplicated == delivered + dropped + ether.under_way
-    return heard, ether.counters
+            network.send(now, sender, [Datagram("swarm", f"{sender}{step}".encode())])
+        meddle(step, network)
+        sent, delivered, dropped, duplicated, _ = network.counters
+        assert sent + duplicated == delivered + dropped + network.under_way
+    return heard, network.counters
 
 
 # Directions
@@ -112,7 +114,7 @@ def test_a_direction_may_be_dead_while_the_way_back_is_clean() -> None:
 )
 def test_overrides_that_make_no_sense_are_refused(overrides: dict[Direction, Faults], naming: str) -> None:
     with pytest.raises(BridgeError, match=naming):
-        Ether([channel(overrides=overrides)], 1, TICK)
+        SimulatedNetwork([channel(overrides=overrides)], 1, TICK)
 
 
 # Cuts
@@ -124,29 +126,29 @@ def test_a_cut_with_an_end_is_as_one_that_is_healed_then(begin: int, length: int
     """Made after step k − 1, until step k + n or healed after step k + n − 1: the same bytes."""
     end = (begin + 1 + length) * TICK
 
-    def bounded(step: int, ether: Ether) -> None:
+    def bounded(step: int, network: SimulatedNetwork) -> None:
         if step == begin:
-            ether.cut("air", members, end)
+            network.cut("air", members, end)
 
-    def healed(step: int, ether: Ether) -> None:
+    def healed(step: int, network: SimulatedNetwork) -> None:
         if step == begin:
-            ether.cut(None, members)
+            network.cut(None, members)
         if step == begin + length:
-            ether.heal()
+            network.heal()
 
     assert story(channel(), meddle=bounded) == story(channel(), meddle=healed)
 
 
 def test_cuts_add_up_and_each_is_healed_by_its_own_name() -> None:
-    def meddle(step: int, ether: Ether) -> None:
+    def meddle(step: int, network: SimulatedNetwork) -> None:
         if step == 9:
-            ether.cut(None, "a")
-            ether.cut("air", "ab", 60 * TICK)
+            network.cut(None, "a")
+            network.cut("air", "ab", 60 * TICK)
         if step == 39:
-            ether.heal("air", "a")
-            ether.heal(None, "c")
+            network.heal("air", "a")
+            network.heal(None, "c")
         if step == 79:
-            ether.heal(None, "a")
+            network.heal(None, "a")
 
     heard, _ = story(channel(Faults()), 120, meddle)
     sent = {path: {int(data[1:]) for _, data in all_heard} for path, all_heard in heard.items()}
@@ -157,20 +159,20 @@ def test_cuts_add_up_and_each_is_healed_by_its_own_name() -> None:
 
 
 def test_a_cut_of_one_channel_leaves_the_others() -> None:
-    ether = Ether([Channel(name, dict.fromkeys("ab", name)) for name in ("x", "y")], 1, TICK)
-    ether.cut("x", "a")
-    ether.send(0, "a", [Datagram("x", b"1"), Datagram("y", b"2")])
-    ether.send(0, "b", [Datagram("x", b"3"), Datagram("y", b"4")])
-    assert ether.receive(TICK, "b") == [Datagram("y", b"2")]
-    assert ether.receive(TICK, "a") == [Datagram("y", b"4")]
+    network = SimulatedNetwork([Channel(name, dict.fromkeys("ab", name)) for name in ("x", "y")], 1, TICK)
+    network.cut("x", "a")
+    network.send(0, "a", [Datagram("x", b"1"), Datagram("y", b"2")])
+    network.send(0, "b", [Datagram("x", b"3"), Datagram("y", b"4")])
+    assert network.receive(TICK, "b") == [Datagram("y", b"2")]
+    assert network.receive(TICK, "a") == [Datagram("y", b"4")]
 
 
 def test_cuts_of_what_is_not_there_are_refused() -> None:
-    ether = Ether([channel()], 1, TICK)
+    network = SimulatedNetwork([channel()], 1, TICK)
     with pytest.raises(BridgeError, match="'fog'; there are air"):
-        ether.cut("fog", "a")
+        network.cut("fog", "a")
     with pytest.raises(BridgeError, match="'x'; there are a, b, c, d"):
-        ether.cut(None, "ax")
+        network.cut(None, "ax")
 
 
 @given(st.permutations(NAMES))
@@ -178,9 +180,9 @@ def test_cuts_of_what_is_not_there_are_refused() -> None:
 def test_the_order_of_members_makes_no_difference(order: list[str]) -> None:
     overrides: dict[Direction, Faults] = {("a", None): HARSH._replace(loss=0.5, burst=4.0), (None, "c"): DEAF}
 
-    def meddle(step: int, ether: Ether) -> None:
+    def meddle(step: int, network: SimulatedNetwork) -> None:
         if step == 20:
-            ether.cut("air", "d", 50 * TICK)
+            network.cut("air", "d", 50 * TICK)
 
     expected = story(channel(overrides=overrides), meddle=meddle)
     assert story(channel(overrides=overrides, order="".join(order)), meddle=meddle) == expected
@@ -191,10 +193,10 @@ def test_the_order_of_members_makes_no_difference(order: list[str]) -> None:
 
 def losses(faults: Faults, count: int) -> list[bool]:
     """Of so many datagrams on one path, which were lost."""
-    ether = Ether([Channel("air", {"a": "swarm", "b": "swarm"}, faults)], 3, TICK)
+    network = SimulatedNetwork([Channel("air", {"a": "swarm", "b": "swarm"}, faults)], 3, TICK)
     for number in range(count):
-        ether.send(number * TICK, "a", [Datagram("swarm", number.to_bytes(4, "big"))])
-    arrived = {int.from_bytes(data, "big") for _, data in ether.receive((count + 1) * TICK, "b")}
+        network.send(number * TICK, "a", [Datagram("swarm", number.to_bytes(4, "big"))])
+    arrived = {int.from_bytes(data, "big") for _, data in network.receive((count + 1) * TICK, "b")}
     return [number not in arrived for number in range(count)]
 
 
@@ -220,7 +222,7 @@ def test_bursts_at_the_ends() -> None:
 @pytest.mark.parametrize(("loss", "burst"), [(0.1, 0.5), (0.1, -1.0), (0.8, 3.9), (0.1, float("nan"))])
 def test_bursts_that_cannot_be_are_refused(loss: float, burst: float) -> None:
     with pytest.raises(BridgeError, match="burst"):
-        Ether([channel(Faults(loss=loss, burst=burst))], 1, TICK)
+        SimulatedNetwork([channel(Faults(loss=loss, burst=burst))], 1, TICK)
 
 
 # Buffers
@@ -228,28 +230,28 @@ def test_bursts_that_cannot_be_are_refused(loss: float, burst: float) -> None:
 
 @given(st.integers(0, 12), st.lists(st.integers(0, 30), min_size=1, max_size=5))
 def test_a_buffer_keeps_the_oldest_however_often_it_is_filled(room: int, looks: list[int]) -> None:
-    ether = Ether([Channel("air", {"a": "swarm", "b": "swarm"})], 1, TICK)
+    network = SimulatedNetwork([Channel("air", {"a": "swarm", "b": "swarm"})], 1, TICK)
     for number in range(20):
-        ether.send(number * TICK, "a", [Datagram("swarm", bytes([number]))])
+        network.send(number * TICK, "a", [Datagram("swarm", bytes([number]))])
     for look in sorted(looks):
-        ether.keep(look * TICK, "b", room)
-    arrived = [data[0] for _, data in ether.receive(30 * TICK, "b")]
+        network.keep(look * TICK, "b", room)
+    arrived = [data[0] for _, data in network.receive(30 * TICK, "b")]
     assert arrived == list(range(20))[:room]
-    assert ether.counters == (20, len(arrived), 20 - len(arrived), 0, 0)
-    ether.send(30 * TICK, "a", [Datagram("swarm", b"x")] * 20)
-    assert len(ether.receive(31 * TICK, "b")) == 20
-    assert ether.under_way == 0
+    assert network.counters == (20, len(arrived), 20 - len(arrived), 0, 0)
+    network.send(30 * TICK, "a", [Datagram("swarm", b"x")] * 20)
+    assert len(network.receive(31 * TICK, "b")) == 20
+    assert network.under_way == 0
 
 
 def test_a_run_with_everything_is_the_same_again() -> None:
-    def meddle(step: int, ether: Ether) -> None:
+    def meddle(step: int, network: SimulatedNetwork) -> None:
         chance = random.Random(step)
         if chance.random() < 0.2:
-            ether.cut(None, chance.sample(NAMES, 2), (step + chance.randrange(20)) * TICK)
+            network.cut(None, chance.sample(NAMES, 2), (step + chance.randrange(20)) * TICK)
         if chance.random() < 0.2:
-            ether.keep(step * TICK, chance.choice(NAMES), chance.randrange(4))
+            network.keep(step * TICK, chance.choice(NAMES), chance.randrange(4))
         if chance.random() < 0.05:
-            ether.heal()
+            network.heal()
 
     first = story(channel(overrides={("a", None): HARSH._replace(loss=0.4, burst=3.0)}), 300, meddle)
     assert first == story(channel(overrides={("a", None): HARSH._replace(loss=0.4, burst=3.0)}), 300, meddle)

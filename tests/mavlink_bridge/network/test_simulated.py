@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mavlink_bridge.errors import BridgeError
-from mavlink_bridge.network.simulated import Channel, Ether, Faults
+from mavlink_bridge.network.simulated import Channel, Faults, SimulatedNetwork
 from mavlink_bridge.node import Datagram
 
 TICK = 2500
@@ -24,43 +24,43 @@ def numbered(number: int, link: str = "swarm") -> list[Datagram]:
 
 def one_way(
     faults: Faults, count: int, seed: int = 1, spacing: int = 10_000
-) -> tuple[Ether, list[tuple[int, int]]]:
+) -> tuple[SimulatedNetwork, list[tuple[int, int]]]:
     """Send ``count`` numbered datagrams from a to b; (time of reception, number) of what arrives."""
-    ether = Ether([Channel("air", {"a": "swarm", "b": "swarm"}, faults)], seed, TICK)
+    network = SimulatedNetwork([Channel("air", {"a": "swarm", "b": "swarm"}, faults)], seed, TICK)
     arrived = []
     for now in range(0, count * spacing + 10_000_000, TICK):
-        arrived += [(now, int.from_bytes(data, "big")) for _, data in ether.receive(now, "b")]
+        arrived += [(now, int.from_bytes(data, "big")) for _, data in network.receive(now, "b")]
         if now % spacing == 0 and now // spacing < count:
-            ether.send(now, "a", numbered(now // spacing))
-    return ether, arrived
+            network.send(now, "a", numbered(now // spacing))
+    return network, arrived
 
 
 def test_a_member_reaches_every_other_under_their_own_link() -> None:
-    ether = Ether([Channel("air", CREW)], 1, TICK)
-    ether.send(0, "a", numbered(7))
-    assert [ether.receive(TICK - 1, name) for name in CREW] == [[], [], []]
-    assert ether.receive(TICK, "a") == []
-    assert ether.receive(TICK, "b") == numbered(7, "radio")
-    assert ether.receive(TICK, "c") == numbered(7)
-    assert ether.receive(TICK, "c") == []
-    assert ether.receive(TICK, "nobody") == []
+    network = SimulatedNetwork([Channel("air", CREW)], 1, TICK)
+    network.send(0, "a", numbered(7))
+    assert [network.receive(TICK - 1, name) for name in CREW] == [[], [], []]
+    assert network.receive(TICK, "a") == []
+    assert network.receive(TICK, "b") == numbered(7, "radio")
+    assert network.receive(TICK, "c") == numbered(7)
+    assert network.receive(TICK, "c") == []
+    assert network.receive(TICK, "nobody") == []
 
 
 def test_channels_do_not_mix_and_links_without_channel_go_nowhere() -> None:
     wires = [Channel(f"wire-{name}", {name: "autopilot", f"pilot-{name}": "companion"}) for name in "ab"]
-    ether = Ether([*wires, Channel("air", CREW)], 1, TICK)
-    ether.send(0, "a", numbered(1, "autopilot") + numbered(2, "nothing"))
-    assert ether.receive(TICK, "pilot-a") == numbered(1, "companion")
-    assert [ether.receive(TICK, name) for name in ("pilot-b", "b", "c")] == [[], [], []]
-    assert ether.counters.unrouted == 1
+    network = SimulatedNetwork([*wires, Channel("air", CREW)], 1, TICK)
+    network.send(0, "a", numbered(1, "autopilot") + numbered(2, "nothing"))
+    assert network.receive(TICK, "pilot-a") == numbered(1, "companion")
+    assert [network.receive(TICK, name) for name in ("pilot-b", "b", "c")] == [[], [], []]
+    assert network.counters.unrouted == 1
 
 
 def test_arrivals_are_ordered_by_time_then_sender_then_sequence() -> None:
-    ether = Ether([Channel("air", dict.fromkeys("dcba", "swarm"))], 1, TICK)
+    network = SimulatedNetwork([Channel("air", dict.fromkeys("dcba", "swarm"))], 1, TICK)
     for sender in "cab":
-        ether.send(0, sender, numbered(ord(sender)) + numbered(ord(sender) + 100))
-    ether.send(1, "a", numbered(0))
-    values = [int.from_bytes(data, "big") for _, data in ether.receive(10 * TICK, "d")]
+        network.send(0, sender, numbered(ord(sender)) + numbered(ord(sender) + 100))
+    network.send(1, "a", numbered(0))
+    values = [int.from_bytes(data, "big") for _, data in network.receive(10 * TICK, "d")]
     assert values == [97, 197, 98, 198, 99, 199, 0]
 
 
@@ -75,29 +75,29 @@ SOME_FAULTS = any_faults(st.floats(0, 1), st.just(0.0)) | any_faults(st.floats(0
 @given(SOME_FAULTS, st.integers(0, 2**32))
 @settings(max_examples=30)
 def test_nothing_is_early_and_the_books_balance(faults: Faults, seed: int) -> None:
-    ether = Ether([Channel("air", CREW, faults)], seed, TICK)
+    network = SimulatedNetwork([Channel("air", CREW, faults)], seed, TICK)
     delivered = 0
     for step in range(60):
         now = step * TICK
         for name in CREW:
-            for _, data in ether.receive(now, name):
+            for _, data in network.receive(now, name):
                 delivered += 1
                 assert now - int.from_bytes(data, "big") * TICK >= max(faults.delay, TICK)
         for name, link in CREW.items():
-            ether.send(now, name, numbered(step, link))
-        sent, got, dropped, duplicated, unrouted = ether.counters
-        assert sent + duplicated == got + dropped + ether.under_way
+            network.send(now, name, numbered(step, link))
+        sent, got, dropped, duplicated, unrouted = network.counters
+        assert sent + duplicated == got + dropped + network.under_way
         assert (sent, got, unrouted) == (3 * 2 * (step + 1), delivered, 0)
 
 
 def test_loss_and_duplication_are_as_frequent_as_said() -> None:
     """Bounds of five standard deviations of the binomial."""
     count = 4000
-    ether, arrived = one_way(Faults(loss=0.2, duplication=0.1), count)
-    assert abs(ether.counters.dropped - 0.2 * count) < 5 * (count * 0.2 * 0.8) ** 0.5
-    survivors = count - ether.counters.dropped
-    assert abs(ether.counters.duplicated - 0.1 * survivors) < 5 * (survivors * 0.1 * 0.9) ** 0.5
-    assert len(arrived) == survivors + ether.counters.duplicated
+    network, arrived = one_way(Faults(loss=0.2, duplication=0.1), count)
+    assert abs(network.counters.dropped - 0.2 * count) < 5 * (count * 0.2 * 0.8) ** 0.5
+    survivors = count - network.counters.dropped
+    assert abs(network.counters.duplicated - 0.1 * survivors) < 5 * (survivors * 0.1 * 0.9) ** 0.5
+    assert len(arrived) == survivors + network.counters.duplicated
 
 
 def test_all_or_nothing() -> None:
@@ -126,38 +126,38 @@ def test_reordering_lets_the_next_one_pass_whatever_the_spacing() -> None:
 
 
 def test_a_partition_cuts_both_ways_while_it_lasts_and_only_across() -> None:
-    ether = Ether([Channel("air", CREW, Faults())], 1, TICK)
+    network = SimulatedNetwork([Channel("air", CREW, Faults())], 1, TICK)
     heard: dict[tuple[str, str], set[int]] = {}
     for step in range(300):
         if step == 100:
-            ether.cut("air", {"a"})
+            network.cut("air", {"a"})
         if step == 200:
-            ether.heal("air", {"a"})
+            network.heal("air", {"a"})
         for receiver in CREW:
-            for _, data in ether.receive(step * TICK, receiver):
+            for _, data in network.receive(step * TICK, receiver):
                 heard.setdefault((data[:1].decode(), receiver), set()).add(int.from_bytes(data[1:], "big"))
         for sender, link in CREW.items():
-            ether.send(step * TICK, sender, [Datagram(link, sender.encode() + step.to_bytes(4, "big"))])
+            network.send(step * TICK, sender, [Datagram(link, sender.encode() + step.to_bytes(4, "big"))])
     whole, outside = set(range(299)), set(range(100)) | set(range(200, 299))
     for (sender, receiver), steps in heard.items():
         assert steps == (outside if "a" in (sender, receiver) else whole)
-    assert ether.counters.dropped == 100 * 4
+    assert network.counters.dropped == 100 * 4
 
 
 HARSH = Faults(delay=5000, jitter=9000, loss=0.2, duplication=0.1, reordering=0.2)
 
 
 def story(names: list[str], seed: int, channels: list[str]) -> dict[str, list[tuple[int, str, bytes]]]:
-    ether = Ether(
+    network = SimulatedNetwork(
         [Channel(channel, dict.fromkeys(names, channel), HARSH) for channel in channels], seed, TICK
     )
     heard: dict[str, list[tuple[int, str, bytes]]] = {name: [] for name in names}
     for step in range(80):
         now = step * TICK
         for name in names:
-            heard[name] += [(now, *datagram) for datagram in ether.receive(now, name)]
+            heard[name] += [(now, *datagram) for datagram in network.receive(now, name)]
         for name in names:
-            ether.send(now, name, [Datagram(channel, f"{name}{step}".encode()) for channel in ("x", "y")])
+            network.send(now, name, [Datagram(channel, f"{name}{step}".encode()) for channel in ("x", "y")])
     return heard
 
 
@@ -191,9 +191,9 @@ def test_another_seed_is_another_story_and_paths_are_independent() -> None:
 )
 def test_faults_that_make_no_sense_are_refused(faults: Faults) -> None:
     with pytest.raises(BridgeError, match="air"):
-        Ether([Channel("air", CREW, faults)], 1, TICK)
+        SimulatedNetwork([Channel("air", CREW, faults)], 1, TICK)
 
 
 def test_channel_names_are_unique() -> None:
     with pytest.raises(BridgeError, match="air"):
-        Ether([Channel("air", CREW), Channel("air", CREW)], 1, TICK)
+        SimulatedNetwork([Channel("air", CREW), Channel("air", CREW)], 1, TICK)

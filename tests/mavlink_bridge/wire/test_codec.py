@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -165,10 +166,20 @@ def test_round_trip(message: m.Message) -> None:
     assert Codec().feed(wire(message)) == [message]
 
 
+def in_floats(message: m.Message) -> m.Message:
+    """What is left of SIM_STATE without its extension fields: degrees as float32."""
+    if not isinstance(message, m.SimulationState):
+        return message
+    latitude, longitude = (
+        round(float(np.float32(value)) * 1e7) / 1e7 for value in (message.latitude, message.longitude)
+    )
+    return message._replace(latitude=latitude, longitude=longitude)
+
+
 @given(st.one_of(*(kind for of, kind in KINDS.items() if BY_TYPE[of].id < 256)))
 def test_round_trip_in_version_1_keeps_all_but_extension_fields(message: m.Message) -> None:
     (back,) = Codec().feed(Codec().encode_v1(message))
-    assert back == message._replace(**EXTENSIONS.get(type(message), {}))
+    assert back == in_floats(message)._replace(**EXTENSIONS.get(type(message), {}))
 
 
 def test_version_1_has_no_long_message_ids() -> None:

@@ -32,8 +32,8 @@ from outrider.fly.process_channel import intercom
 from outrider.fly.request import Request
 from outrider.fly.worker import Worker
 from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
-from outrider.supervision.duplicate_ids import Twin
-from outrider.supervision.supervised_node import Cockpit
+from outrider.supervision.duplicate_ids import DuplicateIds
+from outrider.supervision.supervised_node import SupervisedNode
 
 ORIGIN = (47.4, 8.5, 488.0)
 CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))
@@ -75,7 +75,7 @@ def test_a_dry_run_speaks_in_nobodys_name(orders: list[int]) -> None:
     """The companion may be there as well, and be the one that is asked."""
     node = DryRun(CONFIG.settings, 1, 100, FleetFrame(*ORIGIN), time.thread_time_ns)
     clock = SimulatedClock(1_000_000)
-    cockpit = Cockpit(node, clock, FollowedClock(clock), None)
+    supervised = SupervisedNode(node, clock, FollowedClock(clock), None)
     codec, said = Codec(), []
     for k in range(200):
         stamp = 5_000_000 + 10_000 * k
@@ -86,7 +86,7 @@ def test_a_dry_run_speaks_in_nobodys_name(orders: list[int]) -> None:
         if k == 150:
             asked = [CommandLong(Source(255, 190), 1, COMPONENT, order, 0, (5.0,) * 7) for order in orders]
             inbox += [Datagram("ground", codec.encode(order)) for order in asked]
-        for datagram in cockpit.step(clock.now(), inbox):
+        for datagram in supervised.step(clock.now(), inbox):
             said += Codec().feed(datagram.data)
         clock.wait_until(clock.now() + 10_000)
     assert any(isinstance(message, Heartbeat) for message in said)
@@ -117,7 +117,7 @@ def test_who_follows_a_process_signs_after_it() -> None:
     """A simulation's time, and with it the stamps, may have run ahead of the wall's by hours."""
     key = Key(bytes(range(32)))
     desk, link = intercom()
-    worker = Worker(Request(CONFIG, "px4", {}, key=key), {}, Twin(1, SimulatedClock(1)), link, Path())
+    worker = Worker(Request(CONFIG, "px4", {}, key=key), {}, DuplicateIds(1, SimulatedClock(1)), link, Path())
     before, ear = Signing(key), Codec(None, Signing(key))
     before.present(EPOCH + 7_200_000_000)
     beat = Heartbeat(Source(1, COMPONENT), 18, 8, 0, 0, 4)

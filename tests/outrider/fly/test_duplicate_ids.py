@@ -26,12 +26,12 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import Header
 from outrider.fly.orders import Orders
-from outrider.fly.status import News
-from outrider.fly.transmit_statistics import Departures
+from outrider.fly.status import StatusReports
+from outrider.fly.transmit_statistics import TransmitStatistics
 from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
-from outrider.supervision.duplicate_ids import REMEMBERED, Twin
-from outrider.supervision.supervised_node import CLOCK, TWIN, Cockpit
-from outrider.supervision.takeoff_inhibit import Gate
+from outrider.supervision.duplicate_ids import REMEMBERED, DuplicateIds
+from outrider.supervision.supervised_node import CLOCK, TWIN, SupervisedNode
+from outrider.supervision.takeoff_inhibit import TakeoffInhibit
 from tests.companion.bench import FLEET, PROFILES, START, SYSTEM, TARGET, TICK, PerfectAutopilot
 
 SECOND = 1_000_000
@@ -44,9 +44,9 @@ class Air:
 
     def __init__(self) -> None:
         self.clock = SimulatedClock(SECOND)
-        self.twin = Twin(1, self.clock)
+        self.duplicates = DuplicateIds(1, self.clock)
         own, self.far = memory_pair()
-        dealer = Dealer(own, {"swarm": lambda _header: True}, self.twin)
+        dealer = Dealer(own, {"swarm": lambda _header: True}, self.duplicates)
         self.end = dealer.ends["swarm"]
         self._codec, self._other = Codec(), Codec()
 
@@ -74,36 +74,36 @@ class Air:
 def test_who_speaks_with_the_own_ids_is_found(source: Source | None, found: bool) -> None:
     air = Air()
     air.pass_by(30.0)
-    assert not air.twin.seen
+    assert not air.duplicates.seen
     air.pass_by(4.0, source)
-    assert air.twin.seen == found
+    assert air.duplicates.seen == found
     air.pass_by(20.0)
-    assert not air.twin.seen
+    assert not air.duplicates.seen
 
 
 def test_what_is_said_again_is_remembered_as_long_as_what_is_new() -> None:
     air = Air()
     codec = Codec()
     again = codec.encode(air.position(OWN))
-    air.twin.said(again)
+    air.duplicates.said(again)
     for k in range(2 * REMEMBERED):
-        air.twin.said(codec.encode(air.position(OWN)._replace(altitude=0.01 * k)))
+        air.duplicates.said(codec.encode(air.position(OWN)._replace(altitude=0.01 * k)))
         if k % (3 * REMEMBERED // 4) == 0:
-            air.twin.said(again)
+            air.duplicates.said(again)
             latest = k
         if k == latest + REMEMBERED // 2:
             # It comes back: for two seconds, as often as one likes.
             for _ in range(30):
-                air.twin.heard(Header(*OWN, 33), again)
+                air.duplicates.heard(Header(*OWN, 33), again)
                 air.clock.wait_until(air.clock.now() + 100_000)
-            assert not air.twin.seen
+            assert not air.duplicates.seen
 
 
 def test_what_was_said_before_this_process_and_comes_late_is_nobody() -> None:
     air = Air()
     air.pass_by(1.0, OWN)
     air.pass_by(1.0)
-    assert not air.twin.seen
+    assert not air.duplicates.seen
 
 
 @pytest.mark.parametrize("kind", [Companion, DryRun])
@@ -112,18 +112,18 @@ def test_a_dry_run_beside_the_companion_is_no_alarm(kind: type[Companion]) -> No
     air = Air()
     settings = CompanionConfig.model_validate({"voice": {"texts": True}})
     node = kind(settings, 1, 100, FleetFrame(47.4, 8.5, 488.0), time.thread_time_ns)
-    cockpit = Cockpit(node, air.clock, None, None, air.twin)
+    supervised = SupervisedNode(node, air.clock, None, None, air.duplicates)
     told: list[dict[str, object]] = []
-    departures = Departures(settings.limits)
-    news = News(cockpit, departures, None, None, lambda **one: told.append(one))
+    departures = TransmitStatistics(settings.limits)
+    news = StatusReports(supervised, departures, None, None, lambda **one: told.append(one))
     said: list[Message] = []
     for _ in range(50):
         air.pass_by(0.2, OWN._replace())
-        said += [m for d in cockpit.step(air.clock.now(), []) for m in Codec().feed(d.data)]
+        said += [m for d in supervised.step(air.clock.now(), []) for m in Codec().feed(d.data)]
         news.look(air.clock.now(), air.clock.now())
-    assert air.twin.seen
+    assert air.duplicates.seen
     alarm = kind is Companion
-    assert bool(cockpit.barred) == alarm
+    assert bool(supervised.barred) == alarm
     assert any(one.get("what") == "critical" for one in told) == alarm
     assert any(isinstance(message, StatusText) for message in said) == alarm
 
@@ -132,10 +132,13 @@ def test_a_dry_run_beside_the_companion_is_no_alarm(kind: type[Companion]) -> No
 def test_a_go_that_waits_ends_where_a_twin_is_found(beside: bool) -> None:
     """It was given before anybody knew."""
     wall = SimulatedClock(START)
-    twin = Twin(SYSTEM, wall)
+    duplicates = DuplicateIds(SYSTEM, wall)
     settings = CompanionConfig.model_validate({"task": "goto"})
     node = Companion(settings, SYSTEM, TARGET, FLEET, time.thread_time_ns)
-    cockpit, autopilot = Cockpit(node, wall, None, None, twin), PerfectAutopilot(PROFILES["px4"], (0, 0, 0))
+    supervised, autopilot = (
+        SupervisedNode(node, wall, None, None, duplicates),
+        PerfectAutopilot(PROFILES["px4"], (0, 0, 0)),
+    )
     go = Datagram("ground", Orders(SYSTEM, 5.0).frame("go"))
     own, header = Source(SYSTEM, COMPONENT), Header(SYSTEM, COMPONENT, 33)
     back, answers, codec = b"", [], Codec()
@@ -144,11 +147,11 @@ def test_a_go_that_waits_ends_where_a_twin_is_found(beside: bool) -> None:
         now = wall.now()
         if beside and tick % 20 == 0:
             said = GlobalPosition(own, tick, 47.4, 8.5, 500.0, 12.0, (0.0, 0.0, 0.0), None)
-            twin.heard(header, codec.encode(said))
+            duplicates.heard(header, codec.encode(said))
         # Not ready for want of a position until the twin is known, and ready then.
         autopilot.mute = tick < 400
         inbox = [Datagram("autopilot", autopilot.step(now, back)), *([go] if tick == 100 else [])]
-        told = cockpit.step(now, inbox)
+        told = supervised.step(now, inbox)
         back = b"".join(datagram.data for datagram in told if datagram.link == "autopilot")
         said_back = [m for d in told if d.link == "ground" for m in Codec().feed(d.data)]
         answers += [message.result for message in said_back if isinstance(message, CommandAck)]
@@ -160,10 +163,10 @@ def test_a_go_that_waits_ends_where_a_twin_is_found(beside: bool) -> None:
         # Nor is it obeyed when the other has fallen silent.
         wall.wait_until(wall.now() + 20 * SECOND)
         for _ in range(300):
-            told = cockpit.step(wall.now(), [Datagram("autopilot", autopilot.step(wall.now(), back))])
+            told = supervised.step(wall.now(), [Datagram("autopilot", autopilot.step(wall.now(), back))])
             back = b"".join(datagram.data for datagram in told if datagram.link == "autopilot")
             wall.wait_until(wall.now() + TICK)
-        assert not cockpit.barred
+        assert not supervised.barred
         assert node.pilot.waiting_for == OPERATORS_GO
 
 
@@ -188,7 +191,7 @@ def test_a_closed_gate_keeps_goes_and_nothing_else(
     codec, messages = Codec(), [order(*one) for one in orders]
     data = b"".join(codec.encode(message) for message in messages)
     inbox = [Datagram("swarm", data), Datagram("ground", data + garbage)]
-    passed, answers = Gate(1, None).closed(inbox)
+    passed, answers = TakeoffInhibit(1, None).closed(inbox)
     goes = [one for one in orders if one == (NAV_TAKEOFF, 1, COMPONENT)]
     rest = [m for m in messages if (m.command, m.target_system, m.target_component) != (NAV_TAKEOFF, *OWN)]
     assert passed[0] == inbox[0]
@@ -204,20 +207,20 @@ def test_no_go_is_taken_before_the_clock_is_known_nor_beside_a_twin() -> None:
     node.pilot.phase = Phase.HOLD
     go = Datagram("ground", Orders(1, 5.0).frame("go"))
 
-    def taken(cockpit: Cockpit) -> bool:
+    def taken(supervised: SupervisedNode) -> bool:
         node.pilot.phase = Phase.HOLD
-        told = cockpit.step(air.clock.now(), [go])
+        told = supervised.step(air.clock.now(), [go])
         (answer,) = [
             m for d in told if d.link == "ground" for m in Codec().feed(d.data) if isinstance(m, CommandAck)
         ]
         assert (answer.result == 0) == (node.pilot.phase is Phase.ESCORT)
         return answer.result == 0
 
-    young = Cockpit(node, air.clock, FollowedClock(air.clock, simulated=None), None, air.twin)
+    young = SupervisedNode(node, air.clock, FollowedClock(air.clock, simulated=None), None, air.duplicates)
     assert (young.barred, taken(young)) == (CLOCK, False)
-    cockpit = Cockpit(node, air.clock, None, None, air.twin)
-    assert (cockpit.barred, taken(cockpit)) == ("", True)
+    supervised = SupervisedNode(node, air.clock, None, None, air.duplicates)
+    assert (supervised.barred, taken(supervised)) == ("", True)
     air.pass_by(5.0, OWN._replace())
-    assert (cockpit.barred, taken(cockpit)) == (TWIN, False)
+    assert (supervised.barred, taken(supervised)) == (TWIN, False)
     air.pass_by(20.0)
-    assert (cockpit.barred, taken(cockpit)) == ("", True)
+    assert (supervised.barred, taken(supervised)) == ("", True)

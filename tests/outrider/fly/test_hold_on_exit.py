@@ -18,7 +18,7 @@ from mavlink_bridge.wire.codec import Codec
 from outrider.fly.hold_on_exit import farewell
 from outrider.fly.status import State
 from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
-from outrider.supervision.supervised_node import OURS, Cockpit
+from outrider.supervision.supervised_node import OURS, SupervisedNode
 
 BEAT = Heartbeat(Source(1, 1), 2, 3, 0x80, ARDUPILOT.guided_custom_mode, 4)
 CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))
@@ -34,9 +34,9 @@ def test_a_companion_that_gives_up_asks_where_it_had_the_vehicle(phase: Phase) -
     node = companion()
     node.pilot.receive(BEAT)
     node.pilot.phase = phase
-    cockpit = Cockpit(node, SimulatedClock(1), None, None)
-    cockpit.give_up()
-    told = cockpit.step(1_000, [])
+    supervised = SupervisedNode(node, SimulatedClock(1), None, None)
+    supervised.give_up()
+    told = supervised.step(1_000, [])
     ours = phase not in (Phase.CONNECT, Phase.YIELDED, Phase.DONE)
     assert bool(told) == ours
     assert State(phase=phase.value).ours == ours == (phase in OURS)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.flight.landing import Landing
-from outrider.fly.event_log import Diary
+from outrider.fly.event_log import EventLog
 from outrider.fly.figures import summary
 from outrider.fly.flight import Flight
 from outrider.fly.landing import verdict
@@ -65,13 +65,13 @@ def test_what_the_process_that_flew_measured_is_what_is_reported(
 
     monkeypatch.setattr("outrider.fly.flight.wait", at_once)
     said = Said({"kind": "landing", **landing}, {"kind": "event", "what": "phase", "text": "done", "at": 1.0})
-    diary = Diary(tmp_path, lambda: 0.0)
+    event_log = EventLog(tmp_path, lambda: 0.0)
     typed = type("Typed", (), {"lines": lambda self: []})()
-    flight = Flight(Request(CONFIG, "px4", {}), None, tmp_path, diary, typed, (), lambda: None)
+    flight = Flight(Request(CONFIG, "px4", {}), None, tmp_path, event_log, typed, (), lambda: None)
     flight._look_after(said, Crew())
     assert flight._over()
     assert (flight.ended, flight._elsewhere) == (ended, fault)
     assert flight.landing == Landing(**landing)
     told = summary(flight, tmp_path)
     assert (told["ended"], told["landed_off_m"]) == (ended, landing["off"])
-    diary.close()
+    event_log.close()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from outrider.fly.line_input import FEW, Typed
+from outrider.fly.line_input import FEW, LineInput
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def pipe() -> Iterator[tuple[int, int]]:
 
 def test_who_never_stops_writing_takes_nobodys_time(pipe: tuple[int, int]) -> None:
     near, far = pipe
-    typed, written, found = Typed(near), 0, 0
+    typed, written, found = LineInput(near), 0, 0
     for _ in range(300):
         try:
             while True:
@@ -42,7 +42,7 @@ def test_who_never_stops_writing_takes_nobodys_time(pipe: tuple[int, int]) -> No
 
 def test_a_line_that_never_ends_takes_nobodys_time_either(pipe: tuple[int, int]) -> None:
     near, far = pipe
-    typed = Typed(near)
+    typed = LineInput(near)
     os.write(far, b"x" * 20_000 + b"\nland\n")
     looks = [typed.lines() for _ in range(30)]
     assert looks[0] == []
@@ -53,7 +53,7 @@ def test_a_named_pipe_hears_who_writes_after_another_has_gone(tmp_path: Path) ->
     os.mkfifo(tmp_path / "orders")
     # Open before anybody writes, as no shell waits in a test.
     near = os.open(tmp_path / "orders", os.O_RDONLY | os.O_NONBLOCK)
-    typed = Typed(near)
+    typed = LineInput(near)
     for text in ("go\n", "hold\nret", "land\n"):
         (tmp_path / "orders").write_text(text)
         assert typed.lines() == text.split("\n")[:-1]

@@ -19,8 +19,8 @@ from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.fly.child_process import FAREWELL, KILLED, Crew
-from outrider.fly.event_log import Diary
+from outrider.fly.child_process import FAREWELL, KILLED, ChildProcess
+from outrider.fly.event_log import EventLog
 from outrider.fly.log import BATCH, MOST, Log
 from outrider.fly.terminal import Terminal
 from outrider.fly.worker import Worker
@@ -124,14 +124,14 @@ def test_a_process_that_cannot_be_killed_is_not_waited_for(
         def is_alive(self) -> bool:
             return True
 
-    crew = Crew(cast(Worker, SimpleNamespace(main=None)))
+    crew = ChildProcess(cast(Worker, SimpleNamespace(main=None)))
     monkeypatch.setattr(crew, "_process", Stuck())
     crew.kill()
     crew.join()
     assert done == ["killed", KILLED]
     # Nor where it had time to end by itself.
     done.clear()
-    crew = Crew(cast(Worker, SimpleNamespace(main=None)))
+    crew = ChildProcess(cast(Worker, SimpleNamespace(main=None)))
     monkeypatch.setattr(crew, "_process", Stuck())
     crew.join()
     assert done == [FAREWELL, "killed", KILLED]
@@ -143,10 +143,10 @@ def test_who_does_not_listen_ends_nothing(tmp_path: Path) -> None:
     def gone(_line: str) -> None:
         raise BrokenPipeError
 
-    diary = Diary(tmp_path, lambda: 1.0)
-    diary.tell = gone
-    diary.note("phase", "escort")
-    diary.close()
+    event_log = EventLog(tmp_path, lambda: 1.0)
+    event_log.tell = gone
+    event_log.note("phase", "escort")
+    event_log.close()
     assert "escort" in (tmp_path / "events.jsonl").read_text(encoding="utf-8")
 
 
@@ -157,9 +157,9 @@ def test_a_disk_that_stands_still_keeps_nobody_from_noting_what_happens(
     place = tmp_path / "events.jsonl"
     os.mkfifo(place)
     reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)
-    diary = Diary(tmp_path, lambda: 1.0)
+    event_log = EventLog(tmp_path, lambda: 1.0)
     for number in range(3000):
-        diary.note("autopilot", f"{number:0100}")
+        event_log.note("autopilot", f"{number:0100}")
     os.set_blocking(reader, True)
     found: list[bytes] = []
 
@@ -168,7 +168,7 @@ def test_a_disk_that_stands_still_keeps_nobody_from_noting_what_happens(
 
     listening = Thread(target=read)
     listening.start()
-    diary.close()
+    event_log.close()
     listening.join()
     os.close(reader)
     lines = [json.loads(line)["text"] for line in b"".join(found).splitlines()]

@@ -17,18 +17,18 @@ from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, LocalPosition, S
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from outrider.fly import flight
-from outrider.fly.event_log import Diary
+from outrider.fly.event_log import EventLog
 from outrider.fly.flight import MOST, Flight
-from outrider.fly.line_input import Typed
+from outrider.fly.line_input import LineInput
 from outrider.fly.process_channel import OrderLink, intercom
 from outrider.fly.request import Request
-from outrider.fly.status import News
-from outrider.fly.transmit_statistics import Departures
+from outrider.fly.status import StatusReports
+from outrider.fly.transmit_statistics import TransmitStatistics
 from outrider.fly.wiring import wire
 from outrider.fly.worker import Worker
 from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
-from outrider.supervision.duplicate_ids import Twin
-from outrider.supervision.supervised_node import Cockpit
+from outrider.supervision.duplicate_ids import DuplicateIds
+from outrider.supervision.supervised_node import SupervisedNode
 
 ORIGIN = (47.4, 8.5, 488.0)
 CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))
@@ -48,11 +48,13 @@ def test_the_others_are_told_at_once_by_who_follows_one_that_knew(
     found: bool | None, orders: OrderLink
 ) -> None:
     wall = SimulatedClock(1_000_000)
-    worker = Worker(Request(CONFIG, "px4", {}), {}, Twin(1, wall), orders, Path(), found)
+    worker = Worker(Request(CONFIG, "px4", {}), {}, DuplicateIds(1, wall), orders, Path(), found)
     followed = worker.followed(wall)
     assert followed is not None
-    cockpit = Cockpit(worker.companion, wall, followed, None)
-    news = News(cockpit, Departures(CONFIG.settings.limits), followed, None, lambda **_: None)
+    supervised = SupervisedNode(worker.companion, wall, followed, None)
+    news = StatusReports(
+        supervised, TransmitStatistics(CONFIG.settings.limits), followed, None, lambda **_: None
+    )
     codec, said = Codec(), 0
     for k in range(200):
         stamp = 5_000_000 + 10_000 * k
@@ -60,7 +62,7 @@ def test_the_others_are_told_at_once_by_who_follows_one_that_knew(
         heard.append(GpsGlobalOrigin(VEHICLE, *ORIGIN, stamp))
         heard.append(LocalPosition(VEHICLE, stamp, (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)))
         inbox = [Datagram("autopilot", codec.encode(message)) for message in heard]
-        said += sum(datagram.link == "swarm" for datagram in cockpit.step(wall.now(), inbox))
+        said += sum(datagram.link == "swarm" for datagram in supervised.step(wall.now(), inbox))
         wall.wait_until(wall.now() + 10_000)
     assert (said >= 10) if found is False else (said == 0)
     assert news.state(wall.now()).simulated is found
@@ -72,7 +74,7 @@ def test_what_was_found_out_counts_where_it_was_to_be_found_out(
     clock: str, found: bool | None, orders: OrderLink
 ) -> None:
     config = FlyConfig.model_validate(CONFIG.model_dump() | {"clock": clock})
-    worker = Worker(Request(config, "px4", {}), {}, Twin(1, SimulatedClock(1)), orders, Path(), found)
+    worker = Worker(Request(config, "px4", {}), {}, DuplicateIds(1, SimulatedClock(1)), orders, Path(), found)
     followed = worker.followed(SimulatedClock(1))
     if clock == "wall":
         assert followed is None
@@ -109,13 +111,15 @@ def test_what_one_process_found_out_all_after_it_know(
         def join(self) -> None:
             """It is gone."""
 
-    monkeypatch.setattr(flight, "Crew", Lost)
+    monkeypatch.setattr(flight, "ChildProcess", Lost)
     monkeypatch.setattr(Flight, "_identify", lambda _flight: True)
     endpoint = parse_endpoint("udpin:127.0.0.1:0")
     ends = dict.fromkeys(("autopilot", "swarm", "target", "ground"), endpoint)
     wiring = wire(ends, 1, 100, CONFIG.settings, SimulatedClock(1))
-    with closing(wiring), closing(Diary(tmp_path, lambda: 0.0)) as diary:
-        flown = Flight(Request(CONFIG, "px4", ends), wiring, tmp_path, diary, Typed(None), [], lambda: None)
+    with closing(wiring), closing(EventLog(tmp_path, lambda: 0.0)) as event_log:
+        flown = Flight(
+            Request(CONFIG, "px4", ends), wiring, tmp_path, event_log, LineInput(None), [], lambda: None
+        )
         flown.run()
     os.close(near)
     os.close(far)

@@ -6,41 +6,41 @@ from collections.abc import Iterator
 
 import pytest
 
-from outrider.fly.process_channel import ALONE, Desk, OrderLink, intercom
-from outrider.fly.watchdog import FIRST, HUNG, Pulse
+from outrider.fly.process_channel import ALONE, Channel, OrderLink, intercom
+from outrider.fly.watchdog import FIRST, HUNG, Watchdog
 
 LOOK = 0.05
 
 
-def looked(pulse: Pulse, begin: float, seconds: float) -> float | None:
+def looked(watchdog: Watchdog, begin: float, seconds: float) -> float | None:
     """When (s since ``begin``) it was found stopped, looked at all the time."""
     for k in range(1, round(seconds / LOOK) + 1):
-        if pulse.stopped(begin + k * LOOK):
+        if watchdog.stopped(begin + k * LOOK):
             return k * LOOK
     return None
 
 
 def test_the_first_news_may_take_its_time_and_the_next_may_not() -> None:
-    pulse = Pulse(100.0)
-    assert looked(pulse, 100.0, FIRST) is None
-    assert looked(Pulse(100.0), 100.0, 60.0) == pytest.approx(FIRST, abs=2 * LOOK)
-    pulse.heard(110.0)
-    assert looked(pulse, 110.0, 60.0) == pytest.approx(HUNG, abs=2 * LOOK)
+    watchdog = Watchdog(100.0)
+    assert looked(watchdog, 100.0, FIRST) is None
+    assert looked(Watchdog(100.0), 100.0, 60.0) == pytest.approx(FIRST, abs=2 * LOOK)
+    watchdog.heard(110.0)
+    assert looked(watchdog, 110.0, 60.0) == pytest.approx(HUNG, abs=2 * LOOK)
 
 
 def test_who_was_held_up_himself_judges_nobody() -> None:
-    pulse = Pulse(0.0)
+    watchdog = Watchdog(0.0)
     now = 0.0
     for _ in range(20):
-        pulse.heard(now)
+        watchdog.heard(now)
         now += 30.0
-        assert not pulse.stopped(now)
+        assert not watchdog.stopped(now)
         # What waited is heard then.
-    assert looked(pulse, now, 60.0) == pytest.approx(HUNG, abs=2 * LOOK)
+    assert looked(watchdog, now, 60.0) == pytest.approx(HUNG, abs=2 * LOOK)
 
 
 @pytest.fixture
-def ends() -> Iterator[tuple[Desk, OrderLink]]:
+def ends() -> Iterator[tuple[Channel, OrderLink]]:
     desk, orders = intercom()
     yield desk, orders
     desk.close()
@@ -48,7 +48,7 @@ def ends() -> Iterator[tuple[Desk, OrderLink]]:
 
 
 def test_a_child_whose_parent_stands_still_is_alone(
-    ends: tuple[Desk, OrderLink], monkeypatch: pytest.MonkeyPatch
+    ends: tuple[Channel, OrderLink], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It has been stopped, or waits for a terminal: its process is still there."""
     desk, orders = ends
@@ -65,7 +65,7 @@ def test_a_child_whose_parent_stands_still_is_alone(
     assert orders.alone
 
 
-def test_beats_leave_room_for_orders(ends: tuple[Desk, OrderLink]) -> None:
+def test_beats_leave_room_for_orders(ends: tuple[Channel, OrderLink]) -> None:
     desk, orders = ends
     for k in range(100):
         desk.beat(10.0 + 0.01 * k)

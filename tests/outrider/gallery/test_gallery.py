@@ -38,7 +38,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_page_shows_all_and_says_what_became_of_each(here: Path) -> None:
-    assert gallery(("traffic", "obstacles"), to=Path("page"), run="gallery_runs:straight") == 1
+    assert gallery(("traffic", "obstacles"), to=Path("page"), run="tests.outrider.gallery.runs:straight") == 1
     text = (here / "page" / "README.md").read_text()
     row = "| [traffic](#traffic) | stuck, least 1.50 m | no flight: "
     assert row in text
@@ -51,25 +51,25 @@ def test_the_page_shows_all_and_says_what_became_of_each(here: Path) -> None:
 
 
 def test_what_is_flown_already_is_not_flown_again(here: Path) -> None:
-    assert gallery(("obstacles",), out=Path("out"), run="gallery_runs:fine") == 0
+    assert gallery(("obstacles",), out=Path("out"), run="tests.outrider.gallery.runs:fine") == 0
     before = Path("out/journal.jsonl").read_bytes()
-    assert gallery(("obstacles",), out=Path("out"), run="gallery_runs:never") == 0
+    assert gallery(("obstacles",), out=Path("out"), run="tests.outrider.gallery.runs:never") == 0
     assert Path("out/journal.jsonl").read_bytes() == before
 
 
 def test_a_few_may_be_flown_before_the_rest(here: Path) -> None:
-    assert gallery(("obstacles",), out=Path("out"), run="gallery_runs:fine") == 0
-    assert gallery(("traffic", "obstacles"), out=Path("out"), run="gallery_runs:fine") == 0
+    assert gallery(("obstacles",), out=Path("out"), run="tests.outrider.gallery.runs:fine") == 0
+    assert gallery(("traffic", "obstacles"), out=Path("out"), run="tests.outrider.gallery.runs:fine") == 0
     assert "## traffic" in (here / "out" / "README.md").read_text()
 
 
 def test_a_page_of_somebody_else_is_not_overwritten(here: Path) -> None:
     (here / "README.md").write_text("# Mine\n")
     with pytest.raises(InputError, match=r"holds a README\.md that is no gallery"):
-        gallery(("obstacles",), to=here, run="gallery_runs:fine")
+        gallery(("obstacles",), to=here, run="tests.outrider.gallery.runs:fine")
     (here / "file").touch()
     with pytest.raises(InputError, match="--page file: cannot be made"):
-        gallery(("obstacles",), to=Path("file"), run="gallery_runs:fine")
+        gallery(("obstacles",), to=Path("file"), run="tests.outrider.gallery.runs:fine")
     assert (here / "README.md").read_text() == "# Mine\n"
     assert not list(here.glob("**/*.png"))
 

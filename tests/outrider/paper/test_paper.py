@@ -53,7 +53,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_table_is_that_of_the_runs(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert paper(4, out=Path("out"), as_json=True, rows=THREE, run="paper_runs:table") == 1
+    assert paper(4, out=Path("out"), as_json=True, rows=THREE, run="tests.outrider.paper.runs:table") == 1
     rows = json.loads(capsys.readouterr().out)["rows"]
     assert [set(row) for row in rows] == [KEYS] * 3
     stuck, fine, near = rows
@@ -70,16 +70,16 @@ def test_the_table_is_that_of_the_runs(here: Path, capsys: pytest.CaptureFixture
 
 
 def test_without_a_violation_being_stuck_is_a_result(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert paper(2, out=Path("out"), rows=THREE, run="paper_runs:fine") == 0
+    assert paper(2, out=Path("out"), rows=THREE, run="tests.outrider.paper.runs:fine") == 0
     said = capsys.readouterr()
     assert "tangential" in said.out
     assert "out" in said.err
 
 
 def test_what_was_flown_is_not_flown_again(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    paper(2, out=Path("out"), rows=THREE, run="paper_runs:fine")
+    paper(2, out=Path("out"), rows=THREE, run="tests.outrider.paper.runs:fine")
     before = Path("out/journal.jsonl").read_bytes()
-    paper(3, out=Path("out"), rows=THREE, run="paper_runs:fine")
+    paper(3, out=Path("out"), rows=THREE, run="tests.outrider.paper.runs:fine")
     after = Path("out/journal.jsonl").read_bytes()
     assert after.startswith(before)
     assert after.count(b"\n") == before.count(b"\n") + 3

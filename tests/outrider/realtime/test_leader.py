@@ -16,7 +16,7 @@ from mavlink_bridge.links.udp import MulticastLink
 from mavlink_bridge.node import Datagram
 from outrider.realtime import wiring as wirings
 from outrider.realtime.flight import _Leader
-from outrider.realtime.shared_page import Board
+from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.spawn import operators_turn, rough, turns
 from outrider.runs import names
 from outrider.runs.ground_truth import SAMPLE
@@ -36,7 +36,7 @@ class Processes:
     def __init__(self) -> None:
         self.dead: dict[str, int] = {}
         self.told: list[tuple[str, str, int]] = []
-        self.board: Board
+        self.board: SharedPage
 
     def ended(self) -> dict[str, int]:
         return self.dead
@@ -50,7 +50,7 @@ class Processes:
 
 class Led:
     def __init__(self) -> None:
-        self.crew, self.board = Processes(), Board(2)
+        self.crew, self.board = Processes(), SharedPage(2)
         self.crew.board = self.board
         self.conductor = Conductor(OF, FLEET.starts, FLEET.operator(), START)
         crew: Any = self.crew
@@ -98,7 +98,7 @@ def test_a_thaw_is_on_the_board_before_the_process_goes_on() -> None:
 
 
 def test_rows_of_the_board_do_not_touch() -> None:
-    board = Board(3)
+    board = SharedPage(3)
     board.thaws[:] = 7
     board.gone[:] = 0
     board.show_vehicle(1, np.ones(3), np.zeros(3), False)
@@ -137,7 +137,9 @@ def test_what_no_node_of_the_run_sent_is_dropped_and_counts_nowhere(strange: lis
         for tick in range(40):
             behind.step(tick * 2_500, strange)
         assert node.heard == []
-        assert behind.ether.counters.sent == behind.ether.counters.unrouted == behind.ether.under_way == 0
+        assert (
+            behind.network.counters.sent == behind.network.counters.unrouted == behind.network.under_way == 0
+        )
 
 
 def test_the_own_echo_is_a_stranger_and_a_companion_is_none() -> None:
@@ -145,7 +147,7 @@ def test_the_own_echo_is_a_stranger_and_a_companion_is_none() -> None:
     behind = rough(FLEET, node, {"swarm": None})
     frames = [bytes([0xFD, 0, 0, 0, 0, system]) + bytes(6) for system in (11, 12)]
     behind.step(0, [Datagram("swarm", frame) for frame in frames])
-    assert behind.ether.counters.sent == 1
+    assert behind.network.counters.sent == 1
     behind.step(10**6, [])
     assert node.heard == [Datagram("swarm", frames[1])]
 

@@ -13,10 +13,10 @@ from hypothesis.extra import numpy as hnp
 
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.node import Datagram
-from outrider.runs.ground_truth import SAMPLE, Encounters, Limits, Truth
+from outrider.runs.ground_truth import SAMPLE, Encounters, GroundTruth, Limits
 from outrider.scenarios.scenario import FixedTarget
 from outrider.simulation.targets import Standing
-from outrider.simulation.truth_observer import Witness
+from outrider.simulation.truth_observer import TruthObserver
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
 from sitl.vehicle.multirotor import Reference, VehicleState
@@ -142,20 +142,20 @@ class OnRails:
         return Reference.hover(self.trace[-1], 0.0) if self._referenced else None
 
 
-def truth(vehicles: Sequence[OnRails], d_min_target: float | None = None) -> Truth:
-    return Truth(len(vehicles), Limits(LEAST, d_min_target))
+def truth(vehicles: Sequence[OnRails], d_min_target: float | None = None) -> GroundTruth:
+    return GroundTruth(len(vehicles), Limits(LEAST, d_min_target))
 
 
 def watch(
     vehicles: Sequence[OnRails],
-    truth: Truth,
+    truth: GroundTruth,
     seconds: float,
     tick: int = 5_000,
     at: Any = (0.0, 0.0, 0.0),
 ) -> list[int]:
     """Times at which a sample was taken, the target being ``at`` (m)."""
     target = Standing(FixedTarget(kind="fixed", at=at), FLEET)
-    seen = Witness(cast("list[Autopilot]", list(vehicles)), target, truth)
+    seen = TruthObserver(cast("list[Autopilot]", list(vehicles)), target, truth)
     taken = []
     for now in range(tick, round(seconds * 1e6) + 1, tick):
         for vehicle in vehicles:
@@ -240,11 +240,11 @@ def test_nothing_is_seen_twice() -> None:
     vehicles = [OnRails(lambda _: (0.0, 0.0, 5.0)), OnRails(lambda _: (0.1, 0.0, 5.0))]
     seen = truth(vehicles)
     target = Standing(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET)
-    witness = Witness(cast("list[Autopilot]", vehicles), target, seen)
+    observer = TruthObserver(cast("list[Autopilot]", vehicles), target, seen)
     for vehicle in vehicles:
         vehicle.move(0, 5_000)
-    assert witness.see(5_000)
-    assert not witness.see(10_000_000)
+    assert observer.see(5_000)
+    assert not observer.see(10_000_000)
     assert len(seen.samples().time) == 1
     assert seen.vehicles.count == 1
 
@@ -265,13 +265,15 @@ def test_separation_is_the_least_of_every_step(offset: float, speed: float) -> N
 def test_the_emulated_autopilot_is_watched_at_every_physics_step() -> None:
     config = AutopilotConfig(system_id=11, latitude=47.397742, longitude=8.545594, altitude=488.0)
     autopilot = Autopilot(config, FIREFLY, FLEET, 1)
-    seen = Truth(1, Limits(LEAST, 1.0))
-    witness = Witness([autopilot], Standing(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET), seen)
+    seen = GroundTruth(1, Limits(LEAST, 1.0))
+    observer = TruthObserver(
+        [autopilot], Standing(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET), seen
+    )
     inbox: list[Datagram] = []
     taken = []
     for now in range(0, 200_001, 5_000):
         autopilot.step(now, inbox)
-        if witness.see(now):
+        if observer.see(now):
             taken.append(now)
     assert taken == list(range(5_000, 200_001, SAMPLE))
     samples = seen.samples()

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mavlink_bridge.network.simulated import Ether, Faults
+from mavlink_bridge.network.simulated import Faults, SimulatedNetwork
 from outrider.scenarios.links import Links
 from outrider.simulation.fleet import Fleet
 from tests.outrider.shipped import FIREFLY, LOGS, scenario
@@ -77,4 +77,4 @@ def test_a_burst_too_short_for_its_loss_is_refused(said: dict[str, Any], least: 
 
 def test_a_burst_just_long_enough_flies() -> None:
     flown = scenario("antipodal-8", links={"swarm": {"loss": 0.8, "burst": 4.0}})
-    assert Ether(Fleet(flown, FIREFLY, 1, LOGS).channels(), 1, 2_500).counters.sent == 0
+    assert SimulatedNetwork(Fleet(flown, FIREFLY, 1, LOGS).channels(), 1, 2_500).counters.sent == 0

@@ -19,7 +19,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import KNOTS, unpack
 from outrider.realtime.spawn import rough
 from outrider.runs import names
-from outrider.runs.ground_truth import Limits, Truth
+from outrider.runs.ground_truth import GroundTruth, Limits
 from outrider.scenarios.moving import MovingPostPart, MovingSpherePart
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.fleet import Fleet
@@ -224,9 +224,9 @@ def test_in_real_time_they_come_through_the_companion_s_own_ether() -> None:
     (node,) = fleet.moving()
     behind = rough(fleet, fleet.companion(0, lambda: 0), {"swarm": None})
     behind.step(START, node.step(START, []))
-    assert behind.ether.counters.sent == 1
+    assert behind.network.counters.sent == 1
     behind.step(START + 1_000_000, [])
-    assert behind.ether.counters.delivered == 1
+    assert behind.network.counters.delivered == 1
 
 
 # The truth
@@ -235,7 +235,7 @@ def test_in_real_time_they_come_through_the_companion_s_own_ether() -> None:
 def test_who_comes_too_near_to_one_is_counted() -> None:
     """A vehicle hovers at 5 m; a ball passes with its surface at 0.3 m, and a post 1 m below."""
     known = traffic(SPHERE, {**POST, "height": 4.0}).moving_known
-    truth = Truth(1, Limits(0.5, None, 0.5), None, MovingObstacles(known))
+    truth = GroundTruth(1, Limits(0.5, None, 0.5), None, MovingObstacles(known))
     steps = 2_500e-6 * np.arange(1, 1601).reshape(-1, 8)
     for k, times in enumerate(steps):
         ball = np.stack([2.0 * times - 4.0, np.full(8, 0.9), np.full(8, 5.0)], axis=1)

@@ -17,7 +17,7 @@ from outrider.address_scope import exposed
 from outrider.errors import InputError
 from outrider.scenarios.places import Origin
 from outrider.sitl_server.addresses import addresses, extra
-from outrider.sitl_server.processes import squads
+from outrider.sitl_server.processes import groups
 from outrider.sitl_server.request import MOST_ID, Options, Request, checked
 from outrider.sitl_server.worker import PERIOD, period
 from sitl.autopilot.saved import Saved
@@ -208,10 +208,10 @@ def test_a_vehicle_is_what_was_asked_for() -> None:
 
 @given(COUNTS, st.floats(0.01, 1000.0), st.integers(1, 64))
 def test_every_vehicle_is_in_one_squad_and_squads_are_alike(count: int, speed: float, most: int) -> None:
-    found = squads(count, speed, most)
-    assert sorted(index for squad in found for index in squad) == list(range(count))
+    found = groups(count, speed, most)
+    assert sorted(index for group in found for index in group) == list(range(count))
     assert 1 <= len(found) <= most
-    sizes = [len(squad) for squad in found]
+    sizes = [len(group) for group in found]
     assert max(sizes) - min(sizes) <= 1
 
 

@@ -27,14 +27,14 @@ from outrider.errors import InputError, OutriderError
 from outrider.logs.flight_modes import mode_name
 from outrider.sitl_server.addresses import addresses
 from outrider.sitl_server.display import watching
-from outrider.sitl_server.event_feed import Chronicle
+from outrider.sitl_server.event_feed import EventFeed
 from outrider.sitl_server.figures import factor
-from outrider.sitl_server.persistence import Cabinet, prepare
+from outrider.sitl_server.persistence import Persistence, prepare
 from outrider.sitl_server.request import Options, Request, checked
 from outrider.sitl_server.screen import Screen
-from outrider.sitl_server.shared_page import SAYINGS, Board, Gauges, Pace
+from outrider.sitl_server.shared_page import SAYINGS, Pace, SharedPage, VehicleSnapshot
 from outrider.sitl_server.traffic import Traffic
-from outrider.sitl_server.vehicle_group import SPREAD, Squad, boot_times
+from outrider.sitl_server.vehicle_group import SPREAD, VehicleGroup, boot_times
 
 GCS = Source(255, 190)
 PERIOD = 20_000
@@ -44,13 +44,14 @@ class Field:
     """A squad and its board, and someone who speaks to its vehicles."""
 
     def __init__(self, asked: Request, indices: Sequence[int], state: Path | None = None) -> None:
-        self.cabinet = Cabinet(state, asked.flavour)
+        self.persistence = Persistence(state, asked.flavour)
         boots = boot_times(indices, asked.speed, PERIOD)
         vehicles = {
-            index: asked.autopilot(index, 0, self.cabinet.saved(asked.systems[index])) for index in indices
+            index: asked.autopilot(index, 0, self.persistence.saved(asked.systems[index]))
+            for index in indices
         }
-        self.board = Board(asked.count, 1)
-        self.squad = Squad(vehicles, boots, asked.first_id, self.board, asked.speed)
+        self.board = SharedPage(asked.count, 1)
+        self.group = VehicleGroup(vehicles, boots, asked.first_id, self.board, asked.speed)
         self.now = 0
         self._codec = Codec()
 
@@ -64,9 +65,9 @@ class Field:
         heard: dict[str, list[Message]] = {}
         end = self.now + round(seconds * 1e6)
         while self.now < end:
-            for link, data in self.squad.step(self.now, inbox):
+            for link, data in self.group.step(self.now, inbox):
                 heard.setdefault(link, []).extend(Codec().feed(data))
-            self.squad.show(self.now, lambda _link: 1)
+            self.group.show(self.now, lambda _link: 1)
             inbox = []
             self.now += PERIOD
         return heard
@@ -106,7 +107,7 @@ def test_what_is_shown_is_so() -> None:
     early = field.run(0.5)
     heard = field.run(1.5, {2: [Heartbeat(GCS, 6, 8, 0, 0, 4)] * 3})
     for index in range(4):
-        gauges, node = field.board.gauges(index), field.squad.seats[index].node
+        gauges, node = field.board.gauges(index), field.group.slots[index].node
         assert gauges.position == pytest.approx(request.place(index), abs=0.5)
         assert np.linalg.norm(gauges.velocity) < 0.1
         assert gauges.custom_mode == node.custom_mode
@@ -123,7 +124,7 @@ def test_vehicles_do_not_all_speak_at_once() -> None:
     field = Field(asked(count=8), range(8))
     first: dict[str, int] = {}
     while len(first) < 8:
-        for link, _ in field.squad.step(field.now, []):
+        for link, _ in field.group.step(field.now, []):
             first.setdefault(link, field.now)
         field.now += PERIOD
     assert len(set(first.values())) == 8
@@ -136,7 +137,7 @@ def test_a_vehicle_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         raise ZeroDivisionError("of what")
 
-    monkeypatch.setattr(field.squad.seats[1].node, "step", fail)
+    monkeypatch.setattr(field.group.slots[1].node, "step", fail)
     with pytest.raises(OutriderError, match=r"^vehicle 41: ZeroDivisionError: of what$"):
         field.run(1.0)
 
@@ -150,15 +151,15 @@ def test_with_a_key_only_who_has_it_is_obeyed(tmp_path: Path) -> None:
     signing = Signing(key)
     signing.present(EPOCH + 60_000_000)
     order = Codec(signing=signing).encode(arming(2))
-    for _, data in field.squad.step(field.now, [Datagram("0", order), Datagram("1", order)]):
+    for _, data in field.group.step(field.now, [Datagram("0", order), Datagram("1", order)]):
         assert all(frame.signed for frame in Framer().feed(data))
     field.now += PERIOD
     field.run(0.5)
     assert [field.board.gauges(index).armed for index in range(2)] == [False, True]
     # Its newest stamp changes all the time, and is written when all ends.
-    field.cabinet.keep(field.squad)
+    field.persistence.keep(field.group)
     assert not any((tmp_path / "kept").iterdir())
-    field.cabinet.keep(field.squad, ending=True)
+    field.persistence.keep(field.group, ending=True)
     assert len([*(tmp_path / "kept").iterdir()]) == 2
 
 
@@ -172,12 +173,12 @@ def test_parameters_come_back_to_the_vehicle_that_kept_them(tmp_path: Path) -> N
     field.run(0.5)
     value = np.float32(321.0).tobytes()
     field.run(0.5, {1: [ParamSet(GCS, value, 6, 1, "WPNAV_SPEED", 9)]})
-    field.cabinet.keep(field.squad)
+    field.persistence.keep(field.group)
     assert [path.name for path in state.iterdir()] == ["ardupilot-6.json"]
     prepare(state, request.flavour, request.systems)
     again = Field(request, range(2), state)
-    assert [seat.node.saved for seat in again.squad.seats] == [seat.node.saved for seat in field.squad.seats]
-    assert again.squad.seats[1].node.saved.parameters == {"WPNAV_SPEED": 321.0}
+    assert [slot.node.saved for slot in again.group.slots] == [slot.node.saved for slot in field.group.slots]
+    assert again.group.slots[1].node.saved.parameters == {"WPNAV_SPEED": 321.0}
 
 
 @pytest.mark.parametrize("damage", ["", "{", '{"parameters": {"A": "x"}}', '{"other": 1}', "\xff"])
@@ -201,7 +202,7 @@ def test_without_a_directory_nothing_is_kept(tmp_path: Path, monkeypatch: pytest
     monkeypatch.chdir(tmp_path)
     field = Field(asked(), [0])
     field.run(0.2)
-    field.cabinet.keep(field.squad)
+    field.persistence.keep(field.group)
     assert not any(tmp_path.iterdir())
 
 
@@ -211,7 +212,7 @@ NUMBER = st.floats(-1e6, 1e6)
 PLACE = st.tuples(NUMBER, NUMBER, NUMBER)
 COUNT = st.integers(0, 2**50)
 GAUGES = st.builds(
-    Gauges,
+    VehicleSnapshot,
     st.booleans(),
     st.booleans(),
     st.integers(0, 2**32 - 1),
@@ -228,22 +229,22 @@ GAUGES = st.builds(
 
 @given(st.lists(GAUGES, min_size=1, max_size=4), st.lists(st.tuples(NUMBER, NUMBER), min_size=1, max_size=3))
 def test_what_is_written_on_the_board_can_be_read_there(
-    gauges: list[Gauges], times: list[tuple[float, float]]
+    gauges: list[VehicleSnapshot], times: list[tuple[float, float]]
 ) -> None:
-    board = Board(len(gauges), len(times))
+    board = SharedPage(len(gauges), len(times))
     assert not any(board.gauges(index).up for index in range(len(gauges)))
     paces = [Pace(*time, 3, 2, 1, 0.5, 1.5, 7) for time in times]
     for index, one in enumerate(gauges):
         board.show(index, one)
         board.say(index, SAYINGS + index, f"{index} é")
-    for squad, pace in enumerate(paces):
-        board.show_pace(squad, pace)
-        board.fail(squad, "x" * 1000)
+    for group, pace in enumerate(paces):
+        board.show_pace(group, pace)
+        board.fail(group, "x" * 1000)
     board.stop = True
     assert [board.gauges(index) for index in range(len(gauges))] == gauges
     assert board.paces() == paces
     assert all(board.saying(index, SAYINGS + index) == f"{index} é" for index in range(len(gauges)))
-    assert {len(board.fault(squad)) for squad in range(len(times))} == {255}
+    assert {len(board.fault(group)) for group in range(len(times))} == {255}
     assert board.stop
 
 
@@ -302,14 +303,14 @@ def test_modes_have_the_names_that_ground_stations_give_them(flavour: str, numbe
 
 def test_what_happens_is_told_once() -> None:
     request = asked(count=2, first_id=3)
-    board = Board(2, 1)
-    chronicle = Chronicle(request, board)
+    board = SharedPage(2, 1)
+    chronicle = EventFeed(request, board)
     assert chronicle.look() == []
-    board.show(1, Gauges(up=True, custom_mode=4, time=2.0))
+    board.show(1, VehicleSnapshot(up=True, custom_mode=4, time=2.0))
     assert chronicle.look() == []
     for number in range(SAYINGS + 2):
         board.say(1, number, f"text {number}")
-    board.show(1, Gauges(True, True, 9, clients=2, said=SAYINGS + 2, time=12.5))
+    board.show(1, VehicleSnapshot(True, True, 9, clients=2, said=SAYINGS + 2, time=12.5))
     lines = chronicle.look()
     assert [line.split("vehicle 4: ")[1] for line in lines] == [
         *(f"says 'text {number}'" for number in range(2, SAYINGS + 2)),
@@ -323,7 +324,7 @@ def test_what_happens_is_told_once() -> None:
 
 def test_a_pipe_that_nobody_reads_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
     request = asked(count=4)
-    board = Board(4, 1)
+    board = SharedPage(4, 1)
     near, far = os.pipe()
     os.set_blocking(far, False)
     with suppress(BlockingIOError):
@@ -333,7 +334,7 @@ def test_a_pipe_that_nobody_reads_holds_nobody_up(monkeypatch: pytest.MonkeyPatc
     with open(far, "w", encoding="utf-8") as full:
         monkeypatch.setattr(sys, "stderr", full)
         with watching(request, addresses("ardupilot", 4, None, "127.0.0.1", ()), board) as look:
-            board.show(0, Gauges(up=True, armed=True))
+            board.show(0, VehicleSnapshot(up=True, armed=True))
             look()
         monkeypatch.undo()
     os.close(near)
@@ -342,11 +343,13 @@ def test_a_pipe_that_nobody_reads_holds_nobody_up(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize(("width", "height", "count"), [(80, 24, 3), (80, 24, 50), (200, 60, 12)])
 def test_a_picture_fits_the_terminal(width: int, height: int, count: int) -> None:
     request = asked(count=count, flavour="px4")
-    board = Board(count, 1)
+    board = SharedPage(count, 1)
     for index in range(count):
         board.show(
             index,
-            Gauges(True, True, 6 << 16, (-123.4, 1234.5, 45.6), (3.0, 4.0, 0.0), 0.87, 99, 9999, 12, 0, 3.0),
+            VehicleSnapshot(
+                True, True, 6 << 16, (-123.4, 1234.5, 45.6), (3.0, 4.0, 0.0), 0.87, 99, 9999, 12, 0, 3.0
+            ),
         )
     board.show_pace(0, Pace(4.0, 4.0, 400, 1, 1, 4.9))
     shown = io.StringIO()

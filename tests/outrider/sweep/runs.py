@@ -12,6 +12,8 @@ import numpy as np
 
 from outrider.sweep.tasks import Task
 
+RUNS = __name__
+"""This module, as a worker imports it."""
 FOLDER = "OUTRIDER_TEST_FOLDER"
 """In the environment: where the runs that are not the same each time keep count."""
 

@@ -23,6 +23,7 @@ from outrider.sweep.command import sweep
 from outrider.sweep.tasks import AbandonedError, Entry, Task
 from tests.outrider.sweep import runs as sweep_runs
 from tests.outrider.sweep.dask_machines import Machines
+from tests.outrider.sweep.runs import RUNS
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[3]
@@ -57,7 +58,7 @@ def tasks(key: str, count: int) -> list[Task]:
 
 def work(those: Machines, run: str, count: int, limit: float = LONG) -> list[Entry]:
     entries: list[Entry] = []
-    with Cluster(those.address, f"sweep_runs:{run}", limit) as cluster:
+    with Cluster(those.address, f"{RUNS}:{run}", limit) as cluster:
         cluster.work(tasks(run, count), entries.append)
     return entries
 
@@ -72,7 +73,7 @@ def test_results_depend_on_the_tasks_alone(machines: Machines) -> None:
 def test_a_run_that_raises_is_a_fault_with_its_message(machines: Machines) -> None:
     entries = {entry.seed: entry for entry in work(machines, "breaks", 6)}
     assert {seed for seed, entry in entries.items() if entry.status == "fault"} == {0, 3}
-    assert (entries[3].what or "").startswith("RuntimeError: seed 3 is bad (sweep_runs.py:")
+    assert (entries[3].what or "").startswith("RuntimeError: seed 3 is bad (runs.py:")
 
 
 def test_a_run_that_takes_its_process_down_is_named_and_tried_once_more(machines: Machines) -> None:
@@ -112,7 +113,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def fly(run: str, those: Machines | None = None, **options: Any) -> int:
     address = None if those is None else those.address
-    return sweep("methods.yaml", out=Path("out"), run=f"sweep_runs:{run}", scheduler=address, **options)
+    return sweep("methods.yaml", out=Path("out"), run=f"{RUNS}:{run}", scheduler=address, **options)
 
 
 def expected(capsys: pytest.CaptureFixture[str]) -> tuple[bytes, str]:
@@ -205,7 +206,7 @@ def test_a_worker_without_outrider_is_refused(here: Path, mortal: Machines) -> N
 
 def test_without_a_worker_it_waits_and_says_so(mortal: Machines, capsys: pytest.CaptureFixture[str]) -> None:
     with (
-        Cluster(mortal.address, "sweep_runs:fine", LONG, patience_s=1.0) as cluster,
+        Cluster(mortal.address, f"{RUNS}:fine", LONG, patience_s=1.0) as cluster,
         pytest.raises(AbandonedError, match="has had no worker for 1 s"),
     ):
         cluster.work(tasks("wait", 2), lambda _: None)

@@ -22,6 +22,7 @@ from outrider.sweep.command import sweep
 from outrider.sweep.grid import Sweep
 from outrider.yaml_files.yaml_file import load
 from tests.outrider.sweep import runs as sweep_runs
+from tests.outrider.sweep.runs import RUNS
 
 SWEEP = """
 name: methods
@@ -42,7 +43,7 @@ def fly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fly:
 
     def flown(run: str = "swap", out: str | None = "out", jobs: int = 2, **options: Any) -> int:
         place = None if out is None else Path(out)
-        return sweep("methods.yaml", jobs=jobs, out=place, run=f"sweep_runs:{run}", **options)
+        return sweep("methods.yaml", jobs=jobs, out=place, run=f"{RUNS}:{run}", **options)
 
     return flown
 
@@ -98,7 +99,8 @@ def test_a_sweep_that_is_killed_goes_on_and_ends_with_the_same_table_to_the_byte
     expected = capsys.readouterr().out.replace("whole/", "out/")
     program = (
         "import sys; from pathlib import Path; from outrider.sweep.command import sweep; "
-        "sys.exit(sweep('methods.yaml', jobs=2, out=Path('out'), runs=14, run='sweep_runs:kills_sweep'))"
+        "sys.exit(sweep('methods.yaml', jobs=2, out=Path('out'), runs=14, "
+        f"run='{RUNS}:kills_sweep'))"
     )
     environment = {"PYTHONPATH": ":".join(sys.path), sweep_runs.FOLDER: str(tmp_path)}
     lines = 0

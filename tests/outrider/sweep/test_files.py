@@ -19,6 +19,7 @@ from outrider.sweep.command import sweep
 from outrider.sweep.grid import Sweep
 from outrider.yaml_files.yaml_file import load
 from tests.outrider.sweep import runs as sweep_runs
+from tests.outrider.sweep.runs import RUNS
 
 SWEEP = """
 name: methods
@@ -37,7 +38,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def fly(run: str = "swap", regressions: str | None = None) -> int:
     folder = None if regressions is None else Path(regressions)
-    return sweep("methods.yaml", jobs=2, out=Path("out"), run=f"sweep_runs:{run}", failures=folder)
+    return sweep("methods.yaml", jobs=2, out=Path("out"), run=f"{RUNS}:{run}", failures=folder)
 
 
 def test_parquet_holds_every_run_and_the_summary(capsys: pytest.CaptureFixture[str]) -> None:

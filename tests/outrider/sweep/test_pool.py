@@ -15,6 +15,7 @@ from outrider.sweep import pool, process
 from outrider.sweep.pool import MOST_STARTS, Pool
 from outrider.sweep.tasks import Entry, Task
 from tests.outrider.sweep import runs as sweep_runs
+from tests.outrider.sweep.runs import RUNS
 
 LONG = 600.0
 
@@ -25,7 +26,7 @@ def tasks(count: int) -> list[Task]:
 
 def work(run: str, count: int, jobs: int = 2, limit: float = LONG) -> list[Entry]:
     entries: list[Entry] = []
-    with Pool(f"sweep_runs:{run}", jobs, limit) as pool:
+    with Pool(f"{RUNS}:{run}", jobs, limit) as pool:
         pool.work(tasks(count), entries.append)
         pids = pool.workers
     assert not any(alive(pid) for pid in pids)
@@ -60,7 +61,7 @@ def test_nothing_to_do_starts_nobody() -> None:
 
 
 def test_no_more_workers_than_tasks() -> None:
-    with Pool("sweep_runs:threads", 8, LONG) as pool:
+    with Pool(f"{RUNS}:threads", 8, LONG) as pool:
         entries: list[Entry] = []
         pool.work(tasks(2), entries.append)
         assert len(pool.workers) == 2
@@ -79,7 +80,7 @@ def test_a_run_that_raises_is_a_fault_with_its_message_and_costs_no_worker() -> 
         assert entry.status == ("fault" if seed % 3 == 0 else "done")
     what = entries[3].what
     assert what is not None
-    assert what.startswith("RuntimeError: seed 3 is bad (sweep_runs.py:")
+    assert what.startswith("RuntimeError: seed 3 is bad (runs.py:")
 
 
 def test_a_result_that_is_no_json_is_a_fault() -> None:
@@ -127,7 +128,7 @@ def test_a_run_that_hangs_is_ended_by_the_wall_limit(
         if starts > over and others <= {entry.seed for entry in entries if entry.status == "done"}:
             over += 1
 
-    with Pool("sweep_runs:hangs", jobs, LONG) as workers:
+    with Pool(f"{RUNS}:hangs", jobs, LONG) as workers:
         workers.work(tasks(5), entries.append, pass_time)
     lost = [(entry.seed, entry.what) for entry in entries if entry.status == "lost"]
     assert lost == [(3, "took longer than 600 s of wall time")] * 2
@@ -145,7 +146,7 @@ def test_a_worker_killed_from_outside_is_replaced(tmp_path: Path) -> None:
             os.kill(killed[0], signal.SIGKILL)
 
     entries: list[Entry] = []
-    with Pool("sweep_runs:waits", 1, LONG) as pool, pytest.raises(StopIteration):
+    with Pool(f"{RUNS}:waits", 1, LONG) as pool, pytest.raises(StopIteration):
         pool.work(tasks(1), lambda entry: stop_after(entries, entry), kill_the_first)
     assert [(entry.seed, entry.status) for entry in entries] == [(0, "lost")]
 
@@ -155,7 +156,7 @@ def stop_after(entries: list[Entry], entry: Entry) -> None:
     raise StopIteration
 
 
-@pytest.mark.parametrize("run", ["sweep_runs:nothing", "no_such_module:run", "sweep_runs"])
+@pytest.mark.parametrize("run", [f"{RUNS}:nothing", "no_such_module:run", RUNS])
 def test_a_run_that_is_not_there_is_said_at_once(run: str) -> None:
     with Pool(run, 2, LONG) as pool, pytest.raises(OutriderError, match="no worker can start"):
         pool.work(tasks(3), lambda _: None)
@@ -178,7 +179,7 @@ def test_a_pool_that_is_left_early_leaves_no_process(tmp_path: Path) -> None:
         if (tmp_path / "cell-0").exists():
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), Pool("sweep_runs:waits", 2, LONG) as pool:
+    with pytest.raises(KeyboardInterrupt), Pool(f"{RUNS}:waits", 2, LONG) as pool:
         pool.work(tasks(2), lambda _: None, stop)
     assert pool.workers
     assert not any(alive(pid) for pid in pool.workers)

@@ -23,7 +23,7 @@ def test_every_package_and_the_recorded_targets_count() -> None:
     }
     assert {
         "companion/avoidance/field/dqmpc.py",
-        "outrider/sweeps/sources.py",
+        "outrider/sweep/sources.py",
         "logs/escort-target.tlog",
     } <= found.keys()
 
@@ -47,9 +47,9 @@ def test_a_sweep_does_not_go_on_over_changed_code(tmp_path: Path, monkeypatch: p
     code = tmp_path / "code.py"
     code.write_text("a = 1\n")
     monkeypatch.setattr("outrider.sweep.sources.sources", lambda: {"code": code})
-    command.sweep("swap.yaml", jobs=1, out=Path("out"), run="sweep_runs:swap")
+    command.sweep("swap.yaml", jobs=1, out=Path("out"), run="tests.outrider.sweep.runs:swap")
     written = Path("out/journal.jsonl").read_bytes()
     code.write_text("a = 2\n")
     with pytest.raises(InputError, match=r"was flown with code \w+ \(now \w+\)"):
-        command.sweep("swap.yaml", jobs=1, out=Path("out"), run="sweep_runs:swap")
+        command.sweep("swap.yaml", jobs=1, out=Path("out"), run="tests.outrider.sweep.runs:swap")
     assert Path("out/journal.jsonl").read_bytes() == written

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from outrider.scenarios.scenario import Scenario
-from outrider.scene.datagram_channel import ROOM, Line, pair
-from outrider.scene.snapshot import Moment
+from outrider.scene.datagram_channel import ROOM, DatagramChannel, pair
+from outrider.scene.snapshot import Snapshot
 from outrider.simulation.flight import Flight
 from outrider.swarm.lockstep_view import LockStepView
 from tests.outrider.shipped import FIREFLY, LOGS, scenario
@@ -48,14 +48,14 @@ def logs(directory: Path) -> dict[str, bytes]:
 
 
 @contextmanager
-def line(room: int = ROOM) -> Iterator[tuple[Line, Line]]:
+def line(room: int = ROOM) -> Iterator[tuple[DatagramChannel, DatagramChannel]]:
     """Both ends."""
-    ours, theirs = (Line(end, room) for end in pair())
+    ours, theirs = (DatagramChannel(end, room) for end in pair())
     yield ours, theirs
     ours.close()
     theirs.close()
 
 
-def moments(end: Line) -> list[Moment]:
+def moments(end: DatagramChannel) -> list[Snapshot]:
     """What has come."""
     return [pickle.loads(data) for data in end.receive()]

@@ -21,7 +21,7 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 from outrider.scenarios.scenario import Scenario
-from outrider.scene.datagram_channel import Line
+from outrider.scene.datagram_channel import DatagramChannel
 from outrider.scene.palette import VEHICLES, rgb
 from outrider.simulation.flight import Flight
 from outrider.simulation.preparation import Prepared
@@ -29,7 +29,7 @@ from outrider.swarm import command as swarm
 from outrider.swarm.command import LOCK_STEP
 from outrider.swarm.lockstep_view import LockStepView
 from outrider.swarm.show import Show
-from outrider.view.viewer_client import Attendant
+from outrider.view.viewer_client import ViewerClient
 from tests.outrider.shipped import FIREFLY, scenario
 from tests.outrider.view.flights import logs
 
@@ -58,7 +58,7 @@ Pixels = NDArray[np.int64]
 class Waits(LockStepView):
     """Waits in mid-flight until it is released: a browser takes its time to start."""
 
-    def __init__(self, line: Line, released: threading.Event) -> None:
+    def __init__(self, line: DatagramChannel, released: threading.Event) -> None:
         super().__init__(line)
         self._released = released
 
@@ -73,9 +73,9 @@ class Waits(LockStepView):
 class Waiting(Show):
     """Shows a flight that waits."""
 
-    def __init__(self, attendant: Attendant) -> None:
-        super().__init__(attendant, watched=True)
-        self._line = attendant.line
+    def __init__(self, viewer: ViewerClient) -> None:
+        super().__init__(viewer, watched=True)
+        self._line = viewer.line
         self.released = threading.Event()
 
     def lock_step(self, prepared: Prepared, seed: int) -> LockStepView:
@@ -89,8 +89,8 @@ class Flying:
     def __init__(self, of: Scenario, directory: Path, port: int) -> None:
         directory.mkdir()
         self.directory = directory
-        self.attendant = Attendant(port=port)
-        self.show = Waiting(self.attendant)
+        self.viewer = ViewerClient(port=port)
+        self.show = Waiting(self.viewer)
         self._of = Prepared(of, FIREFLY)
         self._thread = threading.Thread(target=self._fly)
         self._thread.start()
@@ -100,8 +100,8 @@ class Flying:
 
     def kill(self) -> None:
         """The view; the flight then goes on as fast as it can."""
-        self.attendant.process.kill()
-        self.attendant.process.wait()
+        self.viewer.process.kill()
+        self.viewer.process.wait()
 
     def join(self) -> None:
         self._thread.join(2.0 * PATIENCE)
@@ -111,7 +111,7 @@ class Flying:
         self.show.released.set()
         self.kill()
         self.join()
-        self.attendant.close()
+        self.viewer.close()
 
 
 class Look:
@@ -239,7 +239,7 @@ def test_pixels_show_vehicles_that_move_their_trails_and_their_plans(
     changes: dict[str, Any] = {"airborne": True, "companion": {"rates": {"replan_us": 50_000}}}
     of = scenario(name, **{**changes, **SHORT[name]})
     flight = fly(of)
-    look = page(flight.attendant.url)
+    look = page(flight.viewer.url)
     look.wait("flight", 2.0)
     look.hush()
     look.press("pause")

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from outrider.runs.ground_truth import Samples
-from outrider.scene.datagram_channel import Line
-from outrider.scene.view_commands import Wishes, encoded
+from outrider.scene.datagram_channel import DatagramChannel
+from outrider.scene.view_commands import ViewCommands, encoded
 from outrider.simulation.flight import Flight
 from outrider.swarm.lockstep_view import LockStepView, moment
-from outrider.view.viewer_client import Attendant
+from outrider.view.viewer_client import ViewerClient
 from tests.outrider.shipped import FIREFLY, LOGS, scenario
 from tests.outrider.view.flights import flown, line, logs, moments, small
 
@@ -22,7 +22,7 @@ from tests.outrider.view.flights import flown, line, logs, moments, small
 class Told(LockStepView):
     """Tells every sample, whatever the wall says, and does what ``act`` wants at each."""
 
-    def __init__(self, ours: Line) -> None:
+    def __init__(self, ours: DatagramChannel) -> None:
         super().__init__(ours)
         self.count = 0
 
@@ -35,15 +35,15 @@ class Told(LockStepView):
 class Kills(Told):
     """Kills the view in the middle of the flight."""
 
-    def __init__(self, attendant: Attendant, which: signal.Signals) -> None:
-        super().__init__(attendant.line)
-        self._attendant, self._which = attendant, which
+    def __init__(self, viewer: ViewerClient, which: signal.Signals) -> None:
+        super().__init__(viewer.line)
+        self._viewer, self._which = viewer, which
 
     def __call__(self, flight: Flight, now: int) -> None:
         if self.count == 60:
-            os.kill(self._attendant.process.pid, self._which)
+            os.kill(self._viewer.process.pid, self._which)
             if self._which is signal.SIGKILL:
-                self._attendant.process.wait(10.0)
+                self._viewer.process.wait(10.0)
         super().__call__(flight, now)
 
 
@@ -69,15 +69,15 @@ def test_who_is_only_seen_flies_as_alone(alone: dict[str, bytes], tmp_path: Path
 @pytest.mark.slow
 @pytest.mark.parametrize("which", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_view_may_be_killed_or_hang(which: signal.Signals, alone: dict[str, bytes], tmp_path: Path) -> None:
-    attendant = Attendant(port=18080)
+    viewer = ViewerClient(port=18080)
     try:
-        view = Kills(attendant, which)
+        view = Kills(viewer, which)
         flown(small(), tmp_path, view)
         assert view.count > 100
         assert logs(tmp_path) == alone
     finally:
-        attendant.process.send_signal(signal.SIGCONT)
-        attendant.close()
+        viewer.process.send_signal(signal.SIGCONT)
+        viewer.close()
 
 
 def test_a_moment_is_what_is_true() -> None:
@@ -109,7 +109,7 @@ def test_a_moment_is_what_is_true() -> None:
 class Changes(Told):
     """Says once, in the middle, what is wished."""
 
-    def __init__(self, ours: Line, theirs: Line, wishes: Wishes) -> None:
+    def __init__(self, ours: DatagramChannel, theirs: DatagramChannel, wishes: ViewCommands) -> None:
         super().__init__(ours)
         self._theirs, self._wishes = theirs, wishes
 
@@ -123,14 +123,16 @@ class Changes(Told):
 def test_methods_loss_and_target_can_be_changed(alone: dict[str, bytes], tmp_path: Path) -> None:
     place = (2.0, -1.0, 4.0)
     with line() as (ours, theirs):
-        view = Changes(ours, theirs, Wishes(methods="swivel+tangential", loss=0.5, target=place, moves=1))
+        view = Changes(
+            ours, theirs, ViewCommands(methods="swivel+tangential", loss=0.5, target=place, moves=1)
+        )
         flight = flown(small(), tmp_path, view)
     assert logs(tmp_path) != alone
     ((at, change),) = view.orders.given
     assert change.methods == "swivel+tangential"
     assert at is not None
     assert all(len(companion.planner._methods) == 2 for companion in flight.companions)
-    counters = flight.ether.counters
+    counters = flight.network.counters
     assert counters.dropped > 0.05 * counters.sent
     target = flight.truth.samples().target
     np.testing.assert_allclose(target[-1], place)

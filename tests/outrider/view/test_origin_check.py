@@ -12,7 +12,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from outrider.view.origin_check import admits
-from outrider.view.page_server import Theatre
+from outrider.view.page_server import PageServer
 
 PROTOCOL: Any = ["viser-v0"]
 
@@ -51,9 +51,9 @@ def test_the_name_that_it_was_told_to_serve_at_is_its_own() -> None:
 
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
-    theatre = Theatre("127.0.0.1", 8190)
-    yield theatre.server.get_port()
-    theatre.stop()
+    page_server = PageServer("127.0.0.1", 8190)
+    yield page_server.server.get_port()
+    page_server.stop()
 
 
 def test_the_library_is_as_it_was_once_the_server_stands(port: int) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from companion.values.horizon import roll_out
 from outrider.scene.palette import VEHICLES, linear, rgb
 from outrider.scene.scene import Scene, staged
-from outrider.scene.snapshot import KNOTS, Moment, State, euler_attitude, nearest, padded
+from outrider.scene.snapshot import KNOTS, Snapshot, State, euler_attitude, nearest, padded
 from outrider.view import shapes
 from outrider.view.panel import struck, table
 from outrider.view.planes import MOST, between, facing
@@ -136,7 +136,7 @@ def test_a_click_strikes_its_level_in_front_of_the_eye(
 def test_what_a_log_brings_in_stays_text() -> None:
     scene = Scene("mine", (11, 12), 2)
     state = State("<script>alert(1)</script>", 0.123, nan, None)
-    moment = Moment(
+    moment = Snapshot(
         1.0,
         "run",
         np.zeros((2, 3), np.float32),
@@ -155,7 +155,7 @@ def test_what_a_log_brings_in_stays_text() -> None:
 
 def test_a_large_fleet_has_a_short_table() -> None:
     count = 200
-    moment = Moment(
+    moment = Snapshot(
         0.0,
         "run",
         np.zeros((count, 3), np.float32),

@@ -20,10 +20,10 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
 from outrider.realtime.view_page import Window
 from outrider.runs import names
 from outrider.scene.changes import Change
-from outrider.scene.companion_snapshot import MODES, Glimpse
+from outrider.scene.companion_snapshot import MODES, CompanionSnapshot
 from outrider.scene.scene import Scene
-from outrider.scene.snapshot import KNOTS, NO_PLAN, Moment, State
-from outrider.scene.view_commands import Wishes
+from outrider.scene.snapshot import KNOTS, NO_PLAN, Snapshot, State
+from outrider.scene.view_commands import ViewCommands
 from outrider.simulation.flight import Flight
 from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
@@ -41,8 +41,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     return leave(tmp_path_factory.mktemp("view") / "run")
 
 
-def seen(player: Player, wall: float) -> list[Moment]:
-    return [one for one in player.poll(wall) if isinstance(one, Moment)]
+def seen(player: Player, wall: float) -> list[Snapshot]:
+    return [one for one in player.poll(wall) if isinstance(one, Snapshot)]
 
 
 def test_a_run_is_played_as_it_was(made: Made) -> None:
@@ -62,20 +62,20 @@ def test_a_run_is_played_as_it_was(made: Made) -> None:
 def test_pause_step_speed_and_a_time_that_is_chosen(made: Made) -> None:
     player = load(made.directory)
     player.poll(0.0)
-    player.wish(Wishes(paused=True), None)
+    player.wish(ViewCommands(paused=True), None)
     assert seen(player, 5.0) == []
-    player.wish(Wishes(paused=True, steps=2), None)
+    player.wish(ViewCommands(paused=True, steps=2), None)
     assert [one.time for one in seen(player, 6.0)] == pytest.approx([-0.8])
-    player.wish(Wishes(speed=4.0, steps=2), None)
+    player.wish(ViewCommands(speed=4.0, steps=2), None)
     assert [one.time for one in seen(player, 6.5)] == pytest.approx([1.2])
-    player.wish(Wishes(paused=True, steps=2), 3.0)
+    player.wish(ViewCommands(paused=True, steps=2), 3.0)
     found = seen(player, 7.0)
     # Of what was before there is a trail again.
     assert found[-1].time == 3.0
     times = [one.time for one in found]
     assert times == sorted(times)
     assert times[0] == pytest.approx(player.span[0])
-    player.wish(Wishes(speed=None, steps=2), None)
+    player.wish(ViewCommands(speed=None, steps=2), None)
     assert seen(player, 100.0)[-1].time == player.span[1]
     assert seen(player, 101.0) == []
 
@@ -184,7 +184,7 @@ class Overhears:
     def __init__(self, flight: Flight, ear: Ear, listener: Listener) -> None:
         self._flight, self._ear, self._listener = flight, ear, listener
         self._last = 0
-        self.shown: list[tuple[Any, Moment]] = []
+        self.shown: list[tuple[Any, Snapshot]] = []
         self.scenes: list[Scene] = []
 
     def begin(self, now: int, node: str) -> None:
@@ -209,10 +209,10 @@ def overheard(of: Any) -> Overhears:
     found = Overhears(flight, ear, listener)
     from mavlink_bridge.loops.lockstep import LockStep
 
-    loop = LockStep(flight._schedule(), flight.ether, of.timing.base_tick_us, [found])
+    loop = LockStep(flight._schedule(), flight.network, of.timing.base_tick_us, [found])
     from outrider.simulation.flight import EPOCH, _Computers
 
-    computers = _Computers(loop, flight.ether)
+    computers = _Computers(loop, flight.network)
     loop.run(EPOCH + 30_000_000, lambda now: flight._watch(now, computers))
     return found
 
@@ -249,7 +249,7 @@ def test_who_listens_sees_no_plan_of_who_is_disarmed(armed: bool) -> None:
     ]
     ear.arrived = [codec.encode(message) for message in said]
     *_, moment = Listener([ear], [True], 10, "").poll(1.0)
-    assert isinstance(moment, Moment)
+    assert isinstance(moment, Snapshot)
     assert np.isfinite(moment.plan).all() == armed
     assert moment.states[0].mode == ("GUIDED" if armed else "GUIDED, disarmed")
 
@@ -269,7 +269,7 @@ WORDS = st.sampled_from(MODES)
 def test_a_row_of_the_window_is_as_it_was_shown(k: int, mode: str, age: float, held: int) -> None:
     window = Window(3)
     plan = np.arange(6.0 * KNOTS, dtype=np.float32).reshape(KNOTS, 6)
-    window.show_companion(k, Glimpse(State(mode, age, 1.5, held), plan))
+    window.show_companion(k, CompanionSnapshot(State(mode, age, 1.5, held), plan))
     window.show_attitude(k, np.array([1.0, 0.0, 0.0, 0.0]))
     assert window.states[k] == State(mode, age, 1.5, held)
     assert (window.plans[k] == plan).all()

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 
 from outrider.scenarios.options import METHODS
 from outrider.scene.changes import FILE, Change, Orders
-from outrider.scene.view_commands import FASTEST, Wishes, decoded, encoded
+from outrider.scene.view_commands import FASTEST, ViewCommands, decoded, encoded
 from outrider.swarm.pace import LEASE, STEP, Pace
 
 SHARES = st.floats(0.0, 1.0)
 PLACES = st.tuples(*[st.floats(-1000.0, 1000.0)] * 3)
 COUNTS = st.integers(0, 1000)
 WISHES = st.builds(
-    Wishes,
+    ViewCommands,
     speed=st.none() | st.floats(0.01, FASTEST),
     paused=st.booleans(),
     steps=COUNTS,
@@ -30,13 +30,13 @@ WISHES = st.builds(
 )
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.sampled_from(Wishes._fields), inner),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.sampled_from(ViewCommands._fields), inner),
     max_leaves=10,
 )
 
 
 @given(WISHES)
-def test_wishes_arrive_as_they_were_made(wishes: Wishes) -> None:
+def test_wishes_arrive_as_they_were_made(wishes: ViewCommands) -> None:
     assert decoded(encoded(wishes)) == wishes
 
 
@@ -62,7 +62,7 @@ def paced(wall: Wall) -> Pace:
     return Pace(lambda: wall.now, wall.nap)
 
 
-def fly(pace: Pace, wall: Wall, seconds: float, wishes: Wishes | None, begin: int = 0) -> None:
+def fly(pace: Pace, wall: Wall, seconds: float, wishes: ViewCommands | None, begin: int = 0) -> None:
     """Ticks of 20 ms that take no time. Who is at the view says again and again what they wish."""
 
     def say(now: int) -> None:
@@ -77,19 +77,19 @@ def fly(pace: Pace, wall: Wall, seconds: float, wishes: Wishes | None, begin: in
 @given(st.floats(0.1, 50.0))
 def test_a_simulation_goes_at_the_speed_that_is_wished(speed: float) -> None:
     wall = Wall()
-    fly(paced(wall), wall, 10.0, Wishes(speed=speed))
+    fly(paced(wall), wall, 10.0, ViewCommands(speed=speed))
     assert wall.now == pytest.approx(10.0 / speed, rel=0.01, abs=0.05)
 
 
-@pytest.mark.parametrize("wishes", [None, Wishes()])
-def test_nobody_who_wishes_nothing_is_waited_for(wishes: Wishes | None) -> None:
+@pytest.mark.parametrize("wishes", [None, ViewCommands()])
+def test_nobody_who_wishes_nothing_is_waited_for(wishes: ViewCommands | None) -> None:
     wall = Wall()
     fly(paced(wall), wall, 10.0, wishes)
     assert wall.now == 0.0
 
 
-@pytest.mark.parametrize("wishes", [Wishes(paused=True), Wishes(speed=0.01)])
-def test_what_is_no_longer_said_no_longer_counts(wishes: Wishes) -> None:
+@pytest.mark.parametrize("wishes", [ViewCommands(paused=True), ViewCommands(speed=0.01)])
+def test_what_is_no_longer_said_no_longer_counts(wishes: ViewCommands) -> None:
     """A view that is killed or hangs while the flight is paused holds it for the lease, and no longer."""
     wall = Wall()
     pace = paced(wall)
@@ -101,8 +101,8 @@ def test_what_is_no_longer_said_no_longer_counts(wishes: Wishes) -> None:
 def test_a_step_goes_on_by_a_step() -> None:
     wall = Wall()
     pace = paced(wall)
-    pace.receive(Wishes(paused=True), 0)
-    pace.receive(Wishes(paused=True, steps=2), 0)
+    pace.receive(ViewCommands(paused=True), 0)
+    pace.receive(ViewCommands(paused=True, steps=2), 0)
     for now in range(0, 2 * STEP, 20_000):
         pace.wait(now, lambda: None)
     assert wall.now == 0.0
@@ -113,10 +113,10 @@ def test_a_step_goes_on_by_a_step() -> None:
 def test_one_that_cannot_keep_up_is_not_hurried_afterwards() -> None:
     wall = Wall()
     pace = paced(wall)
-    fly(pace, wall, 1.0, Wishes(speed=1.0))
+    fly(pace, wall, 1.0, ViewCommands(speed=1.0))
     wall.now += 5.0
     begin = wall.now
-    fly(pace, wall, 2.0, Wishes(speed=1.0), begin=1_000_000)
+    fly(pace, wall, 2.0, ViewCommands(speed=1.0), begin=1_000_000)
     assert wall.now - begin == pytest.approx(2.0, abs=0.1)
 
 
@@ -124,13 +124,13 @@ def test_each_change_counts_once_and_is_kept(tmp_path: Path) -> None:
     orders = Orders()
     orders.write(tmp_path)
     assert not list(tmp_path.iterdir())
-    said: list[Wishes] = [
-        Wishes(paused=True),
-        Wishes(methods="swivel"),
-        Wishes(methods="swivel"),
-        Wishes(methods="swivel", target=(1.0, 2.0, 3.0), moves=1),
-        Wishes(methods="swivel", target=(1.0, 2.0, 3.0), moves=1, loss=0.5),
-        Wishes(methods="swivel", target=(1.0, 2.0, 3.0), moves=2, loss=0.5),
+    said: list[ViewCommands] = [
+        ViewCommands(paused=True),
+        ViewCommands(methods="swivel"),
+        ViewCommands(methods="swivel"),
+        ViewCommands(methods="swivel", target=(1.0, 2.0, 3.0), moves=1),
+        ViewCommands(methods="swivel", target=(1.0, 2.0, 3.0), moves=1, loss=0.5),
+        ViewCommands(methods="swivel", target=(1.0, 2.0, 3.0), moves=2, loss=0.5),
     ]
     found = [orders.new(wishes, float(at)) for at, wishes in enumerate(said)]
     moved = Change(target=(1.0, 2.0, 3.0))

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sitl.autopilot.firmware import Flavour
+from sitl.autopilot.firmware import Firmware
 from sitl.autopilot.firmware.ardupilot import ArduPilot
 from sitl.autopilot.firmware.px4 import Px4
 from sitl.config.autopilot import AutopilotConfig
@@ -18,7 +18,7 @@ from sitl.values.setpoints import ACCELERATION, POSITION, VELOCITY, Pose, Refusa
 from tests.sitl.autopilot_rig import FLAVOURS, SITE, ZERO, setpoint
 
 CONFIG = AutopilotConfig(system_id=1, latitude=SITE.latitude, longitude=SITE.longitude)
-READERS: dict[str, Flavour] = {"ardupilot": ArduPilot(CONFIG), "px4": Px4(CONFIG)}
+READERS: dict[str, Firmware] = {"ardupilot": ArduPilot(CONFIG), "px4": Px4(CONFIG)}
 HERE = Pose((10.0, 20.0, -30.0), 0.5)
 P, V, A = (1.0, 2.0, -3.0), (4.0, 5.0, -6.0), (0.1, 0.2, -0.3)
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from sitl.environment.noise import one_pole, two_poles
 from sitl.estimation.profiles import PROFILES, SensorProfile
-from sitl.estimation.random_errors import PERIOD, Wandering
+from sitl.estimation.random_errors import PERIOD, RandomErrors
 
 SHARES = st.floats(1e-4, 20.0)
 NOISY = [PROFILES["rtk"], PROFILES["gnss"]]
@@ -49,11 +49,11 @@ def records(profile, seconds, seeds, every=SECOND // 10):
     """Errors (seeds, n, 12), ten a second."""
     found = []
     for seed in range(seeds):
-        wandering = Wandering(profile, np.random.default_rng(seed))
+        random_errors = RandomErrors(profile, np.random.default_rng(seed))
         rows = []
         for sample in range(0, seconds * SECOND, every):
-            wandering.advance(sample)
-            e = wandering.errors
+            random_errors.advance(sample)
+            e = random_errors.errors
             rows.append((*e.position, *e.velocity, e.roll, e.pitch, e.yaw, *e.body_rates))
         found.append(rows)
     return np.array(found)
@@ -62,12 +62,12 @@ def records(profile, seconds, seeds, every=SECOND // 10):
 @pytest.mark.parametrize("profile", NOISY, ids=["rtk", "gnss"])
 def test_the_sizes_are_those_of_the_table(profile):
     """At two times, over 400 vehicles: three standard errors of σ are at most 11 %."""
-    wanderings = [Wandering(profile, np.random.default_rng(seed)) for seed in range(400)]
+    wanderings = [RandomErrors(profile, np.random.default_rng(seed)) for seed in range(400)]
     rows = []
     for sample in (0, 2 * SECOND):
-        for wandering in wanderings:
-            wandering.advance(sample)
-            e = wandering.errors
+        for random_errors in wanderings:
+            random_errors.advance(sample)
+            e = random_errors.errors
             rows.append((*e.position, *e.velocity, e.roll, e.pitch, e.yaw, *e.body_rates))
     p = profile
     drifting = p.drift_time * p.drift_onset
@@ -102,10 +102,10 @@ def test_the_velocity_says_where_the_position_goes():
 
 def test_a_simulations_velocity_says_nothing_of_where_the_position_wanders():
     """And what it does not say is told to the position controller."""
-    wandering, rows = Wandering(PROFILES["sih"], np.random.default_rng(3)), []
+    random_errors, rows = RandomErrors(PROFILES["sih"], np.random.default_rng(3)), []
     for sample in range(60 * SECOND):
-        wandering.advance(sample)
-        e = wandering.errors
+        random_errors.advance(sample)
+        e = random_errors.errors
         rows.append((*e.position, *e.velocity, *e.drift))
     place, velocity, drift = np.split(np.array(rows), 3, axis=1)
     moved = np.diff(place[::SECOND], axis=0)
@@ -118,7 +118,7 @@ def test_a_simulations_velocity_says_nothing_of_where_the_position_wanders():
 @given(stops=st.lists(st.integers(0, 700), min_size=1, max_size=10))
 def test_the_errors_do_not_depend_on_which_samples_are_looked_at(stops):
     profile = PROFILES["gnss"]
-    hasty, patient = (Wandering(profile, np.random.default_rng(7)) for _ in range(2))
+    hasty, patient = (RandomErrors(profile, np.random.default_rng(7)) for _ in range(2))
     for sample in range(max(stops) + 1):
         patient.advance(sample)
         if sample in stops:

@@ -17,7 +17,7 @@ After that it is blocked in the kernel, waiting for a disk, and no longer flies.
 """
 
 
-class Crew:
+class ChildProcess:
     """Child process that runs ``worker.main``, started by fork."""
 
     def __init__(self, worker: Worker) -> None:

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from mavlink_bridge.clocks.clock import WallClock
 from outrider.errors import InputError
-from outrider.fly.event_log import Diary
+from outrider.fly.event_log import EventLog
 from outrider.fly.figures import summary
 from outrider.fly.flight import Flight
 from outrider.fly.instance_lock import instance_lock
@@ -61,8 +61,8 @@ def _live(asked: Request) -> int:
             (directory / CONFIGURATION).write_text(text, encoding="utf-8")
         except OSError as error:
             raise InputError(f"--out {directory}: cannot be written: {error.strerror}") from None
-        with closing(Diary(directory, lambda: time.monotonic() - began)) as diary:
-            flight = _flown(asked, directory, diary, stops, wiring)
+        with closing(EventLog(directory, lambda: time.monotonic() - began)) as event_log:
+            flight = _flown(asked, directory, event_log, stops, wiring)
     found = summary(flight, directory)
     try:
         (directory / SUMMARY).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
@@ -77,17 +77,17 @@ def _live(asked: Request) -> int:
     return FAULT if flight.fault else 0
 
 
-def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wiring: Wiring) -> Flight:
+def _flown(asked: Request, directory: Path, event_log: EventLog, stops: list[Came], wiring: Wiring) -> Flight:
     """Fly with a live display on a terminal, otherwise with one line per event."""
     console = Console(stderr=True)
     with typing(console.is_terminal) as typed:
         if not console.is_terminal:
-            diary.tell = say
-            flight = Flight(asked, wiring, directory, diary, typed, stops, lambda: None)
+            event_log.tell = say
+            flight = Flight(asked, wiring, directory, event_log, typed, stops, lambda: None)
             flight.run()
             return flight
         screen = Screen(terminal := Terminal(sys.stderr.fileno()))
-        diary.tell = screen.tell
+        event_log.tell = screen.tell
 
         def look() -> None:
             screen.pending = typed.pending
@@ -95,7 +95,7 @@ def _flown(asked: Request, directory: Path, diary: Diary, stops: list[Came], wir
             with suppress(OSError):
                 screen.look()
 
-        flight = screen.flight = Flight(asked, wiring, directory, diary, typed, stops, look)
+        flight = screen.flight = Flight(asked, wiring, directory, event_log, typed, stops, look)
         screen.live.start()
         try:
             flight.run()

@@ -29,7 +29,7 @@ _PATIENCE: Final = 5.0
 """Time limit for writing the remaining lines at the end (s)."""
 
 
-class Diary:
+class EventLog:
     """Event log that a thread writes to ``events.jsonl`` in ``directory``.
 
     ``tell`` receives the lines of text. ``phases`` holds each phase with its start time (s), ``concerns`` the

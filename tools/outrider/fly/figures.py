@@ -16,7 +16,7 @@ def summary(flight: Flight, directory: Path) -> dict[str, object]:
 
     Fields known to the worker alone are absent if it was killed; its last report is in ``state``.
     """
-    asked, state, diary = flight.asked, flight.state, flight.diary
+    asked, state, event_log = flight.asked, flight.state, flight.event_log
     profile = None if state.beat is None else KNOWN.get(state.beat[_NUMBER])
     return {
         "system": asked.system,
@@ -28,8 +28,8 @@ def summary(flight: Flight, directory: Path) -> dict[str, object]:
         "restarts": [{"wall_s": lost, "why": why} for lost, why in flight.restarts],
         "last_word": flight.last_word or None,
         "landed_off_m": None if flight.landing.off is None else round(flight.landing.off, 2),
-        "phases": [{"phase": phase, "wall_s": began} for phase, began in diary.phases],
-        "concerns": dict(diary.concerns),
+        "phases": [{"phase": phase, "wall_s": began} for phase, began in event_log.phases],
+        "concerns": dict(event_log.concerns),
         **flight.figures,
         "clock_steps": state.clock_steps,
         "state": state._asdict(),

@@ -25,17 +25,17 @@ from companion.values.phase import Phase
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.wire.signing import Signing
-from outrider.fly.child_process import Crew
-from outrider.fly.event_log import Diary
+from outrider.fly.child_process import ChildProcess
+from outrider.fly.event_log import EventLog
 from outrider.fly.hold_on_exit import farewell
 from outrider.fly.identify import Identification
 from outrider.fly.landing import verdict
-from outrider.fly.line_input import Typed
+from outrider.fly.line_input import LineInput
 from outrider.fly.orders import QUIT, Orders, answered, understood
-from outrider.fly.process_channel import Desk, OrderLink, intercom
+from outrider.fly.process_channel import Channel, OrderLink, intercom
 from outrider.fly.request import Request
 from outrider.fly.status import State
-from outrider.fly.watchdog import Pulse
+from outrider.fly.watchdog import Watchdog
 from outrider.fly.wiring import Wiring
 from outrider.fly.worker import Worker
 from outrider.interruption import Came, insisted
@@ -62,12 +62,12 @@ class Flight:
         asked: Request,
         wiring: Wiring,
         directory: Path,
-        diary: Diary,
-        typed: Typed,
+        event_log: EventLog,
+        typed: LineInput,
         stops: Sequence[Came],
         look: Callable[[], None],
     ) -> None:
-        self.asked, self.diary = asked, diary
+        self.asked, self.event_log = asked, event_log
         self.state = State()
         self.waiting = ""
         self.figures: dict[str, Any] = {}
@@ -82,7 +82,7 @@ class Flight:
         self._signing = None if asked.key is None else Signing(asked.key)
         self._orders = Orders(asked.system, asked.config.takeoff_height, self._signing)
         self._began = time.monotonic()
-        self._pulse = Pulse(self._began)
+        self._watchdog = Watchdog(self._began)
         self.landing = Landing(False, None)
         """Last landing, if the flight ended on the ground."""
         self._left = self._go_given = self._failed = self._elsewhere = False
@@ -104,9 +104,9 @@ class Flight:
         while True:
             self._wiring.drain()
             try:
-                self.diary.note("process", f"the companion flies in process {crew.start()}")
+                self.event_log.note("process", f"the companion flies in process {crew.start()}")
                 self._wiring.lend()
-                self._left, self._pulse = False, Pulse(time.monotonic())
+                self._left, self._watchdog = False, Watchdog(time.monotonic())
                 self._look_after(desk, crew)
             finally:
                 self._finish(desk, crew)
@@ -126,14 +126,14 @@ class Flight:
             self.state, self.waiting = State(), ""
             crew, desk, orders = self._crew(place)
 
-    def _crew(self, place: Path) -> tuple[Crew, Desk, OrderLink]:
+    def _crew(self, place: Path) -> tuple[ChildProcess, Channel, OrderLink]:
         """Return a process ready to fork, and both ends of its channel; its log goes to ``place``."""
         desk, orders = intercom()
         wiring = self._wiring
-        worker = Worker(self.asked, wiring.ends, wiring.twin, orders, place, self._simulated)
+        worker = Worker(self.asked, wiring.ends, wiring.duplicates, orders, place, self._simulated)
         if self._signing is not None:
             worker.resume(self._signing.newest)
-        return Crew(worker), desk, orders
+        return ChildProcess(worker), desk, orders
 
     @property
     def seconds(self) -> float:
@@ -148,17 +148,17 @@ class Flight:
         while not self._over():
             beat = known.look(self._wall.now())
             if beat is not None:
-                self.diary.note("heard", f"vehicle {config.system} is heard on {endpoint}")
+                self.event_log.note("heard", f"vehicle {config.system} is heard on {endpoint}")
                 return True
             if known.waiting != self.waiting:
                 self.waiting = known.waiting
-                self.diary.note("waiting", self.waiting)
+                self.event_log.note("waiting", self.waiting)
             self._obey(None)
             self._look()
             time.sleep(LOOK)
         return False
 
-    def _look_after(self, desk: Desk, crew: Crew) -> None:
+    def _look_after(self, desk: Channel, crew: ChildProcess) -> None:
         while not self._over():
             wait([desk.fileno(), crew.sentinel], LOOK)
             desk.beat(time.monotonic())
@@ -169,7 +169,7 @@ class Flight:
                 ended = "gave up" if crew.status is None else f"ended with status {crew.status}"
                 self._lose(f"its process {ended}")
                 return
-            if self._pulse.stopped(time.monotonic()):
+            if self._watchdog.stopped(time.monotonic()):
                 crew.kill()
                 self._lose("its process is not heard any more")
                 return
@@ -191,13 +191,13 @@ class Flight:
         self._trouble = ""
         now = self.seconds
         self.restarts.append((round(now, 2), why))
-        self.diary.note("lost", f"the companion is gone: {why}")
+        self.event_log.note("lost", f"the companion is gone: {why}")
         if len(self.restarts) >= MOST and now - self.restarts[-MOST][0] < WITHIN and not self.ended:
             self.ended, self.fault = why, True
 
-    def _hear(self, desk: Desk) -> None:
+    def _hear(self, desk: Channel) -> None:
         for news in desk.news():
-            self._pulse.heard(time.monotonic())
+            self._watchdog.heard(time.monotonic())
             kind = news.pop("kind")
             if kind == "state":
                 self.state = State(**news)
@@ -207,10 +207,10 @@ class Flight:
                     self.waiting = news["text"]
                 elif news["what"] == "phase":
                     self.state, self.waiting = self.state._replace(phase=news["text"]), ""
-                self.diary.note(news["what"], news["text"], news["at"])
+                self.event_log.note(news["what"], news["text"], news["at"])
             elif kind == "ack":
                 answer = answered(news["command"], news["result"], self.state.phase, self.waiting)
-                self.diary.note("answer", answer)
+                self.event_log.note("answer", answer)
             elif kind == "landing":
                 self.landing = Landing(**news)
             elif kind == "figures":
@@ -220,7 +220,7 @@ class Flight:
             elif kind == "left":
                 self._left = True
 
-    def _obey(self, desk: Desk | None) -> None:
+    def _obey(self, desk: Channel | None) -> None:
         """Execute typed orders, and the go that was given on the command line.
 
         Without a ``desk`` no process flies yet.
@@ -234,13 +234,13 @@ class Flight:
                 if desk is not None and not answer:
                     self._order(word, desk)
             if answer:
-                self.diary.note("answer", answer)
+                self.event_log.note("answer", answer)
         ready = self.state.phase == Phase.CONNECT.value and self.waiting == OPERATORS_GO
         if desk is not None and self.asked.go and ready and not self._go_given:
             self._go_given = True
             self._order("go", desk)
 
-    def _refused(self, word: str, desk: Desk | None) -> str:
+    def _refused(self, word: str, desk: Channel | None) -> str:
         """Return why an order is not forwarded; empty if it is forwarded."""
         if self.asked.dry_run:
             return f"{word}: a dry run takes no orders; allowed: {QUIT}"
@@ -249,16 +249,16 @@ class Flight:
             return f"{word}: not yet: it waits for {self.waiting}"
         return ""
 
-    def _order(self, word: str, desk: Desk) -> None:
+    def _order(self, word: str, desk: Channel) -> None:
         if self._signing is not None:
             # Not older than the newest stamp the companion has received: a simulation's time may run ahead of
             # the wall's.
             self._signing.resume(self.state.stamp)
             self._signing.present(self._wall.now())
-        self.diary.note("order", word)
+        self.event_log.note("order", word)
         desk.order(self._orders.frame(word))
 
-    def _finish(self, desk: Desk, crew: Crew) -> None:
+    def _finish(self, desk: Channel, crew: ChildProcess) -> None:
         """End the flying process; then, whatever happens meanwhile, ask the vehicle to hold."""
         try:
             self._dismiss(desk, crew)
@@ -270,7 +270,7 @@ class Flight:
         self._hear(desk)
         desk.close()
 
-    def _dismiss(self, desk: Desk, crew: Crew) -> None:
+    def _dismiss(self, desk: Channel, crew: ChildProcess) -> None:
         desk.stop()
         if crew.killed:
             crew.join()
@@ -280,7 +280,7 @@ class Flight:
             if self._at_once() or time.monotonic() > until:
                 crew.kill()
                 crew.join()
-                self.diary.note("process", "the companion's process does not end: killed")
+                self.event_log.note("process", "the companion's process does not end: killed")
                 return
             wait([desk.fileno(), crew.sentinel], _QUICK)
             self._hear(desk)
@@ -299,6 +299,6 @@ class Flight:
         word = LastWord(self.asked.system, beat, self._signing, steered=state.ours)
         farewell(word, self._wiring.ends["autopilot"], self._wall, self._at_once)
         self.last_word, self._failed = word.said, word.failed
-        self.diary.note("last word", f"the vehicle: {word.said or 'asked to hold, no answer yet'}")
+        self.event_log.note("last word", f"the vehicle: {word.said or 'asked to hold, no answer yet'}")
         if word.failed:
-            self.diary.note("critical", "the vehicle is armed and nobody has it: take it over")
+            self.event_log.note("critical", "the vehicle is armed and nobody has it: take it over")

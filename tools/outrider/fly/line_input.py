@@ -20,7 +20,7 @@ FEW: Final = 10
 """Maximum number of lines returned at once."""
 
 
-class Typed:
+class LineInput:
     """Typed lines of standard input; ``fileno`` is its file descriptor, None without one."""
 
     def __init__(self, fileno: int | None) -> None:
@@ -69,7 +69,7 @@ class Typed:
 
 
 @contextmanager
-def typing(shown: bool) -> Iterator[Typed]:
+def typing(shown: bool) -> Iterator[LineInput]:
     """Read lines from standard input.
 
     If ``shown`` (another part displays the incomplete line), a terminal passes on each character and echoes
@@ -77,14 +77,14 @@ def typing(shown: bool) -> Iterator[Typed]:
     """
     fileno = _standard_input()
     if fileno is None or not shown or not os.isatty(fileno):
-        yield Typed(fileno)
+        yield LineInput(fileno)
         return
     before = termios.tcgetattr(fileno)
     now = termios.tcgetattr(fileno)
     now[3] &= ~(termios.ICANON | termios.ECHO)
     termios.tcsetattr(fileno, termios.TCSANOW, now)
     try:
-        yield Typed(fileno)
+        yield LineInput(fileno)
     finally:
         # The terminal may be gone.
         with suppress(OSError, termios.error):

@@ -30,16 +30,16 @@ _ACK: Final = 77
 _BUFFER: Final = 1 << 20
 
 
-def intercom() -> tuple[Desk, OrderLink]:
+def intercom() -> tuple[Channel, OrderLink]:
     """Return both ends of a new channel: the parent's and the child's."""
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     for end in (there, here):
         end.setblocking(False)
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
-    return Desk(there), OrderLink(here)
+    return Channel(there), OrderLink(here)
 
 
-class Desk:
+class Channel:
     """Parent's end of the channel."""
 
     def __init__(self, end: socket.socket) -> None:

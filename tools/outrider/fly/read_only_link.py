@@ -15,7 +15,7 @@ _TELL: Final = frozenset((0, 20, 111, 251, 253))
 """HEARTBEAT, PARAM_REQUEST_READ, TIMESYNC, NAMED_VALUE_FLOAT, STATUSTEXT."""
 
 
-class HarmlessLink:
+class ReadOnlyLink:
     """Wrapper of ``link`` that sends only status messages and requests for messages, parameters and time.
 
     ``kept``: number of datagrams kept back.

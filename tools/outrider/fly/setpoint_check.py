@@ -18,7 +18,7 @@ _IN_A_ROW = 35_000
 """Longest interval over which yaw is compared (µs). After any pause yaw restarts at the vehicle's heading."""
 
 
-class SetpointGauge:
+class SetpointCheck:
     """Running statistics of set-points, fed with each set-point and its time (µs).
 
     No set-point may be faster than ``fastest`` (m/s), accelerate harder than ``hardest`` (m/s²), turn faster
@@ -92,13 +92,13 @@ class SetpointGauge:
 
 def gauge_for(
     limits: LimitsConfig, heading: HeadingConfig | None = None, compensation: float = 0.0
-) -> SetpointGauge:
+) -> SetpointCheck:
     """Return a check for a companion with these limits.
 
     ``compensation`` (m/s²) may be added to the plan's acceleration. Without ``heading`` the yaw is not
     checked, as it jumps where a flight continues after a pilot has turned the vehicle.
     """
-    return SetpointGauge(
+    return SetpointCheck(
         hypot(*limits.v_max), limits.a_total + compensation, inf if heading is None else heading.rate_max
     )
 

@@ -22,7 +22,7 @@ from outrider.fly.trajectory_comparison import likeness
 from outrider.runs.directories import new_directory
 from outrider.shadow.findings import document_of, leave
 from outrider.shadow.roles import Cast, Survey, survey
-from outrider.shadow.shadow_run import Rehearsed, rehearse
+from outrider.shadow.shadow_run import ShadowRun, rehearse
 from outrider.terminal.lines import say
 from outrider.terminal.share_progress import share_progress
 
@@ -87,7 +87,7 @@ def rehearsed(asked: Request, log: Path) -> int:
     return 1 if faults else 0
 
 
-def _faults(asked: Request, found: Rehearsed, mask: int) -> list[str]:
+def _faults(asked: Request, found: ShadowRun, mask: int) -> list[str]:
     """Return what is wrong with the set-points of the run, for an autopilot that expects ``mask``."""
     if not found.would:
         return ["no set-point at all"]

@@ -16,9 +16,9 @@ from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.wire.signing import Signing
-from outrider.fly.transmit_statistics import Departures
+from outrider.fly.transmit_statistics import TransmitStatistics
 from outrider.logs.flight_modes import mode_name
-from outrider.supervision.supervised_node import OURS, TWIN, Cockpit
+from outrider.supervision.supervised_node import OURS, TWIN, SupervisedNode
 
 SHOWN = 200_000
 """Wall time between two states (µs)."""
@@ -71,18 +71,18 @@ class State(NamedTuple):
         return Phase(self.phase) in OURS
 
 
-class News:
+class StatusReports:
     """Status reporter, called after every step; it reports through ``tell``."""
 
     def __init__(
         self,
-        cockpit: Cockpit,
-        departures: Departures,
+        supervised: SupervisedNode,
+        departures: TransmitStatistics,
         followed: FollowedClock | None,
         signing: Signing | None,
         tell: Callable[..., None],
     ) -> None:
-        self._cockpit, self._companion, self._departures = cockpit, cockpit.companion, departures
+        self._supervised, self._companion, self._departures = supervised, supervised.companion, departures
         self._followed, self._signing = followed, signing
         self._tell = tell
         self.plan_times = Histogram()
@@ -93,7 +93,7 @@ class News:
         self._states = 0
         self._plan_ms = (0.0, 0.0)
         self._told = self._refused = self._steps = self._remarked = 0
-        self._judged = self._twin = False
+        self._judged = self._duplicates = False
         self._landing: Landing | None = None
         self._concerns: dict[str, Concern] = {}
         self._sentences: dict[str, str] = {}
@@ -197,9 +197,11 @@ class News:
                 if name not in concerns:
                     self._event(at, "over", concern.text)
             self._concerns = concerns
-        if (twin := self._cockpit.barred == TWIN) != self._twin:
-            self._twin = twin
-            self._event(at, "critical" if twin else "over", "another companion with this system id is heard")
+        if (duplicates := self._supervised.barred == TWIN) != self._duplicates:
+            self._duplicates = duplicates
+            self._event(
+                at, "critical" if duplicates else "over", "another companion with this system id is heard"
+            )
         if self._followed is not None and self._followed.steps != self._steps:
             self._steps = self._followed.steps
             self._event(at, "clock", "the autopilot's clock was set, or began anew")
@@ -211,8 +213,8 @@ class News:
         pilot = self._companion.pilot
         if isinstance(self._companion, DryRun):
             return self._companion.pilot.lacking
-        if pilot.phase is Phase.CONNECT and pilot.waiting_for == OPERATORS_GO and self._cockpit.barred:
-            return self._cockpit.barred
+        if pilot.phase is Phase.CONNECT and pilot.waiting_for == OPERATORS_GO and self._supervised.barred:
+            return self._supervised.barred
         return pilot.waiting_for if pilot.phase in _WAITING else ""
 
     def _would(self) -> str:

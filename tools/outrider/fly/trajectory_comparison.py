@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from outrider.shadow.setpoints import TOGETHER, Array, Course, course
-from outrider.shadow.shadow_run import Rehearsed
+from outrider.shadow.shadow_run import ShadowRun
 
 _FRESH: Final = 500_000
 """Maximum age of a position (µs); an older one is not compared."""
@@ -24,7 +24,7 @@ A recorded PX4's own estimates diverged by 0.5 m in a second.
 """
 
 
-class Likeness(NamedTuple):
+class TrajectoryComparison(NamedTuple):
     """Result of the comparison; None where there is nothing to measure.
 
     ``beside``: distance (m) of set-points from the vehicle's position, less its own motion since then, 99th
@@ -46,13 +46,13 @@ class Likeness(NamedTuple):
         return found
 
 
-def likeness(found: Rehearsed) -> Likeness:
+def likeness(found: ShadowRun) -> TrajectoryComparison:
     """Compare the set-points that would have been sent with the vehicle's own positions."""
     of = course(found.would)
-    return Likeness(_quantile(_beside(of, found), 99), _quantile(_astray(of), 95))
+    return TrajectoryComparison(_quantile(_beside(of, found), 99), _quantile(_astray(of), 95))
 
 
-def _beside(of: Course, found: Rehearsed) -> Array:
+def _beside(of: Course, found: ShadowRun) -> Array:
     if not found.places or not len(of.times):
         return np.zeros(0)
     times = np.array([time for time, _ in found.places])

@@ -18,7 +18,7 @@ _COMMAND_LONG, _SETPOINT = 76, 84
 _COMMAND: Final = Struct("<28xH")
 
 
-class Departures:
+class TransmitStatistics:
     """Counters of a companion's outgoing frames, and the check of its set-points.
 
     ``messages`` counts frames by link, ``commands`` those to the autopilot by number; ``setpoints`` is the

@@ -11,7 +11,7 @@ HUNG: Final = 2.0
 _LATE: Final = 0.5
 
 
-class Pulse:
+class Watchdog:
     """Watchdog of a process that was started at ``now`` (s).
 
     A late poll restarts the time-out: what delayed the caller may have delayed the other process as well.

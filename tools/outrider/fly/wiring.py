@@ -17,7 +17,7 @@ from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.links.serial_port import SerialPort
 from mavlink_bridge.wire.header import Header
 from outrider.errors import InputError
-from outrider.supervision.duplicate_ids import Twin
+from outrider.supervision.duplicate_ids import DuplicateIds
 
 LAST_VEHICLE = 250
 """Highest system id of a vehicle; those above are ground stations'."""
@@ -32,13 +32,13 @@ Other messages may come from any sender.
 class Wiring(NamedTuple):
     """Open links of a companion.
 
-    ``ends`` maps the companion's names of links to links. ``dealers`` are the physical links; ``twin``
+    ``ends`` maps the companion's names of links to links. ``dealers`` are the physical links; ``duplicates``
     observes all of them.
     """
 
     ends: dict[str, DealtLink]
     dealers: list[Dealer]
-    twin: Twin
+    duplicates: DuplicateIds
 
     def physical(self, name: str) -> Link:
         """Return the physical link below the end of that ``name``."""
@@ -106,7 +106,7 @@ def wire(
     """Open the links. Raises InputError if one cannot be opened; then none stays open."""
     with ExitStack() as opened:
         dealers = []
-        twin = Twin(system, clock)
+        duplicates = DuplicateIds(system, clock)
         ends: dict[str, DealtLink] = {}
         for endpoint in dict.fromkeys(endpoints.values()):
             names = [name for name, other in endpoints.items() if other == endpoint]
@@ -116,7 +116,7 @@ def wire(
                 raise InputError(f"--{names[0]}: {error}") from None
             opened.callback(link.close)
             deal = {name: wants(name, system, target, config) for name in names}
-            dealers.append(Dealer(link, deal, twin))
+            dealers.append(Dealer(link, deal, duplicates))
             ends |= dealers[-1].ends
         opened.pop_all()
-    return Wiring(ends, dealers, twin)
+    return Wiring(ends, dealers, duplicates)

@@ -23,12 +23,12 @@ from mavlink_bridge.loops.realtime import RealTime
 from mavlink_bridge.wire.signing import Signing
 from outrider.fly.log import Log
 from outrider.fly.process_channel import OrderLink
-from outrider.fly.read_only_link import HarmlessLink
+from outrider.fly.read_only_link import ReadOnlyLink
 from outrider.fly.request import Request
-from outrider.fly.status import News
-from outrider.fly.transmit_statistics import Departures
-from outrider.supervision.duplicate_ids import Twin
-from outrider.supervision.supervised_node import Cockpit
+from outrider.fly.status import StatusReports
+from outrider.fly.transmit_statistics import TransmitStatistics
+from outrider.supervision.duplicate_ids import DuplicateIds
+from outrider.supervision.supervised_node import SupervisedNode
 
 _IGNORED: Final = (
     signal.SIGINT,
@@ -48,7 +48,7 @@ The parent alone handles them, and a terminal that is closed or stopped ends no 
 class Worker:
     """Body of the flying process.
 
-    ``links`` maps the companion's names to links, which ``twin`` observes; the log is written to
+    ``links`` maps the companion's names to links, which ``duplicates`` observes; the log is written to
     ``directory``. ``simulated``: whether an earlier process found the autopilot's clock to be a simulation's;
     None if that is unknown.
     """
@@ -57,15 +57,15 @@ class Worker:
         self,
         asked: Request,
         links: Mapping[str, Link],
-        twin: Twin,
+        duplicates: DuplicateIds,
         orders: OrderLink,
         directory: Path,
         simulated: bool | None = None,
     ) -> None:
         self._asked, self._orders, self._directory = asked, orders, directory
-        self._doors = [HarmlessLink(link) for link in links.values()] if asked.dry_run else []
+        self._doors = [ReadOnlyLink(link) for link in links.values()] if asked.dry_run else []
         self._links = dict(zip(links, self._doors or links.values(), strict=True))
-        self._parent, self._twin, self._simulated = os.getpid(), twin, simulated
+        self._parent, self._duplicates, self._simulated = os.getpid(), duplicates, simulated
         self._signing = None if asked.key is None else Signing(asked.key)
         kind = DryRun if asked.dry_run else Companion
         config = asked.config
@@ -124,9 +124,9 @@ class Worker:
         asked, node = self._asked, self.companion
         wall = WallClock()
         followed = self.followed(wall)
-        cockpit = Cockpit(node, wall, followed, self._signing, self._twin)
-        departures = Departures(node.config.limits, node.config.tracking.largest)
-        news = News(cockpit, departures, followed, self._signing, self._orders.tell)
+        supervised = SupervisedNode(node, wall, followed, self._signing, self._duplicates)
+        departures = TransmitStatistics(node.config.limits, node.config.tracking.largest)
+        news = StatusReports(supervised, departures, followed, self._signing, self._orders.tell)
         links: dict[str, Link | Sequence[Link]] = {
             **self._links,
             "ground": (self._links["ground"], self._orders),
@@ -134,13 +134,13 @@ class Worker:
 
         def stepped(now: int) -> bool:
             if os.getppid() != self._parent or self._orders.alone:
-                cockpit.give_up()
+                supervised.give_up()
             if isinstance(node, DryRun):
                 for message in node.would:
                     departures.take(now, message)
                 node.would.clear()
             news.look(now, wall.now())
-            return cockpit.last is not None and cockpit.last.over
+            return supervised.last is not None and supervised.last.over
 
         with IdleCollector() as garbage:
 
@@ -148,7 +148,7 @@ class Worker:
                 garbage.idle(free if followed is None else int(free / followed.rate))
 
             loop = RealTime(
-                Scheduled(cockpit, asked.config.period_us),
+                Scheduled(supervised, asked.config.period_us),
                 links,
                 wall if followed is None else followed,
                 taps=(log, departures),
@@ -159,7 +159,9 @@ class Worker:
             finally:
                 self._leave(loop, news, departures, 1.0 if followed is None else followed.rate)
 
-    def _leave(self, loop: RealTime, news: News, departures: Departures, rate: float) -> None:
+    def _leave(
+        self, loop: RealTime, news: StatusReports, departures: TransmitStatistics, rate: float
+    ) -> None:
         """Report the figures that the summary needs."""
         node, statistics = self.companion, loop.statistics
         for reading in node.shed():

@@ -21,9 +21,9 @@ from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.realtime import RealTime
 from outrider.errors import OutriderError
-from outrider.realtime.processes import Crew
-from outrider.realtime.shared_page import Board
-from outrider.realtime.spawn import muster, operators_turn, rough
+from outrider.realtime.processes import Processes
+from outrider.realtime.shared_page import SharedPage
+from outrider.realtime.spawn import operators_turn, rough, spawn
 from outrider.realtime.traces import Moved, Trace, put_together
 from outrider.realtime.view import RealTimeView, Seen
 from outrider.realtime.view_page import Window
@@ -90,13 +90,13 @@ class RealTimeFlight:
         for now in (0, self.fleet.vehicle.physics_period):
             first.step(now, [])
         window = None if self._view is None else Window(self.scenario.size)
-        board = Board(self.scenario.size, window)
+        board = SharedPage(self.scenario.size, window)
         wiring = wire(self.scenario.size, self._clock, len(self.scenario.moving), len(self.fleet.helmed))
         with TemporaryDirectory() as folder, self._interruptible():
             scratch = Path(folder)
             start = self._clock.now() + (_START_WITH_PRIORITY if self._priority else _START)
-            workers = muster(self.fleet, wiring, self._clock, board, start, self._directory, scratch)
-            crew = Crew(workers, wiring, board, scratch)
+            workers = spawn(self.fleet, wiring, self._clock, board, start, self._directory, scratch)
+            crew = Processes(workers, wiring, board, scratch)
             crew.start(priority=self._priority)
             try:
                 wiring.close_others(wiring.operator)
@@ -111,7 +111,7 @@ class RealTimeFlight:
                 loop.run(lambda: self._interrupts > 1, lambda now: leader.look(now, self._interrupts > 0))
             finally:
                 remains = crew.join()
-            counters = behind.ether.counters
+            counters = behind.network.counters
             self.outcome = self._gather(
                 scratch, conductor, leader.moves, remains, Messages(counters.sent, counters.dropped, 0)
             )
@@ -183,8 +183,8 @@ class _Leader:
         self,
         fleet: Fleet,
         conductor: Conductor,
-        crew: Crew,
-        board: Board,
+        crew: Processes,
+        board: SharedPage,
         progress: Progress,
         view: RealTimeView | None = None,
     ) -> None:

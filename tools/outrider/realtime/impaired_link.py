@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from mavlink_bridge.loops.lockstep import Direction, Tap
-from mavlink_bridge.network.simulated import Channel, Ether
+from mavlink_bridge.network.simulated import Channel, SimulatedNetwork
 from mavlink_bridge.node import Datagram, Node
 from mavlink_bridge.wire.header import sending_system
 from outrider.runs import names
 
 
-class Rough:
-    """``node`` behind ``ether``, in which every channel leads from one sender to it.
+class ImpairedLink:
+    """``node`` behind ``network``, in which every channel leads from one sender to it.
 
     ``senders``: for each link the node at its other end; None where there are many, which are identified by
     the system id in the header. Data from elsewhere, as on a multicast group that others use too, is dropped.
@@ -29,7 +29,7 @@ class Rough:
         self._senders = senders
         self._channels = [channel.name for channel in channels]
         self._known = {end for channel in channels for end in channel.members.items() if end[0] != node.name}
-        self.ether = Ether(channels, seed, tick)
+        self.network = SimulatedNetwork(channels, seed, tick)
         self._last: tuple[int, list[Datagram], list[Datagram]] | None = None
 
     @property
@@ -42,8 +42,8 @@ class Rough:
         for datagram in inbox:
             sender = self._senders.get(datagram.link) or self._speaker(datagram)
             if (sender, datagram.link) in self._known:
-                self.ether.send(now, sender, [datagram])
-        delivered = self.ether.receive(now, self.node.name)
+                self.network.send(now, sender, [datagram])
+        delivered = self.network.receive(now, self.node.name)
         self._last = now, delivered, []
         leaving = self.node.step(now, delivered)
         self._last = now, delivered, leaving
@@ -71,13 +71,13 @@ class Rough:
         """Block the swarm's channels between ``members`` and others."""
         inside = list(members)
         for channel in self._swarm:
-            self.ether.cut(channel, inside)
+            self.network.cut(channel, inside)
 
     def heal(self, members: Iterable[str]) -> None:
         """End the block of the swarm's channels between ``members`` and others."""
         inside = list(members)
         for channel in self._swarm:
-            self.ether.heal(channel, inside)
+            self.network.heal(channel, inside)
 
     @property
     def _swarm(self) -> list[str]:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from outrider.realtime.shared_page import Board
+from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.wiring import Wiring
 from outrider.realtime.workers import Remains, Worker
 
@@ -19,10 +19,10 @@ _FAREWELL = 10.0
 """s that a process has to write its results."""
 
 
-class Crew:
+class Processes:
     """One process for each of ``workers``; each writes its results to ``scratch``."""
 
-    def __init__(self, workers: Sequence[Worker], wiring: Wiring, board: Board, scratch: Path) -> None:
+    def __init__(self, workers: Sequence[Worker], wiring: Wiring, board: SharedPage, scratch: Path) -> None:
         self._workers, self._wiring, self._board, self._scratch = workers, wiring, board, scratch
         self._processes: dict[str, BaseProcess] = {}
 

@@ -17,7 +17,7 @@ _COLUMNS = 8
 _TEXT = 240
 
 
-class Board:
+class SharedPage:
     """Shared memory for ``vehicles`` vehicles; made before the processes fork.
 
     Times are µs, 0 for not yet. ``goal``: the goal event; ``end``: the end of the clock; ``stop``: all shall

@@ -10,8 +10,8 @@ from mavlink_bridge.clocks.node_clock import QUANTUM, NodeClock
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.network.channel import Channel
 from mavlink_bridge.node import Node
-from outrider.realtime.impaired_link import Rough
-from outrider.realtime.shared_page import Board
+from outrider.realtime.impaired_link import ImpairedLink
+from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.wiring import Wiring
 from outrider.realtime.workers import AutopilotWorker, CompanionWorker, PlayedWorker, Seat, Worker
 from outrider.runs import names
@@ -22,8 +22,8 @@ from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.targets import Target
 
 
-def muster(
-    fleet: Fleet, wiring: Wiring, clock: Clock, board: Board, start: int, logs: Path, scratch: Path
+def spawn(
+    fleet: Fleet, wiring: Wiring, clock: Clock, board: SharedPage, start: int, logs: Path, scratch: Path
 ) -> list[Worker]:
     """Return one worker for each node but the operator, due from ``start`` (µs) on.
 
@@ -63,7 +63,7 @@ def muster(
         behind = rough(fleet, helm, {"autopilot": names.companion(fleet.systems[k]), "swarm": None})
         turn = start + staggered(2 * len(fleet.systems) + index, _slots(fleet), timing.companion_us)
         every = Scheduled(behind, timing.companion_us, turn, fleet.clock(k, start))
-        workers.append(Worker(Seat(behind, every, wiring.helms[index], clock, board)))
+        workers.append(Worker(Seat(behind, every, wiring.backup_nodes[index], clock, board)))
     phase = start + staggered(_slots(fleet) - 2, _slots(fleet), timing.companion_us)
     played: list[Target | MovingObstacle] = [fleet.target(), *fleet.moving()]
     for node, links in zip(played, [wiring.target, *wiring.moving], strict=True):
@@ -106,9 +106,11 @@ def staggered(k: int, count: int, period: int) -> int:
     return k * period // count // QUANTUM * QUANTUM
 
 
-def rough(fleet: Fleet, node: Node, senders: dict[str, str | None]) -> Rough:
-    """Return ``node`` behind the links that the scenario defines for it; ``senders`` as for ``Rough``."""
-    return Rough(node, senders, _channels(fleet, node.name), fleet.seed, fleet.scenario.timing.base_tick_us)
+def rough(fleet: Fleet, node: Node, senders: dict[str, str | None]) -> ImpairedLink:
+    """Return ``node`` behind the links that the scenario defines; ``senders`` as for ``ImpairedLink``."""
+    return ImpairedLink(
+        node, senders, _channels(fleet, node.name), fleet.seed, fleet.scenario.timing.base_tick_us
+    )
 
 
 def _channels(fleet: Fleet, receiver: str) -> list[Channel]:

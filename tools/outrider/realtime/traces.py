@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavlink_bridge.frames import ned_to_enu
-from outrider.runs.ground_truth import ROW, SAMPLE, Array, Truth
+from outrider.runs.ground_truth import ROW, SAMPLE, Array, GroundTruth
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.moving import places as moving_places
 from outrider.simulation.targets import Placed, Target
@@ -98,7 +98,7 @@ def put_together(
     target: Placed,
     moving: Sequence[MovingObstacle],
     goal: int | None,
-    truth: Truth,
+    truth: GroundTruth,
 ) -> None:
     """Pass the flight of all vehicles to ``truth`` on one grid of physics steps (``period`` µs).
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from outrider.scene.changes import Change, Orders
-from outrider.scene.datagram_channel import Line
-from outrider.scene.snapshot import Array, Moment, Single, State, enu_attitude
+from outrider.scene.datagram_channel import DatagramChannel
+from outrider.scene.snapshot import Array, Single, Snapshot, State, enu_attitude
 from outrider.scene.view_commands import decoded
 
 PICTURE = 50_000
@@ -57,7 +57,7 @@ class Shown(Protocol):
 class RealTimeView:
     """View at one end of ``line``; changes by hand are recorded in ``orders``."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: DatagramChannel) -> None:
         self._line = line
         self._next = 0
         self.orders = Orders()
@@ -68,7 +68,7 @@ class RealTimeView:
             return
         self._next = now + PICTURE
         target: Single = np.full(3, np.nan, np.float32)
-        moment = Moment(
+        moment = Snapshot(
             seen.since,
             seen.stage,
             seen.positions.astype(np.float32),

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from companion.config.planning import MethodName
 from outrider.scene.changes import Change
-from outrider.scene.companion_snapshot import MODES, Glimpse
+from outrider.scene.companion_snapshot import MODES, CompanionSnapshot
 from outrider.scene.snapshot import KNOTS, Array, State
-from outrider.scene.view_commands import Wishes
+from outrider.scene.view_commands import ViewCommands
 
 EVERY = 50_000
 """µs between two snapshots of a node."""
@@ -24,7 +24,7 @@ _ROW = 8 + _PLAN
 """Columns: attitude (4), mode, age, plan's time, held plans, plan."""
 _WISHES = 7
 """Columns: number of commands; methods as bits; loss; number of moves of the target, and its place (3)."""
-_METHODS = Wishes(methods="baseline+swivel+approach_angle+tangential").method_names
+_METHODS = ViewCommands(methods="baseline+swivel+approach_angle+tangential").method_names
 
 
 class Window:
@@ -42,7 +42,7 @@ class Window:
         """Write the attitude of vehicle ``k``: (4,) w x y z, FRD in NED."""
         self._rows[k, 0:4] = attitude
 
-    def show_companion(self, k: int, seen: Glimpse) -> None:
+    def show_companion(self, k: int, seen: CompanionSnapshot) -> None:
         """Write the snapshot of companion ``k``."""
         state, row = seen.state, self._rows[k]
         row[4:8] = MODES.index(state.mode), state.age_s, state.plan_ms, state.held or 0
@@ -72,7 +72,7 @@ class Window:
         """Write a change for the processes, which read it at their next snapshot."""
         found = self._wishes
         if change.methods is not None:
-            asked = Wishes(methods=change.methods).method_names
+            asked = ViewCommands(methods=change.methods).method_names
             found[1] = sum(1 << bit for bit, name in enumerate(_METHODS) if name in asked)
         if change.loss is not None:
             found[2] = change.loss

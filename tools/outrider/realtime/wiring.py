@@ -20,19 +20,26 @@ _HOST = "127.0.0.1"
 class Wiring(NamedTuple):
     """Open links of all nodes, by node and link name.
 
-    ``helms`` are those of the backup nodes.
+    ``backup_nodes`` are those of the backup nodes.
     """
 
     autopilots: list[dict[str, list[Link]]]
     companions: list[dict[str, list[Link]]]
-    helms: list[dict[str, list[Link]]]
+    backup_nodes: list[dict[str, list[Link]]]
     target: dict[str, list[Link]]
     moving: list[dict[str, list[Link]]]
     operator: dict[str, list[Link]]
 
     def close_others(self, own: dict[str, list[Link]]) -> None:
         """Close every link but ``own``: a process keeps only those of its node."""
-        nodes = (*self.autopilots, *self.companions, *self.helms, *self.moving, self.target, self.operator)
+        nodes = (
+            *self.autopilots,
+            *self.companions,
+            *self.backup_nodes,
+            *self.moving,
+            self.target,
+            self.operator,
+        )
         for node in nodes:
             if node is not own:
                 for links in node.values():
@@ -40,8 +47,8 @@ class Wiring(NamedTuple):
                         link.close()
 
 
-def wire(vehicles: int, clock: Clock, moving: int = 0, helms: int = 0) -> Wiring:
-    """Open all links on free ports, also those of ``moving`` obstacles and of the first vehicles' ``helms``.
+def wire(vehicles: int, clock: Clock, moving: int = 0, backup_nodes: int = 0) -> Wiring:
+    """Open all links on free ports, also those of ``moving`` obstacles and of ``backup_nodes``.
 
     Raises LinkError if one cannot be opened; then none stays open.
     """
@@ -71,7 +78,7 @@ def wire(vehicles: int, clock: Clock, moving: int = 0, helms: int = 0) -> Wiring
             )
             operator.append(opening(f"udpout:{_HOST}:{_port(ground)}"))
         helmed = []
-        for autopilot, companion in list(zip(autopilots, companions, strict=True))[:helms]:
+        for autopilot, companion in list(zip(autopilots, companions, strict=True))[:backup_nodes]:
             # The backup node sends its set-points to the autopilot. It receives the data of both, and so
             # detects whether the companion sends.
             ends = [opening(f"udpin:{_HOST}:0"), opening(f"udpin:{_HOST}:0")]

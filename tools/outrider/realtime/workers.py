@@ -27,13 +27,13 @@ from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.loops.lockstep import Scheduled, Tap
 from mavlink_bridge.loops.priority import LEVEL, ask_for_priority, sharpen_timers
 from mavlink_bridge.loops.realtime import RealTime
-from outrider.realtime.impaired_link import Rough
-from outrider.realtime.shared_page import Board
+from outrider.realtime.impaired_link import ImpairedLink
+from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.traces import TraceWriter
 from outrider.realtime.view_page import EVERY, Window
 from outrider.runs import names
 from outrider.runs.recorder import Recorder
-from outrider.scene.companion_snapshot import glimpse
+from outrider.scene.companion_snapshot import companion_snapshot
 from outrider.scene.view_commands import LOSSY
 from outrider.simulation.bystander import Bystander
 from outrider.simulation.disturbances import Event, strike_autopilot, strike_computer
@@ -68,11 +68,11 @@ class Remains:
 class Seat(NamedTuple):
     """Environment of a node: its impaired links, schedule, open links, clock and board."""
 
-    rough: Rough
+    rough: ImpairedLink
     scheduled: Scheduled
     links: dict[str, list[Link]]
     clock: Clock
-    board: Board
+    board: SharedPage
 
 
 class Worker:
@@ -81,8 +81,8 @@ class Worker:
     above = 0
     """Levels of real-time priority above that of the others."""
 
-    def __init__(self, seat: Seat, events: Iterable[Event] = ()) -> None:
-        self.rough, self._scheduled, self.links, self._clock, self.board = seat
+    def __init__(self, slot: Seat, events: Iterable[Event] = ()) -> None:
+        self.rough, self._scheduled, self.links, self._clock, self.board = slot
         self.remains = Remains()
         self._parent = os.getpid()
         self._events = deque(events)
@@ -152,7 +152,7 @@ class Worker:
                 self.remains.lateness = due.lateness
                 self.remains.deadlines = due.lateness.count + due.skipped
                 self.remains.misses = due.misses + due.skipped
-        counters = self.rough.ether.counters
+        counters = self.rough.network.counters
         self.remains.sent = counters.sent
         self.remains.dropped = counters.dropped + statistics.overruns
 
@@ -173,8 +173,8 @@ class AutopilotWorker(Worker):
 
     above = 1
 
-    def __init__(self, k: int, node: Autopilot, trace: Path, seat: Seat, events: Iterable[Event]) -> None:
-        super().__init__(seat, events)
+    def __init__(self, k: int, node: Autopilot, trace: Path, slot: Seat, events: Iterable[Event]) -> None:
+        super().__init__(slot, events)
         self._k, self._node = k, node
         self._trace = TraceWriter(node)
         self._trace_path = trace
@@ -205,9 +205,9 @@ class CompanionWorker(Worker):
     """A companion; it writes its vehicle's tlog to ``logs``."""
 
     def __init__(
-        self, k: int, node: Companion, system: int, logs: Path, seat: Seat, events: Iterable[Event]
+        self, k: int, node: Companion, system: int, logs: Path, slot: Seat, events: Iterable[Event]
     ) -> None:
-        super().__init__(seat, events)
+        super().__init__(slot, events)
         self._k, self._node = k, node
         self._system, self._logs = system, logs
         self._thaws = 0
@@ -248,14 +248,14 @@ class CompanionWorker(Worker):
 
     def _look_on(self, now: int, window: Window) -> None:
         """Write the node's snapshot for the view, and apply the view's commands."""
-        window.show_companion(self._k, glimpse(self._node, now))
+        window.show_companion(self._k, companion_snapshot(self._node, now))
         if window.wishes == self._wishes:
             return
         self._wishes = window.wishes
         if window.methods and not isinstance(self._node, Bystander):
             self._node.use(window.methods)
         if window.loss is not None:
-            self.rough.ether.lose(LOSSY, window.loss)
+            self.rough.network.lose(LOSSY, window.loss)
 
     def leave(self, path: Path) -> None:
         """Write the results, with tallies and plan log."""
@@ -273,8 +273,8 @@ class CompanionWorker(Worker):
 class PlayedWorker(Worker):
     """A node that the harness plays: the target, or a moving obstacle."""
 
-    def __init__(self, node: Target | MovingObstacle, seat: Seat) -> None:
-        super().__init__(seat)
+    def __init__(self, node: Target | MovingObstacle, slot: Seat) -> None:
+        super().__init__(slot)
         self._node = node
         self._moves = 0
 
@@ -293,7 +293,7 @@ class PlayedWorker(Worker):
 class _Radio:
     """Partitions of the swarm for one companion; the parent applies faults of whole processes."""
 
-    def __init__(self, rough: Rough) -> None:
+    def __init__(self, rough: ImpairedLink) -> None:
         self._rough = rough
 
     def freeze(self, system: int) -> None:

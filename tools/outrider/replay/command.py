@@ -12,7 +12,7 @@ from rich.text import Text
 
 from mavlink_bridge.messages import Message
 from mavlink_bridge.wire.codec import Codec
-from outrider.replay.companion_replay import Difference, Reenacted, Sent
+from outrider.replay.companion_replay import Difference, Replayed, Sent
 from outrider.replay.run_replay import again
 from outrider.terminal.share_progress import share_progress
 
@@ -33,7 +33,7 @@ def replay(directory: Path, as_json: bool = False) -> int:
     return 0 if same else 1
 
 
-def _document(one: Reenacted) -> dict[str, object]:
+def _document(one: Replayed) -> dict[str, object]:
     return {
         "system_id": one.system,
         "identical": one.identical,
@@ -46,7 +46,7 @@ def _document(one: Reenacted) -> dict[str, object]:
     }
 
 
-def _show(name: str, found: tuple[Reenacted, ...]) -> None:
+def _show(name: str, found: tuple[Replayed, ...]) -> None:
     same = all(one.identical for one in found)
     table = Table()
     for head in ("vehicle", "steps", "frames sent again", "set-points", "different", "not at a step"):

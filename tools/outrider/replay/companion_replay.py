@@ -36,7 +36,7 @@ class Difference(NamedTuple):
     again: Sent | None
 
 
-class Reenacted(NamedTuple):
+class Replayed(NamedTuple):
     """Result for one vehicle.
 
     ``frames`` counts sent frames that are the same, ``setpoints`` the set-points among them, ``different``
@@ -63,7 +63,7 @@ def reenact(
     steps: Iterable[int],
     records: Iterable[Record],
     watch: Callable[[int], None] = lambda _time: None,
-) -> Reenacted:
+) -> Replayed:
     """Step ``companion`` at ``steps`` (µs) with what ``records`` contain at these times, and compare.
 
     ``own`` is its system and component id; ``watch`` receives the time of each step.
@@ -89,7 +89,7 @@ def reenact(
                 continue
             different += 1
             first = first or Difference(now, before, after)
-    return Reenacted(own[0], count, frames, setpoints, different, together.stray(), first)
+    return Replayed(own[0], count, frames, setpoints, different, together.stray(), first)
 
 
 class _Together:

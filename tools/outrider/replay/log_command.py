@@ -21,7 +21,7 @@ from outrider.runs.directories import new_directory
 from outrider.scenarios.scenario import FIRST_SYSTEM, Scenario
 from outrider.shadow.findings import document_of, leave
 from outrider.shadow.roles import Cast, check, survey
-from outrider.shadow.shadow_run import Rehearsed, rehearse
+from outrider.shadow.shadow_run import ShadowRun, rehearse
 from outrider.simulation.console import progress
 from outrider.swarm.command import fly
 from outrider.terminal.share_progress import share_progress
@@ -71,11 +71,11 @@ def chasing(log: Path, target: int, like: str, out: Path | None, as_json: bool) 
     except LogError as error:
         raise InputError(str(error)) from None
     told = setpoints(directory / names.log(FIRST_SYSTEM))
-    _tell(f"{log.name} · target {target}", Rehearsed(would=told), directory, as_json)
+    _tell(f"{log.name} · target {target}", ShadowRun(would=told), directory, as_json)
     return 0
 
 
-def _tell(title: str, found: Rehearsed, directory: Path, as_json: bool) -> None:
+def _tell(title: str, found: ShadowRun, directory: Path, as_json: bool) -> None:
     document = document_of(found)
     leave(directory, title, found, document)
     if as_json:

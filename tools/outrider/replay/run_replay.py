@@ -8,7 +8,7 @@ from pathlib import Path
 from companion.values.components import COMPONENT
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import Fault, InputError
-from outrider.replay.companion_replay import Reenacted, reenact
+from outrider.replay.companion_replay import Replayed, reenact
 from outrider.resources import config_root, find
 from outrider.runs import names
 from outrider.runs.configuration import resolved
@@ -24,7 +24,7 @@ _OFTEN = 256
 Watch = Callable[[str, float], None]
 
 
-def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[Reenacted, ...]:
+def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[Replayed, ...]:
     """Re-run the companions of the run in ``directory``, made from its configuration, from its logs.
 
     ``watch`` receives the name of the log and the share that is done. Raises InputError where there is no

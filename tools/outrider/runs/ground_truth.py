@@ -82,7 +82,7 @@ class Encounters:
             self._below = below[-1]
 
 
-class Truth:
+class GroundTruth:
     """Collector of the ground truth of ``vehicles``: every physics step, and a sample now and then.
 
     Distances are computed for many samples at once, when there are enough of them or when they are requested.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from companion.avoidance.field.plan_log import PlanLog
 from companion.planning import Tally
-from outrider.runs.ground_truth import Truth
+from outrider.runs.ground_truth import GroundTruth
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import Starts
 
@@ -48,7 +48,7 @@ class Outcome:
     span: float
     starts: Starts
     target_system: int
-    truth: Truth
+    truth: GroundTruth
     clock_start: int | None
     clock_end: int | None
     converged_at: int | None

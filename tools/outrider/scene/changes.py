@@ -6,14 +6,14 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from outrider.scene.view_commands import Wishes
+from outrider.scene.view_commands import ViewCommands
 
 FILE = "orders.json"
 """Name of the record in the run directory; it exists only if there were changes."""
 
 
 class Change(NamedTuple):
-    """The values of ``Wishes`` that are new; None for the others."""
+    """The values of ``ViewCommands`` that are new; None for the others."""
 
     methods: str | None = None
     loss: float | None = None
@@ -25,9 +25,9 @@ class Orders:
 
     def __init__(self) -> None:
         self.given: list[tuple[float | None, Change]] = []
-        self._last = Wishes()
+        self._last = ViewCommands()
 
-    def new(self, wishes: Wishes, seconds: float | None) -> Change | None:
+    def new(self, wishes: ViewCommands, seconds: float | None) -> Change | None:
         """Return what is new in ``wishes``, and record it; None if nothing is."""
         last, self._last = self._last, wishes
         change = Change(

@@ -16,14 +16,14 @@ MODES = tuple(phase.value + held for phase in Phase for held in ("", *_HELD.valu
 """All possible modes of a companion, in words."""
 
 
-class Glimpse(NamedTuple):
+class CompanionSnapshot(NamedTuple):
     """State of a companion, and the plan (KNOTS, 6) that it flies."""
 
     state: State
     plan: Single
 
 
-def glimpse(companion: Companion, now: int) -> Glimpse:
+def companion_snapshot(companion: Companion, now: int) -> CompanionSnapshot:
     """Return the snapshot of ``companion`` at ``now`` (µs)."""
     horizon, phase = companion.flown, companion.pilot.phase
     ages = companion.world.neighbours.ages(now)
@@ -34,4 +34,4 @@ def glimpse(companion: Companion, now: int) -> Glimpse:
         np.nan if companion.last_spent is None else 1e-6 * companion.last_spent,
         companion.held,
     )
-    return Glimpse(state, NO_PLAN if horizon is None else padded(horizon.knots[:, :6]))
+    return CompanionSnapshot(state, NO_PLAN if horizon is None else padded(horizon.knots[:, :6]))

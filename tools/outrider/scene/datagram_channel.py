@@ -9,7 +9,7 @@ ROOM = 1 << 20
 _LARGEST = 1 << 20
 
 
-class Line:
+class DatagramChannel:
     """One ``end`` of the channel, with ``room`` (bytes).
 
     ``dropped``: datagrams for which there was no room or no receiver.
@@ -51,5 +51,5 @@ class Line:
 
 
 def pair() -> tuple[socket.socket, socket.socket]:
-    """Return both ends, each for a ``Line``."""
+    """Return both ends, each for a ``DatagramChannel``."""
     return socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)

@@ -27,7 +27,7 @@ class State(NamedTuple):
     held: int | None = None
 
 
-class Moment(NamedTuple):
+class Snapshot(NamedTuple):
     """Snapshot at ``time`` s after the goal event: K vehicles, M moving obstacles, fleet-local ENU, SI.
 
     Missing values are NaN. ``position`` (K, 3); ``attitude`` (K, 4): w x y z of bodies with x forward, y

@@ -24,7 +24,7 @@ _LARGEST = 4096
 """Bytes."""
 
 
-class Wishes(NamedTuple):
+class ViewCommands(NamedTuple):
     """Commands of the view's user.
 
     ``speed``: multiple of real time, None for as fast as possible; ``paused``; ``steps``: number of requested
@@ -47,25 +47,25 @@ class Wishes(NamedTuple):
         return tuple(name for name in METHODS if name in asked)
 
 
-def encoded(wishes: Wishes) -> bytes:
+def encoded(wishes: ViewCommands) -> bytes:
     """Encode ``wishes`` for ``decoded``."""
     return json.dumps(wishes._asdict()).encode()
 
 
-def decoded(data: bytes) -> Wishes | None:
+def decoded(data: bytes) -> ViewCommands | None:
     """Decode the result of ``encoded``; return None for anything else."""
     if len(data) > _LARGEST:
         return None
     try:
         found = json.loads(data)
         place = found.get("target")
-        wishes = Wishes(**{**found, "target": None if place is None else tuple(place)})
+        wishes = ViewCommands(**{**found, "target": None if place is None else tuple(place)})
     except (ValueError, TypeError, AttributeError, RecursionError):
         return None
     return wishes if _sensible(wishes) else None
 
 
-def _sensible(wishes: Wishes) -> bool:
+def _sensible(wishes: ViewCommands) -> bool:
     speed, loss, target, methods = wishes.speed, wishes.loss, wishes.target, wishes.methods
     return (
         (speed is None or (_number(speed) and 0.0 < speed <= FASTEST))

@@ -10,7 +10,7 @@ import numpy as np
 
 from outrider.shadow.picture import draw
 from outrider.shadow.setpoints import apart, course, facts
-from outrider.shadow.shadow_run import Rehearsed
+from outrider.shadow.shadow_run import ShadowRun
 
 _COLUMNS = (
     *("who", "time_us", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s"),
@@ -18,7 +18,7 @@ _COLUMNS = (
 )
 
 
-def document_of(found: Rehearsed) -> dict[str, object]:
+def document_of(found: ShadowRun) -> dict[str, object]:
     """Return the results for scripts.
 
     They describe the set-points that would have been sent and, under ``sent``, those that were; ``apart_m``
@@ -37,7 +37,7 @@ def document_of(found: Rehearsed) -> dict[str, object]:
     return document
 
 
-def leave(directory: Path, name: str, found: Rehearsed, document: dict[str, object]) -> None:
+def leave(directory: Path, name: str, found: ShadowRun, document: dict[str, object]) -> None:
     """Write ``setpoints.csv``, ``replay.json`` and ``replay.png`` to ``directory``."""
     (directory / "replay.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     with (directory / "setpoints.csv").open("w", newline="", encoding="utf-8") as file:

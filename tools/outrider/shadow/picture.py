@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from outrider.shadow.setpoints import TOGETHER, Course, course
-from outrider.shadow.shadow_run import Rehearsed
+from outrider.shadow.shadow_run import ShadowRun
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _WOULD, _SENT, _FLOWN = "C0", "C1", "0.55"
 
 
-def draw(name: str, found: Rehearsed, path: Path) -> None:
+def draw(name: str, found: ShadowRun, path: Path) -> None:
     """Write the PNG: paths from above, position and speed over time, in the vehicle's local NED."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

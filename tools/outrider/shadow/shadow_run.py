@@ -28,7 +28,7 @@ from outrider.scenarios.part import TARGET_SYSTEM
 from outrider.shadow.roles import GLOBAL, Cast, Part, Survey
 from outrider.simulation.beacon import Beacon
 from outrider.simulation.paths import Motion
-from outrider.supervision.supervised_node import Cockpit
+from outrider.supervision.supervised_node import SupervisedNode
 
 _NEVER = 1 << 60
 """µs, 36,000 years after 1970: damage."""
@@ -40,7 +40,7 @@ Told = tuple[int, SetpointLocal]
 
 
 @dataclass
-class Rehearsed:
+class ShadowRun:
     """Results of a shadow run.
 
     ``would``: set-points that the companion would have sent; ``sent``: those that were, each with its time
@@ -64,7 +64,7 @@ def rehearse(
     on_step: Callable[[int, int], None] = lambda _now, _records: None,
     fleet: FleetFrame | None = None,
     follow: bool = False,
-) -> Rehearsed:
+) -> ShadowRun:
     """Step a shadow companion every 10 ms of the log's time with the records up to then.
 
     Without a target in ``cast``, a fixed target stands at the own vehicle's first position. ``on_step`` is
@@ -81,10 +81,10 @@ def rehearse(
     companion = ShadowCompanion(config, cast.own, target, fleet, lambda: 0)
     standing = None if cast.target is not None else Beacon(system, "target", _RATE_HZ, fleet)
     here = fleet.to_enu(*seen.place) * (1.0, 1.0, 0.0)
-    found, reader, stand_in = Rehearsed(), Codec(), _StandIn(cast.own, seen, fleet)
+    found, reader, stand_in = ShadowRun(), Codec(), _StandIn(cast.own, seen, fleet)
     wall = SimulatedClock(seen.begin)
     followed = FollowedClock(wall, seen.begin) if follow else None
-    cockpit = Cockpit(companion, wall, followed, None)
+    supervised = SupervisedNode(companion, wall, followed, None)
     for now, batch in steps(records):
         wall.wait_until(now)
         inbox = []
@@ -92,7 +92,7 @@ def rehearse(
             inbox += _given(cast.part(record.frame), record, reader, found, stand_in)
         if standing is not None and standing.due(now):
             inbox += standing.say(now, Motion(here, here * 0.0))
-        cockpit.step(now if followed is None else followed.now() // 4 * 4, inbox)
+        supervised.step(now if followed is None else followed.now() // 4 * 4, inbox)
         found.would += [(now, message) for message in companion.would]
         companion.would.clear()
         if companion.lacking:
@@ -126,7 +126,7 @@ def steps(records: Iterable[Record]) -> Iterator[tuple[int, list[Record]]]:
         yield now, batch
 
 
-def _given(part: Part, record: Record, reader: Codec, found: Rehearsed, stand_in: _StandIn) -> list[Datagram]:
+def _given(part: Part, record: Record, reader: Codec, found: ShadowRun, stand_in: _StandIn) -> list[Datagram]:
     """Return the datagrams that the companion receives for a record.
 
     Set-points from other senders and the vehicle's positions are collected in ``found``.

@@ -17,9 +17,9 @@ from companion.planning import Tally
 from companion.values.phase import Phase
 from mavlink_bridge.loops.garbage import seldom_collected
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
-from mavlink_bridge.network.simulated import Ether
+from mavlink_bridge.network.simulated import SimulatedNetwork
 from outrider.runs import names
-from outrider.runs.ground_truth import Limits, Truth
+from outrider.runs.ground_truth import GroundTruth, Limits
 from outrider.runs.outcome import Messages, Outcome
 from outrider.runs.recorder import Recorder
 from outrider.scenarios.faults import Vanish
@@ -28,7 +28,7 @@ from outrider.scenarios.scenario import Scenario
 from outrider.simulation.conductor import Conductor, Sight, Stage
 from outrider.simulation.disturbances import Event, events, strike_autopilot, strike_computer
 from outrider.simulation.fleet import Fleet
-from outrider.simulation.truth_observer import Witness
+from outrider.simulation.truth_observer import TruthObserver
 from sitl.vehicle.config import VehicleConfig
 
 EPOCH = 1_767_225_600_000_000
@@ -67,12 +67,12 @@ class Flight:
         self.moving = fleet.moving()
         self.autopilots = [fleet.autopilot(k) for k in range(scenario.size)]
         self.companions = [fleet.companion(k, stopwatch) for k in range(scenario.size)]
-        self.helms = [fleet.helm(k) for k in fleet.helmed]
+        self.backup_nodes = [fleet.helm(k) for k in fleet.helmed]
         self.operator = fleet.operator()
         self.truth = truth_of(scenario)
-        self.ether = Ether(fleet.channels(), seed, scenario.timing.base_tick_us)
+        self.network = SimulatedNetwork(fleet.channels(), seed, scenario.timing.base_tick_us)
         self.conductor = Conductor(scenario, fleet.starts, self.operator, EPOCH)
-        self._witness = Witness(self.autopilots, self.target, self.truth, self.moving)
+        self._observer = TruthObserver(self.autopilots, self.target, self.truth, self.moving)
         self._progress = progress
         self._reverse = reverse_nodes
         self._directory = run_directory
@@ -88,15 +88,15 @@ class Flight:
             taps = []
             if self._directory is not None:
                 taps.append(Recorder(self._directory, self.systems, files))
-            loop = LockStep(self._schedule(), self.ether, self.scenario.timing.base_tick_us, taps)
-            computers = _Computers(loop, self.ether)
+            loop = LockStep(self._schedule(), self.network, self.scenario.timing.base_tick_us, taps)
+            computers = _Computers(loop, self.network)
             loop.run(EPOCH + _LONGEST, lambda now: self._watch(now, computers))
 
     @property
     def outcome(self) -> Outcome:
         """Results of the flight."""
         conductor, now = self.conductor, [c.tally for c in self.companions]
-        counters = self.ether.counters
+        counters = self.network.counters
         return Outcome(
             self.scenario,
             self.seed,
@@ -122,7 +122,7 @@ class Flight:
             nodes.append(Scheduled(companion, timing.companion_us, EPOCH + phase, clock))
         for k in self.fleet.helmed:
             clock = self.fleet.clock(k, EPOCH)
-            nodes.append(Scheduled(self.helms[k], timing.companion_us, EPOCH, clock))
+            nodes.append(Scheduled(self.backup_nodes[k], timing.companion_us, EPOCH, clock))
         nodes.append(Scheduled(self.target, timing.companion_us, EPOCH))
         nodes += [Scheduled(moving, timing.companion_us, EPOCH) for moving in self.moving]
         nodes.append(Scheduled(self.operator, timing.companion_us, EPOCH))
@@ -134,7 +134,7 @@ class Flight:
         if conductor.clock_start is not None:
             while self._events and self._events[0].after <= now - conductor.clock_start:
                 self._strike(self._events.popleft(), computers)
-        if not self._witness.see(now):
+        if not self._observer.see(now):
             return False
         start = conductor.clock_start
         self._progress(conductor.stage, (now - (EPOCH if start is None else start)) * 1e-6)
@@ -180,8 +180,8 @@ class Flight:
 class _Computers:
     """The companions' computers in lock-step."""
 
-    def __init__(self, loop: LockStep, ether: Ether) -> None:
-        self._loop, self._ether = loop, ether
+    def __init__(self, loop: LockStep, network: SimulatedNetwork) -> None:
+        self._loop, self._network = loop, network
 
     def freeze(self, system: int) -> None:
         self._loop.freeze(names.companion(system))
@@ -193,15 +193,15 @@ class _Computers:
         self._loop.vanish(names.companion(system))
 
     def cut(self, systems: tuple[int, ...]) -> None:
-        self._ether.cut("swarm", map(names.companion, systems))
+        self._network.cut("swarm", map(names.companion, systems))
 
     def heal(self, systems: tuple[int, ...]) -> None:
-        self._ether.heal("swarm", map(names.companion, systems))
+        self._network.heal("swarm", map(names.companion, systems))
 
 
-def truth_of(scenario: Scenario) -> Truth:
+def truth_of(scenario: Scenario) -> GroundTruth:
     """Return the collector of the scenario's true motions, with its limits of distance."""
-    return Truth(
+    return GroundTruth(
         scenario.size,
         Limits(scenario.d_min, scenario.d_min_target, scenario.d_min_obstacle),
         FixedObstacles(scenario.obstacles),

@@ -7,21 +7,21 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mavlink_bridge.frames import ned_to_enu, yaw_to_enu
-from outrider.runs.ground_truth import NOWHERE, ROW, SAMPLE, Array, Truth
+from outrider.runs.ground_truth import NOWHERE, ROW, SAMPLE, Array, GroundTruth
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.moving import places as moving_places
 from outrider.simulation.targets import Placed, Target
 from sitl.node import Autopilot
 
 
-class Witness:
+class TruthObserver:
     """Observer of the autopilots of a lock-step run; ``see`` is called after every tick."""
 
     def __init__(
         self,
         autopilots: list[Autopilot],
         target: Target,
-        truth: Truth,
+        truth: GroundTruth,
         moving: Sequence[MovingObstacle] = (),
     ) -> None:
         self._autopilots = autopilots

@@ -20,7 +20,7 @@ from outrider.sitl_server.addresses import Address, addresses, extra
 from outrider.sitl_server.display import announce, watching
 from outrider.sitl_server.figures import Value, ready, summary
 from outrider.sitl_server.persistence import prepare
-from outrider.sitl_server.processes import Crew
+from outrider.sitl_server.processes import Processes
 from outrider.sitl_server.request import Request
 from outrider.sitl_server.wiring import wire
 
@@ -47,7 +47,7 @@ def run(asked: Request, terms: Terms) -> int:
     began = time.monotonic()
     prepare(terms.state, asked.flavour, asked.systems)
     places = _addresses(asked, terms)
-    crew = Crew(asked, wire(places, WallClock()), terms.state)
+    crew = Processes(asked, wire(places, WallClock()), terms.state)
     with noted((signal.SIGINT, signal.SIGTERM)) as stopped:
         try:
             announce(asked)
@@ -83,7 +83,7 @@ def _addresses(asked: Request, terms: Terms) -> list[Address]:
     return places
 
 
-def _wait(crew: Crew, stopped: Sequence[object], count: int) -> None:
+def _wait(crew: Processes, stopped: Sequence[object], count: int) -> None:
     """Wait until all vehicles are up."""
     while not stopped and not all(crew.board.gauges(index).up for index in range(count)):
         time.sleep(0.02)

@@ -12,10 +12,10 @@ from contextlib import contextmanager
 from rich.console import Console
 
 from outrider.sitl_server.addresses import Address
-from outrider.sitl_server.event_feed import Chronicle
+from outrider.sitl_server.event_feed import EventFeed
 from outrider.sitl_server.request import Request
 from outrider.sitl_server.screen import Screen
-from outrider.sitl_server.shared_page import Board
+from outrider.sitl_server.shared_page import SharedPage
 from outrider.terminal.lines import say
 
 
@@ -26,7 +26,7 @@ def announce(asked: Request) -> None:
 
 
 @contextmanager
-def watching(asked: Request, places: Sequence[Address], board: Board) -> Iterator[Callable[[], None]]:
+def watching(asked: Request, places: Sequence[Address], board: SharedPage) -> Iterator[Callable[[], None]]:
     """Show the vehicles, which are up; yield a function to call a few times a second."""
     console = Console(stderr=True)
     if console.is_terminal:
@@ -37,7 +37,7 @@ def watching(asked: Request, places: Sequence[Address], board: Board) -> Iterato
     for system, place in zip(asked.systems, places, strict=True):
         ends = " ".join(map(str, place.endpoints))
         say(f"vehicle {system} ({asked.flavour}, {asked.vehicle.name}): {ends}")
-    chronicle = Chronicle(asked, board)
+    chronicle = EventFeed(asked, board)
 
     def look() -> None:
         for line in chronicle.look():

@@ -6,15 +6,15 @@ from collections.abc import Iterator
 
 from outrider.logs.flight_modes import mode_name
 from outrider.sitl_server.request import Request
-from outrider.sitl_server.shared_page import SAYINGS, Board, Gauges
+from outrider.sitl_server.shared_page import SAYINGS, SharedPage, VehicleSnapshot
 
 
-class Chronicle:
+class EventFeed:
     """Event feed; ``look`` returns each event once. The number of UDP clients is some seconds late."""
 
-    def __init__(self, asked: Request, board: Board) -> None:
+    def __init__(self, asked: Request, board: SharedPage) -> None:
         self._asked, self._board = asked, board
-        self._before = [Gauges() for _ in range(asked.count)]
+        self._before = [VehicleSnapshot() for _ in range(asked.count)]
 
     def look(self) -> list[str]:
         """Return one line for each event since the last call: time since boot (s), vehicle, event."""
@@ -27,7 +27,7 @@ class Chronicle:
                 self._before[index] = now
         return lines
 
-    def _changes(self, index: int, before: Gauges, now: Gauges) -> Iterator[str]:
+    def _changes(self, index: int, before: VehicleSnapshot, now: VehicleSnapshot) -> Iterator[str]:
         first = max(before.said, now.said - SAYINGS)
         for number in range(first, now.said):
             yield f"says {self._board.saying(index, number)!r}"

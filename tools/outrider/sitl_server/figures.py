@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from outrider.sitl_server.addresses import Address
 from outrider.sitl_server.request import Request
-from outrider.sitl_server.shared_page import Board, Pace
+from outrider.sitl_server.shared_page import Pace, SharedPage
 
 Value = bool | int | float | str | None | list["Value"] | dict[str, "Value"]
 
@@ -26,7 +26,7 @@ def ready(asked: Request, places: Sequence[Address]) -> dict[str, Value]:
     return {"ready": True, "flavour": asked.flavour, "speedup": asked.speed, "vehicles": vehicles}
 
 
-def summary(asked: Request, board: Board, wall: float) -> dict[str, Value]:
+def summary(asked: Request, board: SharedPage, wall: float) -> dict[str, Value]:
     """Return the summary ``wall`` seconds after the beginning.
 
     All worker processes must have been joined.

@@ -9,13 +9,13 @@ from typing import Final
 from pydantic import ValidationError
 
 from outrider.errors import InputError
-from outrider.sitl_server.vehicle_group import Squad
+from outrider.sitl_server.vehicle_group import VehicleGroup
 from sitl.autopilot.saved import Saved
 
 _IDS: Final = ("SYSID_THISMAV", "MAV_SYS_ID")
 
 
-class Cabinet:
+class Persistence:
     """Files FLAVOUR-ID.json in ``directory``, by the id that a vehicle was started with.
 
     Without a directory nothing is stored.
@@ -44,21 +44,21 @@ class Cabinet:
         self._kept[system] = kept
         return kept
 
-    def keep(self, squad: Squad, *, ending: bool = False) -> None:
+    def keep(self, group: VehicleGroup, *, ending: bool = False) -> None:
         """Write the data that have changed since the last call; a file is replaced as a whole.
 
         The newest signature stamp changes all the time, so it alone causes a write only when ``ending``.
         """
         if self._directory is None:
             return
-        for seat in squad.seats:
-            found, before = seat.node.saved, self._kept[seat.system]
+        for slot in group.slots:
+            found, before = slot.node.saved, self._kept[slot.system]
             compared = found
             if not ending:
                 compared = found.model_copy(update={"signed_until": before.signed_until})
             if compared != before and not (_empty(compared) and _empty(before)):
-                self._kept[seat.system] = found
-                path = self._path(seat.system)
+                self._kept[slot.system] = found
+                path = self._path(slot.system)
                 if path is not None:
                     self._write(path, found)
 
@@ -91,6 +91,6 @@ def prepare(directory: Path | None, flavour: str, systems: range) -> None:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"--state {directory}: cannot be made: {error.strerror}") from None
-    cabinet = Cabinet(directory, flavour)
+    persistence = Persistence(directory, flavour)
     for system in systems:
-        cabinet.saved(system)
+        persistence.saved(system)

@@ -14,7 +14,7 @@ from mavlink_bridge.links.link import Link
 from outrider.errors import OutriderError
 from outrider.processes.cores import cores
 from outrider.sitl_server.request import Request
-from outrider.sitl_server.shared_page import Board
+from outrider.sitl_server.shared_page import SharedPage
 from outrider.sitl_server.worker import PERIOD, STRIDE, Worker
 from sitl.autopilot.saved import Saved
 
@@ -24,14 +24,14 @@ _FAREWELL: Final = 5.0
 """Time limit for a process to end by itself (s)."""
 
 
-def squads(count: int, speed: float, most: int) -> list[list[int]]:
+def groups(count: int, speed: float, most: int) -> list[list[int]]:
     """Distribute the indices of ``count`` vehicles over up to ``most`` processes."""
     busy = ceil(count * max(speed, 1.0) / FULL)
     number = min(count, most, busy)
-    return [list(range(squad, count, number)) for squad in range(number)]
+    return [list(range(group, count, number)) for group in range(number)]
 
 
-class Crew:
+class Processes:
     """Worker processes, one per group of vehicles; ``links`` by vehicle.
 
     After ``start`` this process has no link open.
@@ -39,11 +39,11 @@ class Crew:
 
     def __init__(self, asked: Request, links: list[list[Link]], state: Path | None) -> None:
         self._asked, self._links = asked, links
-        self.squads = squads(asked.count, asked.speed, cores())
-        self.board = Board(asked.count, len(self.squads))
+        self.groups = groups(asked.count, asked.speed, cores())
+        self.board = SharedPage(asked.count, len(self.groups))
         self._workers = [
             Worker(number, indices, asked, {str(index): links[index] for index in indices}, self.board, state)
-            for number, indices in enumerate(self.squads)
+            for number, indices in enumerate(self.groups)
         ]
         self._processes: list[BaseProcess] = []
 
@@ -66,7 +66,7 @@ class Crew:
         for number, process in enumerate(self._processes):
             if process.exitcode is not None:
                 fault = self.board.fault(number) or f"its process ended with status {process.exitcode}"
-                systems = ", ".join(str(self._asked.systems[index]) for index in self.squads[number])
+                systems = ", ".join(str(self._asked.systems[index]) for index in self.groups[number])
                 raise OutriderError(f"vehicles {systems}: {fault}")
 
     def stop(self) -> None:

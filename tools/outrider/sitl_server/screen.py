@@ -16,10 +16,10 @@ from rich.text import Text
 
 from outrider.logs.flight_modes import mode_name
 from outrider.sitl_server.addresses import Address
-from outrider.sitl_server.event_feed import Chronicle
+from outrider.sitl_server.event_feed import EventFeed
 from outrider.sitl_server.figures import factor
 from outrider.sitl_server.request import Request
-from outrider.sitl_server.shared_page import Board, Gauges, Pace
+from outrider.sitl_server.shared_page import Pace, SharedPage, VehicleSnapshot
 
 _REFRESH: Final = 0.5
 """Time between two pictures (s)."""
@@ -51,10 +51,12 @@ _COLUMNS: Final[dict[str, Literal["left", "right"]]] = {
 class Screen:
     """Live table; ``look`` may be called at any rate, the table is drawn twice a second."""
 
-    def __init__(self, asked: Request, places: Sequence[Address], board: Board, console: Console) -> None:
+    def __init__(
+        self, asked: Request, places: Sequence[Address], board: SharedPage, console: Console
+    ) -> None:
         self._asked, self._places, self._board = asked, places, board
         self._console = console
-        self._chronicle = Chronicle(asked, board)
+        self._chronicle = EventFeed(asked, board)
         self._events: deque[str] = deque(maxlen=_EVENTS)
         self._counts: deque[tuple[float, list[tuple[int, int]]]] = deque(maxlen=_WINDOW)
         self._paces: deque[list[Pace]] = deque(maxlen=_LATELY)
@@ -95,7 +97,7 @@ class Screen:
             f" · {factor(last, first):.2f} × real time · {late:.1f} ms late (p99)"
         )
 
-    def _row(self, index: int, gauges: Gauges) -> tuple[str, ...]:
+    def _row(self, index: int, gauges: VehicleSnapshot) -> tuple[str, ...]:
         (then, before), (now, counts) = self._counts[0], self._counts[-1]
         elapsed = max(now - then, 1e-3)
         received, sent = (

@@ -19,7 +19,7 @@ _FLAGS: Final = 16
 """Size of two numbers (bytes)."""
 
 
-class Gauges(NamedTuple):
+class VehicleSnapshot(NamedTuple):
     """Snapshot of one vehicle.
 
     ``position`` (m) and ``velocity`` (m/s) are true, ENU from the request's origin. ``battery`` is 0…1.
@@ -61,20 +61,20 @@ _VEHICLE: Final = 15
 _SQUAD: Final = len(Pace._fields)
 
 
-class Board:
+class SharedPage:
     """Shared page for that number of vehicles and groups.
 
     It is created before the processes fork, which then share it.
     """
 
-    def __init__(self, vehicles: int, squads: int) -> None:
-        numbers = vehicles * _VEHICLE + squads * _SQUAD
-        texts = vehicles * SAYINGS + squads
+    def __init__(self, vehicles: int, groups: int) -> None:
+        numbers = vehicles * _VEHICLE + groups * _SQUAD
+        texts = vehicles * SAYINGS + groups
         self._memory = mmap.mmap(-1, _FLAGS + 8 * numbers + texts * _TEXT)
         self._flags: NDArray[np.int64] = np.frombuffer(self._memory, dtype=np.int64, count=2)
         every = np.frombuffer(self._memory, dtype=np.float64, offset=_FLAGS, count=numbers)
         self._vehicles: NDArray[np.float64] = every[: vehicles * _VEHICLE].reshape(vehicles, _VEHICLE)
-        self._squads: NDArray[np.float64] = every[vehicles * _VEHICLE :].reshape(squads, _SQUAD)
+        self._groups: NDArray[np.float64] = every[vehicles * _VEHICLE :].reshape(groups, _SQUAD)
         self._texts = _FLAGS + 8 * numbers
         self._faults = self._texts + vehicles * SAYINGS * _TEXT
 
@@ -96,16 +96,16 @@ class Board:
     def lost(self, value: int) -> None:
         self._flags[1] = value
 
-    def show(self, index: int, gauges: Gauges) -> None:
+    def show(self, index: int, gauges: VehicleSnapshot) -> None:
         """Write the snapshot of vehicle ``index``."""
         up, armed, mode, position, velocity, *rest = gauges
         self._vehicles[index] = (up, armed, mode, *position, *velocity, *rest)
 
-    def gauges(self, index: int) -> Gauges:
+    def gauges(self, index: int) -> VehicleSnapshot:
         """Return the snapshot of vehicle ``index``; not ``up`` until its process has written one."""
         up, armed, mode, x, y, z, u, v, w, battery, *counts, time = self._vehicles[index].tolist()
         received, sent, clients, said = map(int, counts)
-        return Gauges(
+        return VehicleSnapshot(
             bool(up),
             bool(armed),
             int(mode),
@@ -127,24 +127,24 @@ class Board:
         """Return the text ``number`` of vehicle ``index``, one of its latest."""
         return self._read(self._texts + (index * SAYINGS + number % SAYINGS) * _TEXT)
 
-    def show_pace(self, squad: int, pace: Pace) -> None:
-        """Write the timing of group ``squad``."""
-        self._squads[squad] = pace
+    def show_pace(self, group: int, pace: Pace) -> None:
+        """Write the timing of group ``group``."""
+        self._groups[group] = pace
 
     def paces(self) -> list[Pace]:
         """Return the timing of each group."""
         return [
             Pace(simulated, wall, int(steps), int(misses), int(skipped), p99, most, int(overruns))
-            for simulated, wall, steps, misses, skipped, p99, most, overruns in self._squads.tolist()
+            for simulated, wall, steps, misses, skipped, p99, most, overruns in self._groups.tolist()
         ]
 
-    def fail(self, squad: int, text: str) -> None:
-        """Write the reason why the process of ``squad`` ended."""
-        self._write(self._faults + squad * _TEXT, text)
+    def fail(self, group: int, text: str) -> None:
+        """Write the reason why the process of ``group`` ended."""
+        self._write(self._faults + group * _TEXT, text)
 
-    def fault(self, squad: int) -> str:
-        """Return the reason why the process of ``squad`` ended; empty if there is none."""
-        return self._read(self._faults + squad * _TEXT)
+    def fault(self, group: int) -> str:
+        """Return the reason why the process of ``group`` ended; empty if there is none."""
+        return self._read(self._faults + group * _TEXT)
 
     def _write(self, begin: int, text: str) -> None:
         data = text.encode(errors="replace")[: _TEXT - 1]

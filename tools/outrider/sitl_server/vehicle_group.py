@@ -8,7 +8,7 @@ from typing import Final
 from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.node import Datagram
 from outrider.errors import OutriderError
-from outrider.sitl_server.shared_page import Board, Gauges
+from outrider.sitl_server.shared_page import SharedPage, VehicleSnapshot
 from outrider.sitl_server.traffic import Traffic
 from sitl.node import LINK, Autopilot
 
@@ -18,7 +18,7 @@ SHOWN: Final = 0.2
 """Wall time between two snapshots of a vehicle (s)."""
 
 
-class Seat:
+class Slot:
     """One vehicle of a group.
 
     ``index`` is its number among all vehicles, ``node`` the autopilot, ``system`` the id that it was started
@@ -41,7 +41,7 @@ def boot_times(indices: Sequence[int], speed: float, period: int) -> dict[int, i
     return {index: spread * number // len(indices) // period * period for number, index in enumerate(indices)}
 
 
-class Squad:
+class VehicleGroup:
     """Node whose links are those of its vehicles, named by their index."""
 
     name = "squad"
@@ -51,7 +51,7 @@ class Squad:
         vehicles: Mapping[int, Autopilot],
         boots: Mapping[int, int],
         first_id: int,
-        board: Board,
+        board: SharedPage,
         speed: float,
     ) -> None:
         """Make a group.
@@ -59,7 +59,7 @@ class Squad:
         ``vehicles`` are mapped by their index among all, which is their row on the ``board``. ``boots``:
         their boot times (µs). ``first_id``: system id of index 0. ``speed``: simulated seconds per second.
         """
-        self.seats = [Seat(index, node, first_id + index, boots[index]) for index, node in vehicles.items()]
+        self.slots = [Slot(index, node, first_id + index, boots[index]) for index, node in vehicles.items()]
         self._board = board
         self._shown = round(SHOWN * 1e6 * speed)
 
@@ -69,41 +69,41 @@ class Squad:
         for link, data in inbox:
             mail.setdefault(link, []).append(Datagram(LINK, data))
         leaving = []
-        for seat in self.seats:
-            if now < seat.boot:
+        for slot in self.slots:
+            if now < slot.boot:
                 continue
-            arrived = mail.get(seat.link, [])
+            arrived = mail.get(slot.link, [])
             for datagram in arrived:
-                seat.traffic.receive(datagram.data)
+                slot.traffic.receive(datagram.data)
             try:
                 # A late process must not make its vehicles younger than their clocks say.
-                late = not seat.booted and now > seat.boot
-                said = seat.node.step(seat.boot, []) if late else []
-                seat.booted = True
-                said += seat.node.step(now, arrived)
+                late = not slot.booted and now > slot.boot
+                said = slot.node.step(slot.boot, []) if late else []
+                slot.booted = True
+                said += slot.node.step(now, arrived)
             except Exception as error:
-                raise OutriderError(f"vehicle {seat.system}: {type(error).__name__}: {error}") from error
+                raise OutriderError(f"vehicle {slot.system}: {type(error).__name__}: {error}") from error
             for datagram in said:
-                seat.traffic.send(datagram.data)
-                leaving.append(Datagram(seat.link, datagram.data))
+                slot.traffic.send(datagram.data)
+                leaving.append(Datagram(slot.link, datagram.data))
         return leaving
 
     def show(self, now: int, clients: Callable[[str], int]) -> None:
         """Write the snapshots that are due at ``now`` (µs); ``clients`` returns the clients on a link."""
-        for seat in self.seats:
-            if now < seat.shown:
+        for slot in self.slots:
+            if now < slot.shown:
                 continue
-            seat.shown = now + self._shown
-            node, traffic, state = seat.node, seat.traffic, seat.node.state
+            slot.shown = now + self._shown
+            node, traffic, state = slot.node, slot.traffic, slot.node.state
             for text in traffic.sayings:
-                self._board.say(seat.index, seat.said, text)
-                seat.said += 1
+                self._board.say(slot.index, slot.said, text)
+                slot.said += 1
             traffic.sayings.clear()
             east, north, up = ned_to_enu(state.position).tolist()
             u, v, w = ned_to_enu(state.velocity).tolist()
             self._board.show(
-                seat.index,
-                Gauges(
+                slot.index,
+                VehicleSnapshot(
                     True,
                     node.armed,
                     node.custom_mode,
@@ -112,8 +112,8 @@ class Squad:
                     node.charge,
                     traffic.received,
                     traffic.sent,
-                    clients(seat.link),
-                    seat.said,
-                    (now - seat.boot) * 1e-6,
+                    clients(slot.link),
+                    slot.said,
+                    (now - slot.boot) * 1e-6,
                 ),
             )

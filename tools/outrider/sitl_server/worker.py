@@ -18,10 +18,10 @@ from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.priority import sharpen_timers
 from mavlink_bridge.loops.realtime import RealTime
 from outrider.sitl_server.clients import Clients
-from outrider.sitl_server.persistence import Cabinet
+from outrider.sitl_server.persistence import Persistence
 from outrider.sitl_server.request import Request
-from outrider.sitl_server.shared_page import Board, Pace
-from outrider.sitl_server.vehicle_group import Squad, boot_times
+from outrider.sitl_server.shared_page import Pace, SharedPage
+from outrider.sitl_server.vehicle_group import VehicleGroup, boot_times
 
 PERIOD: Final = 10_000
 """Simulated time between two steps (µs), from real time up to 10 times as fast."""
@@ -35,19 +35,19 @@ _SHOWN: Final = 1.0
 
 
 class Worker:
-    """Worker of one group: ``indices`` are its vehicles, ``links`` theirs by index, ``squad`` its row."""
+    """Worker of one group: ``indices`` are its vehicles, ``links`` theirs by index, ``group`` its row."""
 
     def __init__(
         self,
-        squad: int,
+        group: int,
         indices: Sequence[int],
         asked: Request,
         links: dict[str, list[Link]],
-        board: Board,
+        board: SharedPage,
         state: Path | None,
     ) -> None:
         self.links = links
-        self._number, self._indices, self._asked, self._board = squad, indices, asked, board
+        self._number, self._indices, self._asked, self._board = group, indices, asked, board
         self._state = state
         self._parent = os.getpid()
 
@@ -73,17 +73,17 @@ class Worker:
 
     def _run(self, clock: PacedClock) -> None:
         asked, wall = self._asked, WallClock()
-        cabinet = Cabinet(self._state, asked.flavour)
+        persistence = Persistence(self._state, asked.flavour)
         boots = boot_times(self._indices, asked.speed, period(asked.speed))
         vehicles = {
-            index: asked.autopilot(index, clock.start + boot, cabinet.saved(asked.systems[index]))
+            index: asked.autopilot(index, clock.start + boot, persistence.saved(asked.systems[index]))
             for index, boot in boots.items()
         }
         clients = Clients(self.links, wall)
-        squad = Squad(vehicles, boots, asked.first_id, self._board, asked.speed)
+        group = VehicleGroup(vehicles, boots, asked.first_id, self._board, asked.speed)
         with IdleCollector() as garbage:
             loop = RealTime(
-                Scheduled(squad, period(asked.speed)),
+                Scheduled(group, period(asked.speed)),
                 self.links,
                 clock,
                 tolerance=round(PERIOD * max(asked.speed, 1.0)),
@@ -93,17 +93,17 @@ class Worker:
 
             def look(now: int) -> None:
                 nonlocal looked
-                squad.show(now, clients)
+                group.show(now, clients)
                 elapsed = time.monotonic() - began
                 if elapsed - looked >= _SHOWN:
                     looked = elapsed
                     self._board.show_pace(self._number, _pace(loop, now, elapsed))
-                    cabinet.keep(squad)
+                    persistence.keep(group)
 
             try:
                 loop.run(self._over, look)
             finally:
-                cabinet.keep(squad, ending=True)
+                persistence.keep(group, ending=True)
                 self._board.show_pace(self._number, _pace(loop, clock.now(), time.monotonic() - began))
 
 

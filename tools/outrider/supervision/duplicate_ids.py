@@ -23,7 +23,7 @@ under way. After the second time without messages it counts as gone.
 """
 
 
-class Twin:
+class DuplicateIds:
     """Detector of a duplicate on the links of the companion of ``system``.
 
     A duplicate is a sender that has the companion's ids, and whose frames are not, byte by byte, frames that

@@ -18,8 +18,8 @@ from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
-from outrider.supervision.duplicate_ids import Twin
-from outrider.supervision.takeoff_inhibit import Gate
+from outrider.supervision.duplicate_ids import DuplicateIds
+from outrider.supervision.takeoff_inhibit import TakeoffInhibit
 
 CLOCK = "the rate of the autopilot's clock"
 TWIN = "the other companion with this system id to fall silent"
@@ -33,12 +33,12 @@ in whatever mode the vehicle flies.
 _OTHERS = ("swarm", "target")
 
 
-class Cockpit:
+class SupervisedNode:
     """``Node`` that supervises a companion.
 
     ``followed``: clock that receives the autopilot's stamps, as far as the companion accepts them; None for a
-    companion on wall time. ``signing``: the companion's. ``twin``: detector of duplicates on its links; not
-    used for a dry run, which has other ids, because the real companion may be present as well.
+    companion on wall time. ``signing``: the companion's. ``duplicates``: detector of duplicates on its links;
+    not used for a dry run, which has other ids, because the real companion may be present as well.
     """
 
     def __init__(
@@ -47,13 +47,13 @@ class Cockpit:
         wall: Clock,
         followed: FollowedClock | None,
         signing: Signing | None,
-        twin: Twin | None = None,
+        duplicates: DuplicateIds | None = None,
     ) -> None:
         self.companion = companion
         self.last: LastWord | None = None
         self._wall, self._followed, self._signing = wall, followed, signing
-        self._twin = None if isinstance(companion, DryRun) else twin
-        self._gate = Gate(companion.system, signing)
+        self._duplicates = None if isinstance(companion, DryRun) else duplicates
+        self._gate = TakeoffInhibit(companion.system, signing)
         self._warned = False
         self._stamp = 0
         self.settled = followed is None or followed.known
@@ -67,7 +67,7 @@ class Cockpit:
     @property
     def barred(self) -> str:
         """The condition for which any order to take off has to wait; empty for none."""
-        if self._twin is not None and self._twin.seen:
+        if self._duplicates is not None and self._duplicates.seen:
             return TWIN
         return "" if self.settled else CLOCK
 

@@ -21,7 +21,7 @@ _DENIED: Final = 2
 """MAV_RESULT."""
 
 
-class Gate:
+class TakeoffInhibit:
     """Filter of orders to the companion of ``system``; ``signing``: the companion's."""
 
     def __init__(self, system: int, signing: Signing | None) -> None:

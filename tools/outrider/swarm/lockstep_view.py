@@ -9,10 +9,10 @@ import numpy as np
 
 from mavlink_bridge.frames import ned_to_enu
 from outrider.scene.changes import Change, Orders
-from outrider.scene.companion_snapshot import glimpse
-from outrider.scene.datagram_channel import Line
-from outrider.scene.snapshot import Moment, enu_attitude
-from outrider.scene.view_commands import LOSSY, Wishes, decoded
+from outrider.scene.companion_snapshot import companion_snapshot
+from outrider.scene.datagram_channel import DatagramChannel
+from outrider.scene.snapshot import Snapshot, enu_attitude
+from outrider.scene.view_commands import LOSSY, ViewCommands, decoded
 from outrider.simulation.flight import EPOCH, Flight
 from outrider.swarm.pace import Pace
 
@@ -23,7 +23,7 @@ PICTURE = 0.04
 class LockStepView:
     """``Onlooker`` of one flight, at one end of ``line``; changes by hand are recorded in ``orders``."""
 
-    def __init__(self, line: Line, pace: Pace | None = None) -> None:
+    def __init__(self, line: DatagramChannel, pace: Pace | None = None) -> None:
         self._line = line
         self._pace = Pace() if pace is None else pace
         self._next = 0.0
@@ -50,13 +50,13 @@ class LockStepView:
                 obey(flight, now, change)
 
 
-def moment(flight: Flight, now: int) -> Moment:
+def moment(flight: Flight, now: int) -> Snapshot:
     """Return the snapshot of ``flight`` at ``now`` (µs) without changing its state."""
     start, autopilots = flight.conductor.clock_start, flight.autopilots
-    seen = [glimpse(companion, now) for companion in flight.companions]
+    seen = [companion_snapshot(companion, now) for companion in flight.companions]
     _, _, target = flight.truth.latest()
     moving = [one.motion(now).position for one in flight.moving]
-    return Moment(
+    return Snapshot(
         1e-6 * (now - (EPOCH if start is None else start)),
         flight.conductor.stage.value,
         ned_to_enu(np.array([a.state.position for a in autopilots])).astype(np.float32),
@@ -72,8 +72,8 @@ def obey(flight: Flight, now: int, change: Change) -> None:
     """Apply ``change`` at ``now`` (µs)."""
     if change.methods is not None:
         for companion in flight.companions[: flight.scenario.vehicles]:
-            companion.use(Wishes(methods=change.methods).method_names)
+            companion.use(ViewCommands(methods=change.methods).method_names)
     if change.loss is not None:
-        flight.ether.lose(LOSSY, change.loss)
+        flight.network.lose(LOSSY, change.loss)
     if change.target is not None:
         flight.target.move(now, np.array(change.target))

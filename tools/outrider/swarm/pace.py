@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from outrider.scene.view_commands import Wishes
+from outrider.scene.view_commands import ViewCommands
 
 LEASE = 2.0
 """s for which a command applies after it was received."""
@@ -21,13 +21,13 @@ class Pace:
         self, clock: Callable[[], float] = time.monotonic, nap: Callable[[float], None] = time.sleep
     ) -> None:
         self._clock, self._nap = clock, nap
-        self._wishes = Wishes()
+        self._wishes = ViewCommands()
         self._said = -LEASE
         self._steps: int | None = None
         self._until = 0
         self._anchor: tuple[float, int, float | None] | None = None
 
-    def receive(self, wishes: Wishes, now: int) -> None:
+    def receive(self, wishes: ViewCommands, now: int) -> None:
         """Take commands, while the simulation is at ``now`` (µs)."""
         if self._steps is None:
             self._steps = wishes.steps

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from outrider.realtime.view import RealTimeView
 from outrider.scene.changes import Orders
 from outrider.scene.scene import Lever, staged
-from outrider.scene.view_commands import Wishes
+from outrider.scene.view_commands import ViewCommands
 from outrider.swarm.lockstep_view import LockStepView
-from outrider.view.viewer_client import Attendant
+from outrider.view.viewer_client import ViewerClient
 
 if TYPE_CHECKING:
     from outrider.simulation.preparation import Prepared
@@ -22,27 +22,27 @@ _CHANGES: frozenset[Lever] = frozenset({"methods", "loss", "target"})
 
 
 class Show:
-    """View of one flight by ``attendant``.
+    """View of one flight by ``viewer``.
 
     ``watched``: whether a user is at a terminal; then a lock-step flight runs in real time from the
     beginning.
     """
 
-    def __init__(self, attendant: Attendant, watched: bool) -> None:
-        self._attendant, self._watched = attendant, watched
+    def __init__(self, viewer: ViewerClient, watched: bool) -> None:
+        self._viewer, self._watched = viewer, watched
         self.orders = Orders()
 
     def lock_step(self, prepared: Prepared, seed: int) -> LockStepView:
         """Return the onlooker of a lock-step flight."""
-        self._begin(prepared, seed, _CHANGES | {"pace"}, Wishes(speed=1.0 if self._watched else None))
-        view = LockStepView(self._attendant.line)
+        self._begin(prepared, seed, _CHANGES | {"pace"}, ViewCommands(speed=1.0 if self._watched else None))
+        view = LockStepView(self._viewer.line)
         self.orders = view.orders
         return view
 
     def real_time(self, prepared: Prepared, seed: int) -> RealTimeView:
         """Return the view of a flight in real time."""
-        self._begin(prepared, seed, _CHANGES, Wishes())
-        view = RealTimeView(self._attendant.line)
+        self._begin(prepared, seed, _CHANGES, ViewCommands())
+        view = RealTimeView(self._viewer.line)
         self.orders = view.orders
         return view
 
@@ -51,21 +51,21 @@ class Show:
         if self.orders.given:
             sys.stderr.write(f"changed by hand {len(self.orders.given)} times: {directory / 'orders.json'}\n")
         if self._watched:
-            self._attendant.landed(directory)
-            sys.stderr.write(f"{self._attendant.url} plays the run; Ctrl-C ends it\n")
-            self._attendant.wait()
+            self._viewer.landed(directory)
+            sys.stderr.write(f"{self._viewer.url} plays the run; Ctrl-C ends it\n")
+            self._viewer.wait()
 
-    def _begin(self, prepared: Prepared, seed: int, levers: frozenset[Lever], wishes: Wishes) -> None:
+    def _begin(self, prepared: Prepared, seed: int, levers: frozenset[Lever], wishes: ViewCommands) -> None:
         scene = staged(prepared.scenario, seed, prepared.vehicle.span, levers)
-        self._attendant.begin(scene, wishes)
+        self._viewer.begin(scene, wishes)
 
 
 @contextmanager
 def showing() -> Iterator[Show]:
     """Open a view on this machine, and close it afterwards; raise InputError if that is impossible."""
-    attendant = Attendant()
+    viewer = ViewerClient()
     try:
-        sys.stderr.write(f"{attendant.url} shows the flight\n")
-        yield Show(attendant, sys.stderr.isatty() and sys.stdin.isatty())
+        sys.stderr.write(f"{viewer.url} shows the flight\n")
+        yield Show(viewer, sys.stderr.isatty() and sys.stdin.isatty())
     finally:
-        attendant.close()
+        viewer.close()

@@ -14,7 +14,7 @@ from outrider.replay.target_replay import setpoints
 from outrider.report.log_events import mode
 from outrider.runs import names
 from outrider.runs.summary import Value
-from outrider.shadow.shadow_run import Rehearsed
+from outrider.shadow.shadow_run import ShadowRun
 from outrider.testing.golden import Golden
 from outrider.testing.setpoints import Setpoints
 
@@ -113,7 +113,7 @@ class Replayed(Setpoints):
     missing.
     """
 
-    def __init__(self, name: str, found: Rehearsed, golden: Golden) -> None:
+    def __init__(self, name: str, found: ShadowRun, golden: Golden) -> None:
         super().__init__(name, found.would, golden)
         self.sent = Setpoints(f"{name}, as it was sent", found.sent, golden)
         self.reasons = dict(found.reasons)

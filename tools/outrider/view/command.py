@@ -21,7 +21,7 @@ from outrider.interruption import noted
 from outrider.scenarios.scenario import TARGET_SYSTEM
 from outrider.terminal.share_progress import share_progress
 from outrider.view.listener import Listener
-from outrider.view.page_server import Theatre
+from outrider.view.page_server import PageServer
 from outrider.view.player import Player, load
 from outrider.view.recording import html
 from outrider.view.source import Source
@@ -88,13 +88,13 @@ def _whole(place: Endpoint) -> bool:
 def _serve(source: Source, terms: Terms, does: str) -> int:
     with _quiet(), noted((signal.SIGINT, signal.SIGTERM)) as stopped:
         try:
-            theatre = Theatre(terms.host, terms.port)
+            page_server = PageServer(terms.host, terms.port)
         except OSError as error:
             raise InputError(f"--host {terms.host}, --port {terms.port}: {error.strerror or error}") from None
-        sys.stderr.write(f"outrider view {does} {theatre.url} shows it; Ctrl-C ends it\n")
+        sys.stderr.write(f"outrider view {does} {page_server.url} shows it; Ctrl-C ends it\n")
         until = None if terms.seconds is None else time.monotonic() + terms.seconds
-        theatre.run(source, lambda: bool(stopped) or (until is not None and time.monotonic() > until))
-        theatre.stop()
+        page_server.run(source, lambda: bool(stopped) or (until is not None and time.monotonic() > until))
+        page_server.stop()
     return 0
 
 

@@ -18,8 +18,8 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 from outrider.logs.flight_modes import is_armed, told_mode
 from outrider.scene.scene import LEAST_REACH, Scene
-from outrider.scene.snapshot import NO_PLAN, Array, Moment, Single, State, euler_attitude, padded
-from outrider.scene.view_commands import Wishes
+from outrider.scene.snapshot import NO_PLAN, Array, Single, Snapshot, State, euler_attitude, padded
+from outrider.scene.view_commands import ViewCommands
 
 LOST, CARRIED, FRESH = 10.0, 0.5, 1.0
 """Limits of age (s).
@@ -74,7 +74,7 @@ class Listener:
     """
 
     span: tuple[float, float] | None = None
-    begin = Wishes()
+    begin = ViewCommands()
 
     def __init__(self, links: Sequence[Link], whole: Sequence[bool], target: int, hint: str) -> None:
         self._links = [
@@ -91,7 +91,7 @@ class Listener:
         self._shown: tuple[tuple[int, ...], bool] = (), False
         self._scene_at = self._begun = self._next = -np.inf
 
-    def poll(self, wall: float) -> Sequence[Scene | Moment]:
+    def poll(self, wall: float) -> Sequence[Scene | Snapshot]:
         """Return a scene when the shown vehicles change, and snapshots at the rate of the picture."""
         for link, datagrams, codec in self._links:
             for data in link.receive():
@@ -101,7 +101,7 @@ class Listener:
         if not systems or wall < self._next:
             return ()
         self._next = wall + PICTURE
-        found: list[Scene | Moment] = []
+        found: list[Scene | Snapshot] = []
         new = systems, self._certified
         if new != self._shown and wall - self._scene_at > NEW_SCENE:
             self._shown, self._scene_at = new, wall
@@ -111,7 +111,7 @@ class Listener:
             found.append(self._moment(wall))
         return found
 
-    def wish(self, wishes: Wishes, sought: float | None) -> None:
+    def wish(self, wishes: ViewCommands, sought: float | None) -> None:
         """Ignore view commands, because nothing is sent."""
 
     def _hear(self, wall: float, message: Message) -> None:
@@ -181,10 +181,10 @@ class Listener:
             step_s=self._step if self._certified else None,
         )
 
-    def _moment(self, wall: float) -> Moment:
+    def _moment(self, wall: float) -> Snapshot:
         shown = [self._heard[system] for system in self._shown[0]]
         target = self._heard.get(self._target)
-        return Moment(
+        return Snapshot(
             wall - self._begun,
             "live",
             np.array([_carried(one.fix, wall) for one in shown], np.float32),

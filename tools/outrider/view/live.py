@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from outrider.scene.datagram_channel import Line
+from outrider.scene.datagram_channel import DatagramChannel
 from outrider.scene.scene import Scene
-from outrider.scene.snapshot import Moment
-from outrider.scene.view_commands import Wishes, encoded
+from outrider.scene.snapshot import Snapshot
+from outrider.scene.view_commands import ViewCommands, encoded
 from outrider.view.player import Player
 
 
@@ -25,7 +25,7 @@ class Begin(NamedTuple):
     """Start of a flight: its ``scene``, and the initial view commands."""
 
     scene: Scene
-    wishes: Wishes
+    wishes: ViewCommands
 
 
 class Landed(NamedTuple):
@@ -37,10 +37,10 @@ class Landed(NamedTuple):
 class Live:
     """``Source`` at one end of ``line``; after the flight it plays the run that the flight left."""
 
-    def __init__(self, line: Line, load: Callable[[Path], Player]) -> None:
+    def __init__(self, line: DatagramChannel, load: Callable[[Path], Player]) -> None:
         self._line, self._load = line, load
         self._player: Player | None = None
-        self._begin = Wishes()
+        self._begin = ViewCommands()
 
     @property
     def span(self) -> tuple[float, float] | None:
@@ -48,7 +48,7 @@ class Live:
         return None if self._player is None else self._player.span
 
     @property
-    def begin(self) -> Wishes:
+    def begin(self) -> ViewCommands:
         """Initial view commands of the flight; afterwards those of the run."""
         return self._begin if self._player is None else self._player.begin
 
@@ -57,25 +57,25 @@ class Live:
         """Sentence shown to the user; empty during the flight."""
         return "" if self._player is None else self._player.hint
 
-    def poll(self, wall: float) -> Sequence[Scene | Moment]:
+    def poll(self, wall: float) -> Sequence[Scene | Snapshot]:
         """Return the received data. If too much was sent, the channel has dropped some; the rest is shown."""
         if self._player is not None:
             return self._player.poll(wall)
-        found: list[Scene | Moment] = []
+        found: list[Scene | Snapshot] = []
         for data in self._line.receive():
             # Received from the process that started this one, over a socket that no other process has.
             told = pickle.loads(data)
             if isinstance(told, Begin):
                 self._begin = told.wishes
                 found.append(told.scene)
-            elif isinstance(told, Moment):
+            elif isinstance(told, Snapshot):
                 found.append(told)
             elif isinstance(told, Landed):
                 self._player = self._load(Path(told.directory))
                 return self._player.poll(wall)
         return found
 
-    def wish(self, wishes: Wishes, sought: float | None) -> None:
+    def wish(self, wishes: ViewCommands, sought: float | None) -> None:
         """Pass the view commands on; a flight that is not simulated ignores them."""
         if self._player is not None:
             self._player.wish(wishes, sought)

@@ -9,10 +9,10 @@ from collections.abc import Callable
 import viser
 
 from outrider.scene.scene import Scene
-from outrider.scene.snapshot import Moment
+from outrider.scene.snapshot import Snapshot
 from outrider.view.origin_check import guarded
 from outrider.view.panel import Panel
-from outrider.view.renderer import Stage
+from outrider.view.renderer import Renderer
 from outrider.view.source import Source
 
 PICTURE = 1.0 / 30.0
@@ -29,7 +29,7 @@ class Server(viser.ViserServer):
         return None
 
 
-class Theatre:
+class PageServer:
     """Page at ``host`` and ``port``, or at the next free port. ``url`` is its address."""
 
     def __init__(self, host: str, port: int) -> None:
@@ -40,7 +40,7 @@ class Theatre:
         here = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::", "::1") else host
         self.url = f"http://{here}:{self.server.get_port()}"
         self.server.gui.add_markdown("Nothing has come yet.")
-        self._stage: Stage | None = None
+        self._stage: Renderer | None = None
         self._panel: Panel | None = None
 
     def run(self, source: Source, over: Callable[[], bool]) -> None:
@@ -63,7 +63,7 @@ class Theatre:
 
     def show(self, source: Source, wall: float) -> None:
         """Show the new data of ``source`` at the wall time ``wall`` (s)."""
-        moments: list[Moment] = []
+        moments: list[Snapshot] = []
         for one in source.poll(wall):
             if isinstance(one, Scene):
                 self._set(one, source)
@@ -84,7 +84,7 @@ class Theatre:
     def _set(self, scene: Scene, source: Source) -> None:
         self.server.scene.reset()
         self.server.gui.reset()
-        self._stage = Stage(self.server, scene)
+        self._stage = Renderer(self.server, scene)
         self._panel = Panel(self.server, self._stage, source.begin, source.span, source.hint)
 
     def stop(self) -> None:

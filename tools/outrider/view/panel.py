@@ -13,9 +13,9 @@ from viser import uplot
 from outrider.scenarios.options import METHODS
 from outrider.scene.palette import hex_of
 from outrider.scene.scene import Scene
-from outrider.scene.snapshot import Moment, nearest
-from outrider.scene.view_commands import Wishes
-from outrider.view.renderer import Stage
+from outrider.scene.snapshot import Snapshot, nearest
+from outrider.scene.view_commands import ViewCommands
+from outrider.view.renderer import Renderer
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4", "8", "as fast as it can")
 TABLE_EVERY, PLOT_EVERY = 0.2, 0.5
@@ -35,15 +35,15 @@ class Panel:
     def __init__(
         self,
         server: viser.ViserServer,
-        stage: Stage,
-        begin: Wishes,
+        stage: Renderer,
+        begin: ViewCommands,
         span: tuple[float, float] | None = None,
         hint: str = "",
     ) -> None:
         self._server, self._stage, self._gui = server, stage, server.gui
         self.wishes = self._begin = begin
         self._watched = False
-        self._last: Moment | None = None
+        self._last: Snapshot | None = None
         self._speed: viser.GuiDropdownHandle[str] | None = None
         self.sought: float | None = None
         self._series: deque[tuple[float, float]] = deque()
@@ -91,7 +91,7 @@ class Panel:
         elif not watched:
             self.wishes = self.wishes._replace(speed=self._begin.speed, paused=False)
 
-    def see(self, moment: Moment) -> None:
+    def see(self, moment: Snapshot) -> None:
         """Add a point to the plot. A time before the last one clears the plot."""
         if self._series and moment.time < self._series[-1][0]:
             self._series.clear()
@@ -101,7 +101,7 @@ class Panel:
         if len(self._series) > 2 * POINTS:
             self._series = deque(list(self._series)[::2])
 
-    def show(self, moment: Moment, wall: float, playing: float | None = None) -> None:
+    def show(self, moment: Snapshot, wall: float, playing: float | None = None) -> None:
         """Show the table and the plot of ``moment``, if they are due at ``wall`` (s).
 
         ``playing`` is the position of the slider, or None.
@@ -124,7 +124,7 @@ class Panel:
         if self._last is not None:
             self._head.content = self._headline(self._last)
 
-    def _headline(self, moment: Moment) -> str:
+    def _headline(self, moment: Snapshot) -> str:
         pair, scene = nearest(moment.position), self._stage.scene
         near = ""
         if isfinite(pair.distance):
@@ -199,7 +199,7 @@ class Panel:
 
     _target_height = 0.0
 
-    def notice(self, moment: Moment) -> None:
+    def notice(self, moment: Snapshot) -> None:
         """Store the height of the target: a click moves the target at this height."""
         if np.isfinite(moment.target).all():
             self._target_height = float(moment.target[2])
@@ -236,7 +236,7 @@ def struck(
     return place
 
 
-def table(scene: Scene, moment: Moment) -> str:
+def table(scene: Scene, moment: Snapshot) -> str:
     """Return the HTML table with a row for each vehicle."""
     rows = []
     for k, (system, state) in enumerate(zip(scene.systems, moment.states, strict=True)):

@@ -15,8 +15,8 @@ from outrider.runs.arrays import Motion, Plans
 from outrider.runs.source import read
 from outrider.scenarios.scenario import Scenario
 from outrider.scene.scene import SPAN, Scene, staged
-from outrider.scene.snapshot import Moment, State
-from outrider.scene.view_commands import Wishes
+from outrider.scene.snapshot import Snapshot, State
+from outrider.scene.view_commands import ViewCommands
 from outrider.view.recorded import Record, record
 from outrider.yaml_files.yaml_file import load as load_yaml
 from sitl.vehicle.config import VehicleConfig
@@ -42,7 +42,7 @@ class Player:
     ) -> None:
         self.scene, self._motion, self._records = scene, motion, records
         self.span: tuple[float, float] = float(motion.time_s[0]), float(motion.time_s[-1])
-        self.begin = Wishes(speed=1.0)
+        self.begin = ViewCommands(speed=1.0)
         self.hint = ""
         self._spent = [_of(plan_times, system) for system in scene.systems]
         self._wishes = self.begin
@@ -52,9 +52,9 @@ class Player:
         self._told: float | None = None
         self._sought = True
 
-    def poll(self, wall: float) -> Sequence[Scene | Moment]:
+    def poll(self, wall: float) -> Sequence[Scene | Snapshot]:
         """Return the scene at first, then a snapshot whenever time has advanced."""
-        found: list[Scene | Moment] = []
+        found: list[Scene | Snapshot] = []
         if self._wall is None:
             found.append(self.scene)
             self._wall = wall
@@ -72,7 +72,7 @@ class Player:
             found.append(self.moment(self._at))
         return found
 
-    def wish(self, wishes: Wishes, sought: float | None) -> None:
+    def wish(self, wishes: ViewCommands, sought: float | None) -> None:
         """Apply pause, steps and speed, and jump to the time ``sought``."""
         if wishes.paused and wishes.steps > self._wishes.steps:
             self._at = min(self._at + _STEP * (wishes.steps - self._wishes.steps), self.span[1])
@@ -81,7 +81,7 @@ class Player:
             self._at = min(max(sought, self.span[0]), self.span[1])
             self._sought = True
 
-    def moment(self, time: float) -> Moment:
+    def moment(self, time: float) -> Snapshot:
         """Return the snapshot at ``time`` (s after the goal event).
 
         It has the last sample before that time and the data of the logs.
@@ -89,7 +89,7 @@ class Player:
         motion = self._motion
         row = max(int(np.searchsorted(motion.time_s, time, side="right")) - 1, 0)
         now = int(motion.time[row])
-        return Moment(
+        return Snapshot(
             time,
             "before the goal" if time < 0.0 else "run",
             motion.position[row],

@@ -9,7 +9,7 @@ import signal
 import socket
 import sys
 
-from outrider.scene.datagram_channel import Line
+from outrider.scene.datagram_channel import DatagramChannel
 from outrider.view.live import Live, Ready
 
 _GENTLE = 10
@@ -25,17 +25,17 @@ def main(descriptor: int, host: str, port: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(OSError):
         os.nice(_GENTLE)
-    line = Line(socket.socket(fileno=descriptor))
+    line = DatagramChannel(socket.socket(fileno=descriptor))
     try:
-        from outrider.view.page_server import Theatre
+        from outrider.view.page_server import PageServer
         from outrider.view.player import load
 
-        theatre = Theatre(host, port)
+        page_server = PageServer(host, port)
     except Exception as error:
         line.send(pickle.dumps(Ready(error=f"{type(error).__name__}: {error}")))
         return
-    line.send(pickle.dumps(Ready(theatre.url)))
-    theatre.run(Live(line, load), lambda: os.getppid() != parent)
+    line.send(pickle.dumps(Ready(page_server.url)))
+    page_server.run(Live(line, load), lambda: os.getppid() != parent)
     # Threads of the server may still be sending to browsers: do not wait for them.
     os._exit(0)
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from outrider.view.page_server import Theatre
+from outrider.view.page_server import PageServer
 from outrider.view.player import Player
-from outrider.view.renderer import Stage
+from outrider.view.renderer import Renderer
 
 EVERY = 0.1
 """Time (s) between two pictures."""
@@ -16,16 +16,16 @@ EVERY = 0.1
 
 def html(player: Player, watch: Callable[[str, float], None]) -> str:
     """Return the HTML of the whole run of ``player``, at its own speed, without the table and the plot."""
-    theatre = Theatre("127.0.0.1", 0)
+    page_server = PageServer("127.0.0.1", 0)
     try:
-        stage = Stage(theatre.server, player.scene)
+        stage = Renderer(page_server.server, player.scene)
         begin, end = player.span
         stage.show(player.moment(begin))
-        recording = theatre.server.get_scene_serializer()
+        recording = page_server.server.get_scene_serializer()
         for time in np.arange(begin, end, EVERY).tolist():
             stage.show(player.moment(time))
             recording.insert_sleep(EVERY)
             watch("drawing", (time - begin) / max(end - begin, EVERY))
         return recording.as_html()
     finally:
-        theatre.stop()
+        page_server.stop()

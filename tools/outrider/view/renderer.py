@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from outrider.scene.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, linear, rgb
 from outrider.scene.scene import Scene, Solid
-from outrider.scene.snapshot import Array, Moment, Single
+from outrider.scene.snapshot import Array, Single, Snapshot
 from outrider.view import shapes
 from outrider.view.planes import MOST, Plane, between, facing
 from outrider.view.trails import Trails
@@ -37,7 +37,7 @@ class Layers(NamedTuple):
     labels: bool = True
 
 
-class Stage:
+class Renderer:
     """``scene`` on ``server``.
 
     All bodies are below one frame, which follows the vehicles if the scene requests that.
@@ -121,7 +121,7 @@ class Stage:
         for label in self._labels:
             label.visible = layers.labels
 
-    def show(self, moment: Moment, past: tuple[Moment, ...] = ()) -> None:
+    def show(self, moment: Snapshot, past: tuple[Snapshot, ...] = ()) -> None:
         """Show a snapshot; ``past`` holds earlier snapshots for the trails."""
         for one in (*past, moment):
             self._trails.see(one.time, one.position)
@@ -147,7 +147,7 @@ class Stage:
         if self.scene.follows and there.any():
             self._follow(moment.position[there].mean(axis=0))
 
-    def _draw_plans(self, moment: Moment) -> None:
+    def _draw_plans(self, moment: Snapshot) -> None:
         ways = moment.plan[..., :3]
         points = np.stack([ways[:, :-1], ways[:, 1:]], axis=2)
         there = np.isfinite(points).all(axis=(2, 3))

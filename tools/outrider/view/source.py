@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from outrider.scene.scene import Scene
-from outrider.scene.snapshot import Moment
-from outrider.scene.view_commands import Wishes
+from outrider.scene.snapshot import Snapshot
+from outrider.scene.view_commands import ViewCommands
 
 
 class Source(Protocol):
@@ -19,7 +19,7 @@ class Source(Protocol):
         ...
 
     @property
-    def begin(self) -> Wishes:
+    def begin(self) -> ViewCommands:
         """Initial view commands."""
         ...
 
@@ -28,14 +28,14 @@ class Source(Protocol):
         """Sentence shown to the user."""
         ...
 
-    def poll(self, wall: float) -> Sequence[Scene | Moment]:
+    def poll(self, wall: float) -> Sequence[Scene | Snapshot]:
         """Return new data at the wall time ``wall`` (s).
 
         A scene precedes its snapshots; snapshots are in order of time.
         """
         ...
 
-    def wish(self, wishes: Wishes, sought: float | None) -> None:
+    def wish(self, wishes: ViewCommands, sought: float | None) -> None:
         """Apply view commands. It is called repeatedly.
 
         ``sought`` is a time (s) that a user has just chosen, or None.

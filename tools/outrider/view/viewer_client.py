@@ -13,16 +13,16 @@ from importlib import import_module
 from pathlib import Path
 
 from outrider.errors import InputError
-from outrider.scene.datagram_channel import Line, pair
+from outrider.scene.datagram_channel import DatagramChannel, pair
 from outrider.scene.scene import Scene
-from outrider.scene.view_commands import Wishes
+from outrider.scene.view_commands import ViewCommands
 from outrider.view.live import Begin, Landed, Ready
 
 _PATIENCE = 60.0
 """Time (s) that the process has to start."""
 
 
-class Attendant:
+class ViewerClient:
     """View process that serves at ``host`` and ``port``, or at the next free port.
 
     ``url`` is the address of the page; ``line`` is this process's end of the channel. Raises InputError if
@@ -32,7 +32,7 @@ class Attendant:
     def __init__(self, host: str = "127.0.0.1", port: int = 8080) -> None:
         import_module("viser")
         ours, theirs = pair()
-        self.line = Line(ours)
+        self.line = DatagramChannel(ours)
         command = [sys.executable, "-m", "outrider.view.process", str(theirs.fileno()), host, str(port)]
         # The session is its own, so that Ctrl-C reaches only the flight.
         self.process = subprocess.Popen(
@@ -50,7 +50,7 @@ class Attendant:
             raise InputError(f"--view: no page at {host}:{port}: {ready.error}")
         self.url = ready.url
 
-    def begin(self, scene: Scene, wishes: Wishes) -> None:
+    def begin(self, scene: Scene, wishes: ViewCommands) -> None:
         """Report that a flight of ``scene`` begins."""
         self.line.send(pickle.dumps(Begin(scene, wishes)))
 
