@@ -14,7 +14,8 @@ from pathlib import Path
 from tests.outrider.sweep import runs as sweep_runs
 
 PATIENCE_S = 120.0
-HERE = str(Path(__file__).parent)
+HERE = str(Path(__file__).parents[3])
+"""Root of the checkout, from which workers import `runs`."""
 
 
 class Machines:
