@@ -22,6 +22,8 @@ from companion.world import View
 
 _BACK, _STILL = 0.5, 0.5
 """Distance (m) to the start and speed (m/s) below which the vehicle is back."""
+_BELOW, _NEARBY = 1.0, 2.0
+"""Distance (m) below its lane up to which a vehicle sets off, and to its start at which it needs no lane."""
 _BESIDE, _PATIENCE = 5.0, 10_000_000
 """Distance (m) and time (µs): a vehicle this near that has come no nearer for so long is back, too."""
 
@@ -187,8 +189,9 @@ class Goals:
     def _way_back(self, now: int, measured: Motion) -> Array:
         """Return the place (3,), m, to return to: above the start.
 
-        Its height is the one at the order to return plus the vehicle's lane. It is clipped to the box. The
-        pilot receives a report when the vehicle is there, or when it is beside the place and comes no nearer.
+        Its height is the one at the order to return plus the vehicle's lane. It is clipped to the box. A
+        vehicle with a lane climbs to it first: while all climb, lanes do not separate them. The pilot receives
+        a report when the vehicle is there, or when it is beside the place and comes no nearer.
         """
         start = self._pilot.start
         if start is None:
@@ -197,6 +200,10 @@ class Goals:
         above: Array = np.clip(np.array([start[0], start[1], height]), self._low, self._high)
         off = above - measured.position
         far = hypot(off[0], off[1])
+        if self._lane and off[2] > _BELOW and far > _NEARBY:
+            self._nearer_at = now
+            here = self._place_to_hold(measured)
+            return np.array([here[0], here[1], above[2]])
         if far >= _BESIDE or far < self._nearest - _BACK:
             self._nearest, self._nearer_at = far, now
         there = far < _BACK and float(measured.velocity @ measured.velocity) < _STILL**2
