@@ -8,7 +8,7 @@ import pytest
 from companion.errors import SolverError
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandLong
-from tests.companion.bench import LAND, NAN, TAKEOFF, TARGET, Bench, only, seen_at
+from tests.companion.bench import LAND, NAN, SYSTEM, TAKEOFF, TARGET, Bench, only, seen_at
 
 RETURN, HOLD = 20, 17
 GO = (TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5)
@@ -171,3 +171,21 @@ def test_what_failed_is_over_when_somebody_takes_the_vehicle_over() -> None:
     assert bench.companion.guard.failing is None
     assert not only(CommandLong, sent)
     assert not any("solver" in name for name in bench.companion.watch.concerns)
+
+
+def test_a_vehicle_with_a_lane_climbs_to_it_before_it_sets_off() -> None:
+    """Lanes keep vehicles apart that are in them; while all climb, they are side by side."""
+    bench = Bench(guard={"return_step": 3.0})
+    heard = bench.datagram("swarm", seen_at(SYSTEM - 1, (-15.0, 15.0, 5.0)))
+    bench.fly(0.5, heard)
+    bench.take_off()
+    bench.go_to((15, 0, 5))
+    bench.fly(12.0)
+    assert off(bench, (15.0, 0.0)) < 0.5
+    bench.order(RETURN)
+    while off(bench, (15.0, 0.0)) < 1.0:
+        bench.step(*([heard] if bench.now % 100_000 == 0 else []))
+        assert bench.phase is Phase.RETURN
+    assert bench.autopilot.position[2] > 5.0 + 3.0 - 1.1
+    bench.until(Phase.DONE, 60.0)
+    assert off(bench, (0.0, 0.0)) < 1.0
