@@ -190,8 +190,8 @@ class Goals:
         """Return the place (3,), m, to return to: above the start.
 
         Its height is the one at the order to return plus the vehicle's lane. It is clipped to the box. A
-        vehicle with a lane climbs to it first: while all climb, lanes do not separate them. The pilot receives
-        a report when the vehicle is there, or when it is beside the place and comes no nearer.
+        vehicle with a lane climbs to it first: while all climb, lanes do not separate them. The pilot
+        receives a report when the vehicle is there, or when it is beside the place and comes no nearer.
         """
         start = self._pilot.start
         if start is None:
