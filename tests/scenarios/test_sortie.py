@@ -63,6 +63,15 @@ def test_in_wind_and_with_loss_no_two_come_too_near(tmp_path: Path) -> None:
     assert flown.summary["anchored_anew"] == 0
 
 
+@pytest.mark.slow
+def test_vehicles_that_return_soon_after_gathering_keep_apart(tmp_path: Path) -> None:
+    """Their ways cross: each is in its lane before it sets off."""
+    mixed = of(8, flavour="ardupilot,px4").model_dump()
+    flown = fly(Scenario.model_validate(merged(mixed, {"cap_s": 8.0})), 6, tmp_path)
+    assert flown.summary["failure"] is None
+    assert flown.summary["min_separation_m"] >= 1.5
+
+
 LATE = {
     "companion": {"rates": {"replan_us": 200_000}},
     "target": {"through": [[8.0, 8.0, 1.5], [15.0, 19.0, 1.5], [2.0, 19.0, 1.5]], "speed": 1.5, "paces": []},
