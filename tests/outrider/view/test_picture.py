@@ -79,8 +79,8 @@ def test_planes_lie_between_the_plans_that_they_part(plans: list[tuple[np.ndarra
     for quaternion, normal in zip(turned, found.normal, strict=True):
         np.testing.assert_allclose(matrix(quaternion)[:, 2], normal, atol=1e-6)
     if len(plans) == 2 and len(found.gap) and found.gap[0] > 0.1:
-        # In the middle of its segment one plan is on one side, the other on the other. At its ends both may be
-        # on one side: plans that move along the normal take the plane with them.
+        # In the middle of its segment one plan is on one side, the other on the other. At its ends both may
+        # be on one side: plans that move along the normal take the plane with them.
         places = plan[..., :3].astype(float)
         side = (0.5 * (places[:, :-1] + places[:, 1:]) - found.middle[0]) @ found.normal[0]
         assert (side[0] * side[1] < 0.0).any()
