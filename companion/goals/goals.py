@@ -196,14 +196,14 @@ class Goals:
         start = self._pilot.start
         if start is None:
             return measured.position
-        height = float(self._place_to_hold(measured)[2]) + self._lane
+        held = self._place_to_hold(measured)
+        height = float(held[2]) + self._lane
         above: Array = np.clip(np.array([start[0], start[1], height]), self._low, self._high)
         off = above - measured.position
         far = hypot(off[0], off[1])
         if self._lane and off[2] > _BELOW and far > _NEARBY:
             self._nearer_at = now
-            here = self._place_to_hold(measured)
-            return np.array([here[0], here[1], above[2]])
+            return np.array([held[0], held[1], above[2]])
         if far >= _BESIDE or far < self._nearest - _BACK:
             self._nearest, self._nearer_at = far, now
         there = far < _BACK and float(measured.velocity @ measured.velocity) < _STILL**2

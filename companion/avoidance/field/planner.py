@@ -167,7 +167,7 @@ class Planner:
             jerk = min(j_max)
             # The last plan's field has moved on along its horizon since, which matters where plans are made
             # seldom.
-            last = self._force[min(int(min(elapsed, self.dqmpc.seconds) / dt), len(self._force) - 1)]
+            last = self._force[int(min(elapsed / dt, len(self._force) - 1))]
             force = rate_limited(force, last, jerk * min(elapsed, dt), jerk * dt)
         elif elapsed < inf and self.config.field.smoothing_us > 0:
             share = -expm1(-1e6 * elapsed / self.config.field.smoothing_us)
