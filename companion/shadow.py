@@ -104,4 +104,4 @@ class ShadowCompanion(Companion):
         """The missing input without which there is no set-point, or an empty string."""
         if self.pilot.waiting_for:
             return self.pilot.waiting_for
-        return "" if self.guard.horizon is not None else "a place to plan from"
+        return "" if self.flown is not None else "a place to plan from"

@@ -79,8 +79,6 @@ class Goals:
         self._lane = 0.0
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
-        self.spacing = inf
-        """Distance (m) that vehicles that share the surface shall keep; ∞ where it is not shared."""
         self.goal: Array | None = None
         """Ordered goal (3,) of the task ``goto``, m, fleet-local ENU; None for where steering began."""
 
@@ -118,7 +116,6 @@ class Goals:
         nearest point.
         """
         self._lane = self._config.guard.return_step * below
-        self.spacing = inf
         aim = self._destination(now, view, measured, obstacles, mates)
         speed = self._config.guard.cautious_speed
         return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
@@ -156,29 +153,31 @@ class Goals:
         ahead, rate, surface = self._seconds, self._config.turn_rate, self._surface
         (end,), (velocity,) = target.ahead(np.array([ahead]))
         here = measured.position - target.position
-        turn = self._turn(here, mates - target.position)
+        turn, apart = self._turn(here, mates - target.position)
         offset = surface.nearest(turned(here, turn) if turn else here)
         if rate:
             offset = surface.nearest(turned(offset, rate * ahead))
             velocity = velocity + rate * np.array([-offset[1], offset[0], 0.0])
         if turn:
             offset = outside(offset, turn)
-        return Aim(end + offset, velocity, target.position, end, surface)
+        return Aim(end + offset, velocity, target.position, end, surface, apart)
 
-    def _turn(self, offset: Array, mates: Array) -> float:
-        """Return the angle (rad) by which to go round, from ``offset`` (3,) from the target, m.
+    def _turn(self, offset: Array, mates: Array) -> tuple[float, float]:
+        """Return the angle (rad) by which to go round, and the spacing.
 
-        It leads towards the vehicle's place among ``mates`` (M, 3), also offsets from the target.
+        ``offset`` (3,), m, is the vehicle's from the target. The angle leads towards the vehicle's place
+        among ``mates`` (M, 3), also offsets from the target. The spacing (m) is the distance to keep from
+        them, ∞ where the surface is not shared.
         """
         formation = self._config.formation
         if not isinstance(formation, Spread) or not len(mates):
-            return 0.0
+            return 0.0, inf
         here = self._surface.nearest(offset)
         others = taking_part(formation, mates, float(np.linalg.norm(here)))
-        turn = even_turn(offset, others)
+        turn, apart = even_turn(offset, others), inf
         if 0 < len(others) == len(mates):
-            self.spacing = spacing(hypot(here[0], here[1]), len(others), turn)
-        return max(-formation.turn, min(formation.turn, turn))
+            apart = spacing(hypot(here[0], here[1]), len(others), turn)
+        return max(-formation.turn, min(formation.turn, turn)), apart
 
     def _place_to_hold(self, measured: Motion) -> Array:
         """Return the position (3,) at the order to hold or to return, or at the loss of the target."""

@@ -13,3 +13,8 @@ def limit(force: Array, bound: float) -> Array:
     scale = bound / np.maximum(norm, bound)
     limited: Array = force * scale[..., None]
     return limited
+
+
+def clipped(vector: Array, most: Array) -> Array:
+    """Return ``vector`` with each component clipped to ± that of ``most``."""
+    return np.minimum(np.maximum(vector, -most), most)

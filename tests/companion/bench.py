@@ -15,6 +15,7 @@ from companion.flight.autopilots import Profile
 from companion.flight.autopilots.ardupilot import ARDUPILOT
 from companion.flight.autopilots.px4 import PX4
 from companion.node import Companion
+from companion.planning.field import FieldAvoidance
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
 from mavlink_bridge.frames import FleetFrame
@@ -51,6 +52,12 @@ ARMED, PREARM_OK = 0x80, 0x10000000
 NAN = math.nan
 
 M = TypeVar("M", bound=Message)
+
+
+def field_of(companion: Companion) -> FieldAvoidance:
+    """Return the avoidance of a ``companion`` that avoids by the field."""
+    assert isinstance(companion.avoidance, FieldAvoidance)
+    return companion.avoidance
 
 
 class PerfectAutopilot:

@@ -43,6 +43,7 @@ from tests.companion.bench import (
     TAKEOFF,
     TARGET,
     Bench,
+    field_of,
     numbers_of,
     only,
     seen_at,
@@ -250,7 +251,7 @@ def test_a_goal_that_is_no_place_is_denied_and_moves_nothing(flying, x, y, z, fr
 def test_a_stale_own_state_is_held_then_braked_and_flown_again_when_it_returns(flying):
     flying.go_to([15.0, 0.0, 5.0])
     flying.fly(1.5)
-    guard = flying.companion.guard
+    guard = field_of(flying.companion).guard
     assert flying.autopilot.velocity[0] > 1.0
     flying.autopilot.mute = True
     states = []
@@ -276,25 +277,25 @@ def test_a_stale_own_state_is_held_then_braked_and_flown_again_when_it_returns(f
 def test_a_solver_failure_keeps_the_plan_then_brakes_and_is_counted(flying, monkeypatch):
     flying.go_to([15.0, 0.0, 5.0])
     flying.fly(1.5)
-    companion, plan = flying.companion, flying.companion.guard.horizon
+    companion, plan = flying.companion, flying.companion.flown
 
     def fail(*_):
         raise SolverError("PIQP_MAX_ITER_REACHED", 60)
 
-    monkeypatch.setattr(companion.planner, "plan", fail)
+    monkeypatch.setattr(field_of(companion).planner, "plan", fail)
     sent = flying.fly(0.4)
-    assert companion.guard.state is Holding.HELD
-    assert companion.guard.horizon is plan
+    assert companion.avoidance.state is Holding.HELD
+    assert companion.flown is plan
     assert companion.tally.solver_failures == 8
     for message in setpoints(sent)[-1:]:
         lead = flying.now - 20_000 + flying.config.setpoint_lead_us
         np.testing.assert_allclose(place(message), plan.at(lead).position, atol=0.05)
     found = setpoints(flying.fly(3.0))
-    assert companion.guard.state is Holding.BRAKING
+    assert companion.avoidance.state is Holding.BRAKING
     np.testing.assert_allclose(found[-1].velocity, 0.0, atol=1e-6)
     monkeypatch.undo()
     flying.fly(0.1)
-    assert companion.guard.state is Holding.FRESH
+    assert companion.avoidance.state is Holding.FRESH
 
 
 def test_a_lost_target_is_followed_for_its_time_then_the_vehicle_hovers():
@@ -305,17 +306,17 @@ def test_a_lost_target_is_followed_for_its_time_then_the_vehicle_hovers():
     bench.target = None
     stale = bench.config.guard.target_stale_us * 1e-6
     bench.fly(stale - 0.2)
-    assert "target" not in bench.companion.watch.concerns
+    assert "target" not in bench.companion.health.concerns
     bench.fly(3.0)
     # It still plans, so that it keeps clear of the others where it stays.
-    assert bench.companion.guard.state is Holding.FRESH
-    assert "target" in bench.companion.watch.concerns
+    assert bench.companion.avoidance.state is Holding.FRESH
+    assert "target" in bench.companion.health.concerns
     found = setpoints(bench.fly(1.0))
     assert len(found) == 50
     np.testing.assert_allclose(found[-1].velocity, 0.0, atol=0.02)
     bench.target = seen_at(TARGET, [0.0, 0.0, 0.0])
     bench.fly(1.0)
-    assert "target" not in bench.companion.watch.concerns
+    assert "target" not in bench.companion.health.concerns
 
 
 def test_without_any_target_an_escort_hovers():
@@ -419,8 +420,8 @@ def test_an_origin_that_takes_the_vehicle_along_is_not_believed(flying, north, l
     """The vehicle says the same place in its own frame, whose origin moved: it cannot have."""
     moved = GpsGlobalOrigin(AUTOPILOT, FLEET.latitude + north, FLEET.longitude, FLEET.altitude, 0)
     flying.fly(0.5, flying.datagram("autopilot", moved))
-    assert "origin True" in flying.companion.watch.concerns or not lands
-    assert "origin False" in flying.companion.watch.concerns or lands
+    assert "origin True" in flying.companion.health.concerns or not lands
+    assert "origin False" in flying.companion.health.concerns or lands
     assert (flying.phase in (Phase.SETTLE, Phase.LAND, Phase.DONE)) == lands
 
 
@@ -454,7 +455,7 @@ def test_the_shared_plan_is_the_flown_one():
     bench.go_to([5.0, 5.0, 6.0])
     for _ in range(50):
         for tunnel in only(Tunnel, bench.step(), "swarm"):
-            flown, told = bench.companion.guard.horizon, unpack(tunnel.payload)
+            flown, told = bench.companion.flown, unpack(tunnel.payload)
             assert (told.epoch, told.dt) == (flown.epoch, flown.dt)
             np.testing.assert_allclose(told.positions_m(), flown.knots[:, 0:3], atol=1e-3)
 

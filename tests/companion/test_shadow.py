@@ -24,7 +24,7 @@ def test_an_empty_battery_of_the_vehicle_it_looks_on_at_leaves_no_gap() -> None:
     before = len(bench.companion.would)
     bench.autopilot.battery = 0.05
     bench.fly(1.0)
-    assert any("battery" in name for name in bench.companion.watch.concerns)
+    assert any("battery" in name for name in bench.companion.health.concerns)
     assert len(bench.companion.would) - before == 50
     assert not bench.sent
 

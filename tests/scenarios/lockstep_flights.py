@@ -51,9 +51,9 @@ class Watch:
         if stage not in self.stages:
             self.stages.append(stage)
         for companion in self.flight.companions:
-            if companion.guard.horizon is not None:
-                accelerations = companion.guard.horizon.knots[:, 6:9]
-                self.plans_finite &= bool(np.isfinite(companion.guard.horizon.knots).all())
+            if companion.flown is not None:
+                accelerations = companion.flown.knots[:, 6:9]
+                self.plans_finite &= bool(np.isfinite(companion.flown.knots).all())
                 largest = float(np.sqrt((accelerations**2).sum(axis=1).max()))
                 self.planned_acceleration = max(self.planned_acceleration, largest)
 

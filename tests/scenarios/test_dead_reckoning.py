@@ -31,8 +31,8 @@ def test_the_loss_is_said_within_a_second_and_the_doubt_grows_until_gps_is_back(
     vehicle.autopilot.lose_gps()
     vehicle.run(1.0)
     assert vehicle.texts[-1] == "GPS is lost: dead reckoning"
-    assert "positioning" in vehicle.companion.watch.concerns
-    assert vehicle.companion.watch.blinkered
+    assert "positioning" in vehicle.companion.health.concerns
+    assert vehicle.companion.health.blinkered
     vehicle.run(3.0)
     # The autopilot says nothing of it yet.
     assert not [m for m in vehicle.all(StatusText) if "Failsafe" in m.text]
@@ -42,8 +42,8 @@ def test_the_loss_is_said_within_a_second_and_the_doubt_grows_until_gps_is_back(
     vehicle.autopilot.regain_gps()
     vehicle.run(4.0)
     assert vehicle.companion.world.doubt == 0.0
-    assert "positioning" not in vehicle.companion.watch.concerns
-    assert not vehicle.companion.watch.blinkered
+    assert "positioning" not in vehicle.companion.health.concerns
+    assert not vehicle.companion.health.blinkered
     vehicle.run(5.0)
     times, radii = told(vehicle)
     grows = times < 3.0

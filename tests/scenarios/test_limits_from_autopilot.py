@@ -27,6 +27,7 @@ from outrider.resources import find
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.supervision.supervised_node import SupervisedNode
 from outrider.yaml_files.yaml_file import load
+from tests.companion.bench import field_of
 from tests.scenarios.single_vehicle import LAND, OPERATOR, SITE, SYSTEM, TAKEOFF, TARGET, SingleVehicle
 
 FLAVOURS = ("ardupilot", "px4")
@@ -73,7 +74,7 @@ def plans(vehicle, seconds):
     made = []
     for _ in range(round(seconds * 100)):
         vehicle.step()
-        plan = vehicle.companion.plan
+        plan = field_of(vehicle.companion).plan
         if plan is not None and (not made or plan is not made[-1]):
             made.append(plan)
     return made
@@ -111,7 +112,7 @@ def test_stock_parameters_leave_the_shipped_file_as_it_is(flavour):
     assert said(vehicle) == ""
     made = there_and_back(vehicle)
     assert 3.0 < jerk(made, 0.1) < 3.5 + 1e-6
-    assert vehicle.companion.planner.config.limits == vehicle.config.limits
+    assert field_of(vehicle.companion).planner.config.limits == vehicle.config.limits
 
 
 def test_plans_of_a_vehicle_with_less_jerk_have_less():
@@ -120,7 +121,7 @@ def test_plans_of_a_vehicle_with_less_jerk_have_less():
     assert len(made) > 500
     assert 1.2 < jerk(made, 0.1) < 1.4 + 1e-6
     assert said(vehicle) == "Limits lowered to the autopilot's: j_max 1.4 m/s3 (PSC_JERK_XY 2)"
-    assert vehicle.companion.planner.config.limits.u_max == vehicle.config.limits.u_max
+    assert field_of(vehicle.companion).planner.config.limits.u_max == vehicle.config.limits.u_max
 
 
 @pytest.mark.parametrize(
@@ -202,7 +203,7 @@ def test_in_flight_nothing_is_asked_and_nothing_changes():
     vehicle.tell(ParamSet(OPERATOR, pack("<f", 4.0), SYSTEM, 1, "PSC_JERK_XY", REAL32))
     vehicle.run(20.0)
     assert not [m for at, _, m in vehicle.sent if at >= begun and isinstance(m, ParamRequestRead)]
-    assert vehicle.companion.planner.config.limits.j_max[:2] == (1.4, 1.4)
+    assert field_of(vehicle.companion).planner.config.limits.j_max[:2] == (1.4, 1.4)
     vehicle.order(LAND)
     vehicle.until(Phase.DONE)
     vehicle.replace_companion()

@@ -26,6 +26,7 @@ from mavlink_bridge.messages import (
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_TYPE
 from mavlink_bridge.wire.framing import frame_v2, leading_frames
+from tests.companion.bench import field_of
 from tests.soak.air_nodes import FENCE, GROUND, Edit
 from tests.soak.airfield import Airfield, Craft
 
@@ -180,11 +181,11 @@ def _no_plans(scene: Scene) -> None:
     def fails(*_arguments: object) -> None:
         raise SolverError("as asked", 0)
 
-    scene.craft.companion.planner.plan = fails  # type: ignore[assignment, method-assign]
+    field_of(scene.craft.companion).planner.plan = fails  # type: ignore[assignment, method-assign]
 
 
 def _plans_again(scene: Scene) -> None:
-    vars(scene.craft.companion.planner).pop("plan", None)
+    vars(field_of(scene.craft.companion).planner).pop("plan", None)
 
 
 def _hang(scene: Scene) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from companion.estimation.tracks import State
 from companion.values.phase import Phase
 from mavlink_bridge.messages import SetpointLocal
+from tests.companion.bench import field_of
 from tests.soak.airfield import CONFIG, Craft
 
 _SINGLE = 1e-4
@@ -40,7 +41,7 @@ class SetpointLaws:
     def take(self, craft: Craft, now: int, message: SetpointLocal) -> None:
         """One of ``craft``."""
         system, limits = craft.system, CONFIG.limits
-        pilot, guard = craft.companion.pilot, craft.companion.guard
+        pilot = craft.companion.pilot
         self.sent[system] += 1
         self._must(craft, pilot.vehicle.alive and pilot.streaming, "no set-point but to who follows them")
         self._must(craft, pilot.phase is not Phase.YIELDED, "nothing for who was taken over")
@@ -59,7 +60,7 @@ class SetpointLaws:
         if view.own.age <= 100_000 and not self._has_jumped(craft, now, view.own):
             off = float(np.linalg.norm(here - view.own.position))
             self._must(craft, off <= CONFIG.guard.tube + 0.5, f"{off:.2f} m from the vehicle: {message}")
-        before, anchor = self.last.get(system), (guard.anchored_anew, view.local)
+        before, anchor = self.last.get(system), (field_of(craft.companion).guard.anchored_anew, view.local)
         if before is not None and now - before.now <= 100_000 and before.anchor == anchor:
             step, dt = float(np.linalg.norm(here - before.here)), 1e-6 * (now - before.now)
             self._must(craft, step <= fastest * dt + _CORRECTED, f"a jump of {step:.2f} m: {message}")

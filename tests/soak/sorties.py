@@ -177,8 +177,8 @@ class Sorties:
 
     def _see(self, craft: Craft, now: int) -> None:
         companion = craft.companion
-        texts = frozenset(concern.text for concern in companion.watch.concerns.values())
-        braking = companion.guard.horizon is None or companion.guard.state is Holding.BRAKING
+        texts = frozenset(concern.text for concern in companion.health.concerns.values())
+        braking = companion.flown is None or companion.avoidance.state is Holding.BRAKING
         row = Row(now, companion.pilot.phase, texts, braking, craft.place)
         rows = self._rows[craft.system]
         before = rows[-1] if rows else row

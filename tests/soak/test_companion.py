@@ -73,7 +73,7 @@ def fly_through(bench: Bench, session: list[Mutant], links: tuple[str, ...]) -> 
             now += bench.fly(random.choice((0.0, 0.01, 0.05)))
             for message in only(SetpointLocal, now):
                 assert np.isfinite(numbers_of(message)).all()
-            horizon = bench.companion.guard.horizon
+            horizon = bench.companion.flown
             assert horizon is None or np.isfinite(horizon.knots).all()
             assert bench.companion.bad_frames >= bad
             bad = bench.companion.bad_frames

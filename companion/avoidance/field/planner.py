@@ -30,7 +30,8 @@ class Aim(NamedTuple):
     """Aim of a plan at the end of the horizon, fleet-local ENU.
 
     ``destination`` x̌ (3,) and terminal ``velocity`` (3,); ``target`` (3,) now and ``target_end`` (3,) at the
-    end of the horizon. ``surface`` is the one that x̌ lies on, None for a goal.
+    end of the horizon. ``surface`` is the one that x̌ lies on, None for a goal. ``spacing``: distance (m)
+    that vehicles that share the surface shall keep; ∞ where it is not shared.
     """
 
     destination: Array
@@ -38,6 +39,7 @@ class Aim(NamedTuple):
     target: Array
     target_end: Array
     surface: Surface | None = None
+    spacing: float = inf
 
 
 def standing(goal: Array, target: Array | None = None) -> Aim:

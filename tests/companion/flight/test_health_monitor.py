@@ -261,7 +261,7 @@ def test_a_neighbour_that_is_silent_is_said_and_still_kept_away_from(flying):
     neighbour = flying.datagram("swarm", seen_at(12, [3.0, 0.0, 5.0]))
     flying.fly(1.0, neighbour)
     flying.fly(GUARD.neighbour_lost_us * 1e-6 + 0.5)
-    assert "neighbour 12" in flying.companion.watch.concerns
+    assert "neighbour 12" in flying.companion.health.concerns
     flying.go_to([3.0, 0.0, 5.0])
     flying.fly(6.0)
     assert np.linalg.norm(flying.autopilot.position - [3.0, 0.0, 5.0]) > CONFIG.field.d_min
@@ -284,7 +284,7 @@ def test_who_misses_a_neighbour_flies_about_slowly():
     bench = Bench(guard=guard.model_dump()).take_off(5.0)
     bench.fly(1.0, bench.datagram("swarm", seen_at(12, [0.0, 15.0, 5.0])))
     bench.fly(GUARD.neighbour_lost_us * 1e-6 + 0.5)
-    assert bench.companion.watch.blinkered
+    assert bench.companion.health.blinkered
     bench.go_to([8.0, 0.0, 5.0])
     fastest = 0.0
     for _ in range(40):

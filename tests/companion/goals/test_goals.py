@@ -8,7 +8,7 @@ import pytest
 from companion.errors import SolverError
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandLong
-from tests.companion.bench import LAND, NAN, SYSTEM, TAKEOFF, TARGET, Bench, only, seen_at
+from tests.companion.bench import LAND, NAN, SYSTEM, TAKEOFF, TARGET, Bench, field_of, only, seen_at
 
 RETURN, HOLD = 20, 17
 GO = (TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5)
@@ -155,7 +155,7 @@ def test_who_finds_its_start_taken_lands_beside_it(distance: float) -> None:
 
 def test_what_failed_is_over_when_somebody_takes_the_vehicle_over() -> None:
     bench = Bench().take_off()
-    planner = bench.companion.planner
+    planner = field_of(bench.companion).planner
     plan = planner.plan
 
     def fails(*_args, **_kwargs):
@@ -163,14 +163,14 @@ def test_what_failed_is_over_when_somebody_takes_the_vehicle_over() -> None:
 
     planner.plan = fails
     bench.fly(0.2)
-    assert bench.companion.guard.failing is not None
+    assert bench.companion.avoidance.failing is not None
     bench.autopilot.mode, bench.autopilot.velocity = LOITER, np.zeros(3)
     bench.fly(0.5)
     planner.plan = plan
     sent = bench.fly(10.0)
-    assert bench.companion.guard.failing is None
+    assert bench.companion.avoidance.failing is None
     assert not only(CommandLong, sent)
-    assert not any("solver" in name for name in bench.companion.watch.concerns)
+    assert not any("solver" in name for name in bench.companion.health.concerns)
 
 
 def test_a_vehicle_with_a_lane_climbs_to_it_before_it_sets_off() -> None:

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from companion.planning import Tally
+from companion.planning.avoidance import Tally
 from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Messages, Outcome, Punctuality
 from outrider.runs.summary import (

@@ -15,6 +15,7 @@ from outrider.scene.view_commands import ViewCommands, encoded
 from outrider.simulation.flight import Flight
 from outrider.swarm.lockstep_view import LockStepView, moment
 from outrider.view.viewer_client import ViewerClient
+from tests.companion.bench import field_of
 from tests.outrider.shipped import FIREFLY, LOGS, scenario
 from tests.outrider.view.flights import flown, line, logs, moments, small
 
@@ -131,7 +132,7 @@ def test_methods_loss_and_target_can_be_changed(alone: dict[str, bytes], tmp_pat
     ((at, change),) = view.orders.given
     assert change.methods == "swivel+tangential"
     assert at is not None
-    assert all(len(companion.planner._methods) == 2 for companion in flight.companions)
+    assert all(len(field_of(companion).planner._methods) == 2 for companion in flight.companions)
     counters = flight.network.counters
     assert counters.dropped > 0.05 * counters.sent
     target = flight.truth.samples().target

@@ -150,7 +150,7 @@ class StatusReports:
             0 if self._followed is None else self._followed.steps,
             self._departures.setpoints.count,
             self._would(),
-            tuple(concern.text for concern in node.watch.concerns.values()),
+            tuple(concern.text for concern in node.health.concerns.values()),
             0 if self._signing is None else self._signing.newest,
             None if self._followed is None else self._followed.verdict,
         )
@@ -188,7 +188,7 @@ class StatusReports:
             for refusal in pilot.refusals[-(pilot.refused - self._refused) :]:
                 self._event(at, "refused", refusal)
             self._refused = pilot.refused
-        concerns = node.watch.concerns
+        concerns = node.health.concerns
         if concerns is not self._concerns:
             for name, concern in concerns.items():
                 if name not in self._concerns:

@@ -15,7 +15,7 @@ from types import FrameType
 
 import numpy as np
 
-from companion.planning import Tally
+from companion.planning.avoidance import Tally
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.loops.lockstep import Scheduled

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from companion.avoidance.field.plan_log import PlanLog
 from companion.node import Companion
-from companion.planning import Tally
+from companion.planning.avoidance import Tally
 from companion.values.phase import Phase
 from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link

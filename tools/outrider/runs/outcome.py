@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from companion.avoidance.field.plan_log import PlanLog
-from companion.planning import Tally
+from companion.planning.avoidance import Tally
 from outrider.runs.ground_truth import GroundTruth
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import Starts

@@ -27,11 +27,11 @@ def companion_snapshot(companion: Companion, now: int) -> CompanionSnapshot:
     """Return the snapshot of ``companion`` at ``now`` (µs)."""
     horizon, phase = companion.flown, companion.pilot.phase
     ages = companion.world.neighbours.ages(now)
-    mode = phase.value + (_HELD.get(companion.guard.state, "") if phase is Phase.ESCORT else "")
+    mode = phase.value + (_HELD.get(companion.avoidance.state, "") if phase is Phase.ESCORT else "")
     state = State(
         mode,
         1e-6 * max(max(ages.values()), 0) if ages else np.nan,
         np.nan if companion.last_spent is None else 1e-6 * companion.last_spent,
-        companion.held,
+        companion.avoidance.held,
     )
     return CompanionSnapshot(state, NO_PLAN if horizon is None else padded(horizon.knots[:, :6]))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from companion.obstacles.moving import MovingObstacles
 from companion.obstacles.static import FixedObstacles
-from companion.planning import Tally
+from companion.planning.avoidance import Tally
 from companion.values.phase import Phase
 from mavlink_bridge.loops.garbage import seldom_collected
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled

@@ -96,7 +96,7 @@ class SupervisedNode:
             self.companion.pilot.take_back()
         if (barred == TWIN) != self._warned:
             self._warned = barred == TWIN
-            self.companion.voice.report(Severity.CRITICAL, "Own system id used twice", begins=self._warned)
+            self.companion.reporter.report(Severity.CRITICAL, "Own system id used twice", begins=self._warned)
         leaving = self.companion.step(now, inbox) + answers
         stamp = self.companion.world.stamp
         if self._followed is not None and stamp != self._stamp:

@@ -1,0 +1,92 @@
+"""Health checks of one companion: concerns are determined, reported to the ground, and reacted to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.config import CompanionConfig
+from companion.estimation.time_sync import RoundTrips
+from companion.flight.health_monitor import HealthMonitor, Situation
+from companion.flight.reactions import Reactions
+from companion.flight.state_machine import Pilot
+from companion.planning.avoidance import Avoidance
+from companion.telemetry.status_text import Severity, StatusReporter
+from companion.world import View, World
+
+_PERIOD = 100_000
+"""Period of the health checks, µs."""
+_PLAIN = str.maketrans({"²": "2", "³": "3", "°": "deg"})
+"""Replacements for STATUSTEXT, which is ASCII."""
+
+
+class HealthChecks:
+    """Health checks of the vehicle of ``pilot``, ten times a second.
+
+    Concerns and what was found out about the autopilot's limits are reported with ``reporter``.
+    """
+
+    def __init__(
+        self,
+        config: CompanionConfig,
+        world: World,
+        pilot: Pilot,
+        avoidance: Avoidance,
+        round_trips: RoundTrips,
+        reporter: StatusReporter,
+    ) -> None:
+        self._world, self._pilot, self._avoidance = world, pilot, avoidance
+        self._round_trips, self._reporter = round_trips, reporter
+        self.monitor = HealthMonitor(config)
+        self._reactions = Reactions()
+        self._next = self._latest = self._remarked = 0
+
+    def start(self, now: int) -> None:
+        """Start the checks at ``now`` (µs)."""
+        self._next = now
+
+    def step(self, now: int, view: View, late: int) -> None:
+        """Check if it is time to.
+
+        ``late``: time (µs) by which this step is later than the set-point that was due.
+        """
+        self._latest = max(self._latest, late)
+        if now < self._next:
+            return
+        self._next = now + _PERIOD
+        for change in self.monitor.look(self._situation(now, view)):
+            concern = change.concern
+            if concern.name != "target":  # ``report_silence`` reports the target
+                self._reporter.report(concern.severity, concern.text, begins=change.begins)
+            self._reactions.note(change)
+        self._latest = 0
+        self._reactions.follow(self._pilot)
+        self._report_limits()
+
+    def _situation(self, now: int, view: View) -> Situation:
+        world, pilot, avoidance = self._world, self._pilot, self._avoidance
+        world.neighbours.listen(now, view.own)
+        return Situation(
+            now,
+            view,
+            pilot.phase,
+            pilot.vehicle,
+            avoidance.state,
+            world.neighbours.ages(now),
+            avoidance.failing,
+            self._latest if pilot.streaming else 0,
+            world.clock_steps,
+            world.moves,
+            world.displaced,
+            world.clock_lost,
+            self._round_trips.unanswered(now),
+            float(np.linalg.norm(avoidance.tracking.error)) if pilot.streaming else 0.0,
+            world.neighbours.nearest(now, view.own),
+        )
+
+    def _report_limits(self) -> None:
+        """Report to the ground what was found out about the autopilot's limits."""
+        limits = self._pilot.limits
+        new = min(limits.said - self._remarked, len(limits.remarks))
+        for text in list(limits.remarks)[len(limits.remarks) - new :]:
+            self._reporter.say(Severity.WARNING, text.translate(_PLAIN))
+        self._remarked = limits.said

@@ -1,0 +1,144 @@
+"""Protocol of collision avoidance, which the field and the committed plans implement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
+
+from companion.avoidance.field.plan_log import PlanLog
+from companion.avoidance.field.planner import Aim
+from companion.config.planning import MethodName
+from companion.flight.guard import Holding
+from companion.flight.lowering import Lowered
+from companion.flight.tracking import Tracking
+from companion.values.horizon import Array, Horizon, Motion
+from companion.world import View
+from mavlink_bridge.messages import Message
+
+
+class Tally(NamedTuple):
+    """Counters of one companion so far.
+
+    ``plan_ns``: one stopwatch reading (ns) per plan, at most 4.29 s. ``plan_at``: time (µs on the companion's
+    clock) at which that plan was due.
+    """
+
+    plans: int
+    relaxed: int
+    solver_failures: int
+    held: int
+    anchored_anew: int
+    plan_ns: Sequence[int]
+    plan_at: Sequence[int] = ()
+
+
+class Situation(NamedTuple):
+    """Inputs of one step of avoidance.
+
+    ``measured``: the own motion, its velocity clipped to the limits; ``stale``: whether it is too old to plan
+    from; ``aim``: function that returns the aim of a plan made now, None if the surface has no nearest point.
+    """
+
+    view: View
+    measured: Motion
+    stale: bool
+    aim: Callable[[], Aim | None]
+
+
+class Avoidance(Protocol):
+    """Collision avoidance of one vehicle: makes the horizon that it flies."""
+
+    next_due: int
+    """Time (µs) at which the next plan is due; with committed plans, the next yaw."""
+
+    @property
+    def seconds(self) -> float:
+        """Time (s) from now to the end of the plan that is made next, at most."""
+        ...
+
+    @property
+    def horizon(self) -> Horizon | None:
+        """Horizon that is flown; None while nothing is steered."""
+        ...
+
+    @property
+    def state(self) -> Holding:
+        """Kind of the horizon that is flown."""
+        ...
+
+    @property
+    def failing(self) -> int | None:
+        """Time (µs) since which the solver finds no plan; None while it does."""
+        ...
+
+    @property
+    def tracking(self) -> Tracking:
+        """Tracking of the set-points by the vehicle."""
+        ...
+
+    @property
+    def held(self) -> int:
+        """Number of times that an old plan was kept."""
+        ...
+
+    @property
+    def tally(self) -> Tally:
+        """Counters for the summary."""
+        ...
+
+    @property
+    def log(self) -> PlanLog:
+        """Log of the field's plans since the last ``shed``."""
+        ...
+
+    def shed(self) -> None:
+        """Empty the log."""
+        ...
+
+    def use(self, methods: tuple[MethodName, ...]) -> None:
+        """Use ``methods`` of the field from the next plan on."""
+        ...
+
+    def keep(self, lowered: Lowered) -> None:
+        """Stay within ``lowered``, the limits that the autopilot can follow, from the next plan on."""
+        ...
+
+    def begin(self, now: int, measured: Motion) -> None:
+        """Start to steer at ``now`` (µs) from the ``measured`` motion."""
+        ...
+
+    def pause(self, gap: int) -> None:
+        """Take account of ``gap`` (µs), the time since the last step."""
+        ...
+
+    def discard(self) -> None:
+        """Discard the horizon that is flown."""
+        ...
+
+    def rest(self) -> None:
+        """Discard what is flown and observed, because set-points do not steer the vehicle."""
+        ...
+
+    def fly(self, now: int, situation: Situation) -> Array | None:
+        """Bring the horizon up to date at ``now`` (µs).
+
+        Returns the own positions (N + 1, 3), m, of the next steps if the yaw is to be planned along them,
+        otherwise None.
+        """
+        ...
+
+    def idle(self, now: int) -> bool:
+        """Return whether nothing is to be planned or sent at ``now`` (µs)."""
+        ...
+
+    def receive(self, now: int, link: str, message: Message) -> bool:
+        """Receive ``message`` from ``link``; return False for a message that avoidance does not use."""
+        ...
+
+    def messages(self, now: int, *, farewell: bool) -> list[Message]:
+        """Return the messages for the swarm link; ``farewell``: the vehicle makes no further plan."""
+        ...
+
+    def shared(self, now: int, view: View) -> Horizon | None:
+        """Return the horizon to share with the neighbours in plan messages; None for no such message."""
+        ...

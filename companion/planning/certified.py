@@ -1,0 +1,136 @@
+"""Avoidance by committed plans: the committed plan is flown, and the next epoch's is made when it is due."""
+
+from __future__ import annotations
+
+from companion.avoidance.certified.commitment import HoldReason
+from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.field.plan_log import PlanLog
+from companion.config import CompanionConfig
+from companion.config.flight import TrackingConfig
+from companion.config.planning import MethodName
+from companion.flight.guard import Holding
+from companion.flight.lowering import Lowered
+from companion.flight.state_machine import Pilot
+from companion.flight.tracking import Tracking
+from companion.planning.avoidance import Situation, Tally
+from companion.planning.plan_times import PlanTimes
+from companion.values.horizon import Array, Horizon, Motion
+from companion.world import View, World
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
+
+
+class CertifiedAvoidance:
+    """``Avoidance`` by the committed plans of one vehicle.
+
+    A committed plan is flown as it is: set-points are not compensated, limits are not lowered, and no method
+    of the field takes part.
+    """
+
+    failing: int | None = None
+    state = Holding.FRESH
+
+    def __init__(
+        self,
+        config: CompanionConfig,
+        own: Source,
+        fleet: FleetFrame,
+        world: World,
+        pilot: Pilot,
+        times: PlanTimes,
+    ) -> None:
+        self._config, self._world, self._pilot, self._times = config, world, pilot, times
+        self._flight = CertifiedFlight(config, own, fleet)
+        self.seconds = self._flight.seconds
+        self.tracking = Tracking(TrackingConfig())
+        self.horizon: Horizon | None = None
+        self.log = PlanLog()
+        self.next_due = 0
+        self._plans = 0
+
+    @property
+    def held(self) -> int:
+        """Number of epochs for which the plan was carried on."""
+        return sum(self._flight.commitment.held.values())
+
+    @property
+    def tally(self) -> Tally:
+        """Counters for the summary."""
+        commitment, times = self._flight.commitment, self._times
+        failures = commitment.held[HoldReason.UNSOLVED]
+        counts = self._plans, 0, failures, self.held, commitment.anchored_anew
+        return Tally(*counts, times.plan_ns[:], times.plan_at[:])
+
+    def shed(self) -> None:
+        """Do nothing: the log is empty."""
+
+    def use(self, methods: tuple[MethodName, ...]) -> None:
+        """Do nothing: committed plans use no methods."""
+
+    def keep(self, lowered: Lowered) -> None:
+        """Do nothing: the limits of committed plans are those of the configuration."""
+
+    def begin(self, now: int, measured: Motion) -> None:
+        """Stand at the ``measured`` position until the vehicle steers."""
+        self._flight.stand(now, measured.position)
+
+    def pause(self, gap: int) -> None:
+        """Do nothing: a committed plan stays valid."""
+
+    def discard(self) -> None:
+        """Discard the horizon that is flown."""
+        self.horizon = None
+
+    def rest(self) -> None:
+        """Discard what is flown, because set-points do not steer the vehicle."""
+        self.horizon = None
+
+    def fly(self, now: int, situation: Situation) -> Array | None:
+        """Bring the committed plan up to date.
+
+        Returns its positions (N + 1, 3), m, of the next steps when the yaw is due, otherwise None.
+        """
+        flight = self._flight
+        if not self._pilot.guided:
+            flight.stand(now, situation.measured.position)
+        elif not situation.stale:
+            flight.watch(now, situation.measured)
+        if self._pilot.guided and flight.due(now):
+            self._replan(now, situation)
+        self.horizon = horizon = flight.horizon()
+        if horizon is None or now < self.next_due:
+            return None
+        self.next_due = now + self._config.rates.replan_us
+        step, count = self._config.horizon.dt_us, self._config.horizon.steps + 1
+        return horizon.positions(now + step, count, step)
+
+    def idle(self, now: int) -> bool:
+        """Return whether nothing is to be planned, announced or turned at ``now`` (µs)."""
+        return now < self.next_due and self._flight.idle(now)
+
+    def receive(self, now: int, link: str, message: Message) -> bool:
+        """Receive plans, rosters and clocks of the swarm link; return False for any other message."""
+        if link != "swarm" or not isinstance(message, Tunnel | Timesync):
+            return False
+        self._flight.receive(now, message)
+        return True
+
+    def messages(self, now: int, *, farewell: bool) -> list[Message]:
+        """Return the announcements of the committed plan and the requests for the others' clocks."""
+        return self._flight.messages(now, farewell=farewell)
+
+    def shared(self, now: int, view: View) -> Horizon | None:
+        """Return None: committed plans have messages of their own."""
+        return None
+
+    def _replan(self, now: int, situation: Situation) -> None:
+        """Make the next epoch's plan, or carry the present one on."""
+        flight, started = self._flight, self._times.stopwatch()
+        aim = None if situation.stale else situation.aim()
+        if aim is None:
+            flight.commitment.carry_on(HoldReason.MISSING)
+        elif flight.lost:
+            flight.commitment.anchor(now, situation.measured)
+        else:
+            self._plans += flight.plan(now, aim, self._world, situation.view)
+        self._times.add(now, started)

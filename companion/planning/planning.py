@@ -1,0 +1,120 @@
+"""Planning of what the vehicle flies: position by avoidance, yaw towards the target."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from companion.avoidance.field.planner import Aim
+from companion.config import CompanionConfig
+from companion.config.formation import Spread
+from companion.errors import SurfaceError
+from companion.flight.lowering import Lowered
+from companion.flight.state_machine import Pilot
+from companion.goals.goals import Goals
+from companion.goals.heading import Heading, Yaw
+from companion.planning.avoidance import Avoidance, Situation
+from companion.values.horizon import Array, Motion
+from companion.values.obstacles import Obstacles
+from companion.values.phase import Phase
+from companion.values.vectors import clipped
+from companion.world import View, World
+from mavlink_bridge.frames import LocalFrame
+
+_ZERO = np.zeros(3)
+_ZERO.flags.writeable = False
+_NOBODY = np.empty((0, 3))
+_NOBODY.flags.writeable = False
+_NO_OBSTACLES = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
+
+
+class Planning:
+    """Planning of one vehicle by ``avoidance``.
+
+    ``world`` holds what is known of the surroundings, ``goals`` gives the destination, and ``pilot`` reports
+    whether the companion controls the vehicle.
+    """
+
+    def __init__(
+        self, config: CompanionConfig, world: World, pilot: Pilot, goals: Goals, avoidance: Avoidance
+    ) -> None:
+        self._config, self._world, self._pilot, self._goals = config, world, pilot, goals
+        self._avoidance = avoidance
+        self._heading = Heading(config.heading, config.horizon)
+        self._frame: LocalFrame | None = None
+        self._shares_surface = isinstance(config.formation, Spread)
+        self._lowered = pilot.limits.lowered
+        self.fastest: Array = np.array(config.limits.v_max)
+        """v_max (3,), m/s, as lowered by the autopilot's parameters."""
+        self._stepped = 0
+
+    def yaw(self, time: int) -> Yaw:
+        """Return the planned yaw at ``time`` (µs)."""
+        return self._heading.at(time)
+
+    def step(self, now: int, view: View, *, cautious: bool) -> None:
+        """Plan when due; start from the measured state each time control of the vehicle begins.
+
+        ``cautious`` limits the way within a horizon to what ``guard.cautious_speed`` covers.
+        """
+        avoidance = self._avoidance
+        if view.local is not self._frame:
+            # Positions in the old frame must not be flown to in the new one.
+            self._frame = view.local
+            avoidance.discard()
+        if self._pilot.limits.lowered is not self._lowered:
+            self._keep(self._pilot.limits.lowered)
+        avoidance.pause(now - self._stepped)
+        self._stepped = now
+        if not self._pilot.streaming or view.own is None or view.local is None:
+            avoidance.rest()
+            return
+        stale = view.own.age > self._config.guard.own_stale_us
+        # Whatever speed the own autopilot reports, or a sender that uses its id, no axis is asked for more
+        # than its limit.
+        measured = Motion(view.own.position, clipped(view.own.velocity, self.fastest), _ZERO)
+        if avoidance.horizon is None:
+            if stale or view.yaw is None:
+                return
+            self._heading.reset(view.yaw)
+            self._goals.begin(measured.position)
+            avoidance.begin(now, measured)
+        aim = partial(self._aim, now, view, measured, cautious=cautious)
+        places = avoidance.fly(now, Situation(view, measured, stale, aim))
+        if places is not None:
+            self._face(now, view, places)
+
+    def _keep(self, lowered: Lowered) -> None:
+        """Plan within ``lowered``, the limits that the autopilot can follow."""
+        self._lowered = lowered
+        self.fastest = np.array(lowered.limits.v_max)
+        self._avoidance.keep(lowered)
+
+    def _face(self, now: int, view: View, places: Array) -> None:
+        """Plan the yaw along the own ``places`` (N + 1, 3), m, of the next steps.
+
+        Without a target the vehicle keeps its yaw.
+        """
+        if view.target is None:
+            return
+        ahead: Array = 1e-6 * self._config.horizon.dt_us * np.arange(1.0, len(places) + 1.0)
+        self._heading.plan(now, places, view.target.ahead(ahead).positions)
+
+    def _aim(self, now: int, view: View, measured: Motion, *, cautious: bool) -> Aim | None:
+        """Return the aim of the next plan; None if the surface has no nearest point."""
+        obstacles = _NO_OBSTACLES
+        if self._pilot.phase is Phase.SETTLE:
+            # Use the others' present positions: a vehicle that has just begun to steer has no plan yet that
+            # was made among them.
+            here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
+            obstacles = self._world.obstacles(now, view, here)
+        try:
+            mates = self._world.neighbours.mates(now) if self._shares_surface else _NOBODY
+            below = self._world.neighbours.below if self._config.guard.return_step else 0
+            aim = self._goals.aim(now, view, measured, obstacles, mates, below, cautious=cautious)
+        except SurfaceError:
+            return None
+        if self._config.traffic is None:
+            return aim
+        return aim._replace(destination=self._world.sensed.aside(now, aim.destination, measured.position))

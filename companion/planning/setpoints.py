@@ -1,0 +1,61 @@
+"""Stream of set-points from the horizon that is flown."""
+
+from __future__ import annotations
+
+from companion.config import CompanionConfig
+from companion.flight.setpoint import is_finite, setpoint
+from companion.flight.state_machine import Pilot
+from companion.planning.avoidance import Avoidance
+from companion.planning.planning import Planning
+from companion.world import View
+from mavlink_bridge.messages import Message, Source
+
+
+class Setpoints:
+    """Set-points of the vehicle of ``own``, at the rate of ``rates.setpoint_us``."""
+
+    def __init__(
+        self, config: CompanionConfig, own: Source, pilot: Pilot, avoidance: Avoidance, planning: Planning
+    ) -> None:
+        self._config, self._own, self._pilot = config, own, pilot
+        self._avoidance, self._planning = avoidance, planning
+        self._boot = 0
+        self.next_due = 0
+        """Time (µs) at which the next set-point is due."""
+        self.not_finite = 0
+        """Number of set-points that were not finite and therefore not sent."""
+
+    def start(self, now: int) -> None:
+        """Start the stream at ``now`` (µs), from which set-points count their time."""
+        self._boot = self.next_due = now
+
+    def due(self, now: int, view: View) -> list[Message]:
+        """Return the set-point if one is due at ``now`` (µs) and the vehicle is steered."""
+        if now < self.next_due:
+            return []
+        period = self._config.rates.setpoint_us
+        self.next_due += period * (1 + (now - self.next_due) // period)
+        horizon, profile = self._avoidance.horizon, self._pilot.profile
+        if not self._pilot.streaming or horizon is None or profile is None or view.local is None:
+            return []
+        time, tracking = now + self._config.setpoint_lead_us, self._avoidance.tracking
+        message = setpoint(
+            time,
+            now - self._boot,
+            horizon,
+            self._planning.yaw(time),
+            view.local,
+            self._own,
+            profile.setpoint_mask,
+            tracking.compensation,
+            tracking.bias,
+            self._planning.fastest,
+            tracking.lead(self._pilot.loop),
+        )
+        if not is_finite(message):
+            # Such a set-point must not be sent: the plan starts anew at the measured position.
+            self.not_finite += 1
+            self._avoidance.discard()
+            return []
+        self._pilot.streamed(now)
+        return [message]
