@@ -1,20 +1,15 @@
-"""Reader of a run's ``.npz`` files with checks: damage is reported, missing values are not guessed."""
+"""Arrays of a run as the report needs them: values out of range are unknown."""
 
 from __future__ import annotations
 
-import struct
-import zipfile
-import zlib
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from outrider.errors import InputError
 from outrider.report.run import Array, Motions, Plans, PlanTimes
+from outrider.runs.array_file import Shapes, read_arrays
 
-MOST_BYTES = 1 << 30
-"""Largest total size of a file's arrays: an hour of a hundred vehicles at 50 Hz has half of it."""
 _LONGEST = 1e5
 """Largest time (s) from the goal event."""
 _FAR = 1e9
@@ -34,23 +29,6 @@ _MOTIONS = {
 }
 _PLANS = {"system": ("n",), "time_s": ("n",), "gradient": ("n", 3)}
 _PLAN_TIMES = {"system": ("n",), "plan_ms": ("n",)}
-
-_DAMAGE = (
-    OSError,
-    ValueError,
-    TypeError,
-    KeyError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-    RuntimeError,  # from zipfile: encrypted, or compressed with an unknown method
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""Exceptions that reading a damaged archive of arrays may raise."""
-
-Shapes = Mapping[str, Sequence[int | str]]
 
 
 def motions(path: Path) -> Motions:
@@ -88,36 +66,8 @@ def plan_times(path: Path) -> PlanTimes:
 
 
 def _read(path: Path, shapes: Shapes) -> dict[str, Array]:
-    """Read arrays by name, as float64, with consistent shapes. Raises InputError."""
-    found: dict[str, Array] = {}
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > MOST_BYTES:
-            raise InputError(f"{path.name}: unpacks to {size} bytes; at most {MOST_BYTES} are read")
-        with np.load(path, allow_pickle=False) as file:
-            for name in shapes:
-                if name in file:
-                    found[name] = np.asarray(file[name], dtype=np.float64)
-    except _DAMAGE as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{path.name}: cannot be read: {reason or type(error).__name__}") from None
-    _check(path.name, found, shapes)
-    return found
-
-
-def _check(name: str, found: Mapping[str, Array], shapes: Shapes) -> None:
-    sizes: dict[str, int] = {}
-    for key, shape in shapes.items():
-        if key not in found:
-            raise InputError(f"{name}: holds no {key}")
-        has = found[key].shape
-        fits = len(has) == len(shape) and all(
-            size == (sizes.setdefault(axis, size) if isinstance(axis, str) else axis)
-            for size, axis in zip(has, shape, strict=True)
-        )
-        if not fits:
-            wanted = ", ".join(str(sizes.get(str(axis), axis)) for axis in shape)
-            raise InputError(f"{name}: {key} is of shape {has}; needed: ({wanted})")
+    """Read arrays by name, as float64. Raises InputError, also if a system id is impossible."""
+    found = {name: values.astype(np.float64) for name, values in read_arrays(path, shapes).items()}
     if not ((found["system"] >= 0) & (found["system"] <= 255)).all():
-        raise InputError(f"{name}: system is not a system id everywhere")
+        raise InputError(f"{path.name}: system is not a system id everywhere")
+    return found

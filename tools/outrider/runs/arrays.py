@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import zlib
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from outrider.errors import Fault, InputError
 from outrider.logs.message_stream import LATEST
+from outrider.runs.array_file import read_arrays
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 Whole = NDArray[np.int64]
-_Arrays = dict[str, NDArray[np.generic]]
 
 
 class Motion(NamedTuple):
@@ -61,25 +59,24 @@ def read_motion(path: Path, vehicles: int, moving: int) -> Motion | None:
 
     Returns None if there is no such file. Raises InputError for a file that does not match ``write_flight``.
     """
-    arrays = _arrays(path)
-    if arrays is None:
+    if not path.is_file():
         return None
-    count = _rows(arrays, "time_s")
-    each, vectors = (count, vehicles), (count, vehicles, 3)
-    shapes: dict[str, tuple[int, ...]] = {
-        "start_us": (),
-        "system": (vehicles,),
-        "time_s": (count,),
-        "position": vectors,
-        "velocity": vectors,
-        "reference": vectors,
-        "yaw": each,
-        "tilt": each,
-        "target": (count, 3),
-        "separation": (count,),
-        "moving": (count, moving, 3),
-    }
-    _check(path, arrays, shapes)
+    arrays = read_arrays(
+        path,
+        {
+            "start_us": (),
+            "system": (vehicles,),
+            "time_s": ("T",),
+            "position": ("T", vehicles, 3),
+            "velocity": ("T", vehicles, 3),
+            "reference": ("T", vehicles, 3),
+            "yaw": ("T", vehicles),
+            "tilt": ("T", vehicles),
+            "target": ("T", 3),
+            "separation": ("T",),
+            "moving": ("T", moving, 3),
+        },
+    )
     start, seconds = int(arrays["start_us"]), arrays["time_s"].astype(np.float64)
     rest = {name: arrays[name].astype(np.float32) for name in Motion._fields[4:]}
     return Motion(start, _unix(path, start, seconds), seconds, arrays["system"].astype(np.int64), **rest)
@@ -90,12 +87,10 @@ def read_plans(path: Path, value: str, width: int | None, start_us: int) -> Plan
 
     Returns None if there is no such file. Raises InputError for a file that does not match its writer.
     """
-    arrays = _arrays(path)
-    if arrays is None:
+    if not path.is_file():
         return None
-    count = _rows(arrays, "system")
-    shape = (count,) if width is None else (count, width)
-    _check(path, arrays, {"system": (count,), "time_s": (count,), value: shape})
+    shape = ("n",) if width is None else ("n", width)
+    arrays = read_arrays(path, {"system": ("n",), "time_s": ("n",), value: shape})
     seconds = arrays["time_s"].astype(np.float64)
     return Plans(
         _unix(path, start_us, seconds),
@@ -103,33 +98,6 @@ def read_plans(path: Path, value: str, width: int | None, start_us: int) -> Plan
         arrays["system"].astype(np.int64),
         arrays[value].astype(np.float64),
     )
-
-
-def _arrays(path: Path) -> _Arrays | None:
-    if not path.is_file():
-        return None
-    try:
-        with path.open("rb") as raw, np.load(raw) as file:
-            return {name: file[name] for name in file.files}
-    except (ValueError, OSError, EOFError, BadZipFile, zlib.error, NotImplementedError) as error:
-        raise InputError(Fault(str(path), f"cannot be read: {error}; allowed: what outrider left")) from None
-
-
-def _rows(arrays: _Arrays, name: str) -> int:
-    found = arrays.get(name)
-    return len(found) if found is not None and found.ndim else 0
-
-
-def _check(path: Path, arrays: _Arrays, shapes: dict[str, tuple[int, ...]]) -> None:
-    """Raise InputError for an array that is missing, has another shape, or holds no numbers."""
-    for name, shape in shapes.items():
-        found = arrays.get(name)
-        if found is None:
-            wrong = f"has no array {name}; allowed: what this version of outrider leaves"
-            raise InputError(Fault(str(path), wrong))
-        if found.shape != shape or found.dtype.kind not in "if":
-            wrong = f"array {name} is {found.dtype} {found.shape}; allowed: numbers {shape}"
-            raise InputError(Fault(str(path), wrong))
 
 
 def _unix(path: Path, start_us: int, seconds: Array) -> Whole:

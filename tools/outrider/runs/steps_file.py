@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from array import array
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from outrider.errors import Fault, InputError
+from outrider.runs.array_file import read_arrays
 
 
 class StepsFile:
@@ -50,15 +50,9 @@ class StepsFile:
 
 def read_steps(path: Path) -> NDArray[np.int64]:
     """Return the step times (n,), µs; raise InputError if the file cannot be read."""
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
-            first, gaps = found["first"], found["gaps"]
-    except (OSError, BadZipFile, ValueError, KeyError, EOFError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is damaged"
-        raise InputError(
-            Fault(str(path), f"when the companion was stepped cannot be read: {reason}")
-        ) from None
-    if first.dtype != np.int64 or gaps.dtype != np.int64 or first.ndim != 1 or gaps.ndim != 1:
+    arrays = read_arrays(path, {"first": ("F",), "gaps": ("n",)})
+    steps = np.concatenate([arrays["first"], arrays["gaps"]])
+    if steps.dtype != np.int64:
         raise InputError(Fault(str(path), "does not hold times"))
-    times: NDArray[np.int64] = np.cumsum(np.concatenate([first, gaps]))
+    times: NDArray[np.int64] = np.cumsum(steps)
     return times
