@@ -12,8 +12,10 @@ cancels so much of it − and then up to ``force_max`` at ``d_full``. It acts on
 the way: ahead, fading out from 60° off the bow to abeam, so that the band is left once the obstacle is
 passed; not beyond the destination, fading out over d_safe; and not when the vehicle has almost arrived. The
 sense is latched per obstacle for as long as the encounter lasts; otherwise it chatters when the bearing
-crosses zero. Obstacles with no way between them (``gap``) are passed as one, with one sense: with a sense for
-each, a vehicle before a U would be sent between its ends.
+crosses zero. With one turning sense for all vehicles, an obstacle may be on the side on which it is not to be
+passed; the force about it leads back, and fades out with the bearing to that side. Obstacles with no way
+between them (``gap``) are passed as one, with one sense: with a sense for each, a vehicle before a U would be
+sent between its ends.
 """
 
 from __future__ import annotations
@@ -30,6 +32,11 @@ from companion.values.obstacles import Obstacles
 
 _ABEAM = 0.5
 """Cosine of the bearing off the bow up to which the force is whole; it vanishes abeam."""
+_ASIDE, _PASSED = 0.4, 0.8
+"""Sines of the bearing off the bow, to the side on which an obstacle with a given sense is not passed.
+
+Up to the first the force is whole; from the second on it is none: it would lead back.
+"""
 _STEEP = 2.0
 """One over the cosine of the elevation up to which the force is whole; it vanishes overhead."""
 _QUICK = 10.0
@@ -71,7 +78,10 @@ class Tangential:
         weight = self._weights(scene, away, distance) * shares(_STEEP * flat / distance)
         self._release(obstacles, weight)
         # α̂ = ± ẑ × α, horizontal: passing never costs height.
-        signed = weight * self._senses(obstacles, weight, away, scene.to_go) / flat
+        senses = self._senses(obstacles, weight, away, scene.to_go)
+        if self._turning != "own":
+            weight = weight * _onward(senses, away, flat, scene.to_go)
+        signed = weight * senses / flat
         total = np.array([-(signed @ away[:, 1]), signed @ away[:, 0], 0.0])
         norm = sqrt(total @ total)
         if norm < _NEAR:
@@ -174,6 +184,17 @@ class Tangential:
             sense = 1.0 if to_go[1] * x - to_go[0] * y >= 0.0 else -1.0
         for name in names:
             self._sense.setdefault(name, sense)
+
+
+def _onward(senses: Array, away: Array, flat: Array, to_go: Array) -> Array:
+    """Return how much (0…1) each force about an obstacle leads on rather than back, (M,).
+
+    With one turning sense for all, an obstacle can be on the side on which it is not to be passed. ``away``
+    (M, 3), m, leads from the obstacles to the vehicle; ``flat`` (M,) are its horizontal norms.
+    """
+    length = sqrt(to_go @ to_go) + _NEAR
+    sine = senses * (away[:, 0] * to_go[1] - away[:, 1] * to_go[0]) / (flat * length)
+    return shares((sine + _PASSED) / (_PASSED - _ASIDE))
 
 
 def groups(places: Array, radius: Array, gap: float) -> list[list[int]]:

@@ -8,6 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from companion.avoidance.field.methods import Influence
+from companion.avoidance.field.methods.tangential import _ASIDE, _PASSED
 from companion.config.planning import TangentialConfig
 from tests.companion.band import NOTHING, force, method, scene
 from tests.companion.rig import LAWS, ZERO, numbers, obstacles, vectors
@@ -105,11 +106,28 @@ def test_at_the_destination_it_is_zero(place, sense):
 
 
 @LAWS
-@given(place=vectors(4.0), velocity=vectors(5.0))
-def test_right_and_left_are_opposite(place, velocity):
-    others = obstacles([place], [velocity])
+@given(distance=numbers(0.5, 3.9), sine=numbers(-_ASIDE, _ASIDE), velocity=vectors(5.0))
+def test_right_and_left_are_opposite_for_what_is_ahead(distance, sine, velocity):
+    others = obstacles([[distance * np.sqrt(1.0 - sine**2), distance * sine, 0.0]], [velocity])
     right, left = (force(others, sense=sense)[0] for sense in ("right", "left"))
-    np.testing.assert_array_equal(right, -left)
+    np.testing.assert_allclose(right, -left, atol=1e-9)
+
+
+@LAWS
+@given(places=st.lists(vectors(4.0), min_size=1, max_size=4), own=vectors(5.0), sense=SENSES)
+def test_the_force_about_an_obstacle_leads_back_no_further_than_its_bearing_allows(places, own, sense):
+    """Of a vehicle that has an obstacle on the wrong side of its course: it would be thrown out of a ring."""
+    for place in places:
+        f, _ = force(obstacles([place]), velocity=own, sense=sense)
+        # The course is east.
+        assert f[0] >= -_PASSED * np.linalg.norm(f) - 1e-9
+
+
+@pytest.mark.parametrize(("sense", "side"), [("right", -1.0), ("left", 1.0)])
+def test_an_obstacle_well_on_the_other_side_is_passed_there(sense, side):
+    angle = side * (np.arcsin(_PASSED) + 0.01)
+    place = 2.0 * np.array([np.cos(angle), np.sin(angle), 0.0])
+    assert method(sense).influence(scene(obstacles([place])), NOTHING) is NOTHING
 
 
 def test_passing_right_leaves_the_obstacle_on_the_left():
