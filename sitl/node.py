@@ -19,31 +19,22 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.converters import BY_TYPE
 from mavlink_bridge.wire.packing import parcels
 from mavlink_bridge.wire.signing import Signing
-from sitl.autopilot.autonomous_modes import AutonomousModes
 from sitl.autopilot.command_protocol import Orders
-from sitl.autopilot.commander import Commander
-from sitl.autopilot.failsafes import Failsafes
 from sitl.autopilot.failures import Failures
-from sitl.autopilot.fences import Fences
 from sitl.autopilot.firmware import Firmware, Mode
 from sitl.autopilot.firmware.ardupilot import ArduPilot
 from sitl.autopilot.firmware.px4 import Px4
-from sitl.autopilot.following import Following
-from sitl.autopilot.guidance import Guidance
+from sitl.autopilot.flight_control import FlightControl
 from sitl.autopilot.home_commands import HomeCommands
-from sitl.autopilot.maneuvers import Maneuvers
-from sitl.autopilot.missions.itinerary import Itinerary
-from sitl.autopilot.missions.plans import Plans
 from sitl.autopilot.missions.service import MissionService
+from sitl.autopilot.navigation import Navigation
 from sitl.autopilot.parameters import ardupilot as ardupilot_parameters
 from sitl.autopilot.parameters import px4 as px4_parameters
 from sitl.autopilot.parameters.values import Values
 from sitl.autopilot.plant import Plant
 from sitl.autopilot.reception import Reception
-from sitl.autopilot.returning import Returning
 from sitl.autopilot.saved import Saved
 from sitl.autopilot.services import Services
-from sitl.autopilot.setpoint_reception import SetpointReception
 from sitl.autopilot.trust import Trust
 from sitl.config.autopilot import AutopilotConfig
 from sitl.environment.weather import WeatherConfig
@@ -53,7 +44,6 @@ from sitl.telemetry.reports import HEARTBEAT, ORIGIN
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
 from sitl.telemetry.streams import usual_rates
-from sitl.values.home import Home
 from sitl.values.origin import Origin
 from sitl.vehicle.airframe import hover_speeds
 from sitl.vehicle.battery import Battery
@@ -67,11 +57,11 @@ LINK: Final = "autopilot"
 _COMPONENT: Final = 1
 # Message ids of SET_MODE, PING, GLOBAL_POSITION_INT, COMMAND_INT, COMMAND_LONG, SET_ATTITUDE_TARGET,
 # SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT, TIMESYNC, FOLLOW_TARGET. The services add their own.
-_HEARD: Final = frozenset((4, 11, 33, 75, 76, 82, 84, 86, 111, 144))
+_RECEIVED: Final = frozenset((4, 11, 33, 75, 76, 82, 84, 86, 111, 144))
 # Limit of messages in answer to one datagram; the rest of the datagram is ignored.
 _ANSWERS: Final = 32
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
-_FLAVOURS: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
+_FIRMWARE: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
 
 
 class Autopilot:
@@ -101,145 +91,95 @@ class Autopilot:
         senders; without it any sender may command the autopilot.
         """
         saved = saved or Saved()
-        rotors = len(vehicle.rotors)
-        self._values = Values(_TABLES[config.flavour](rotors), config, saved.parameters)
+        self._values = Values(_TABLES[config.flavour](len(vehicle.rotors)), config, saved.parameters)
         self._configured = config
         self.config = config = self._values.configured(config)
-        self._source = Source(config.system_id, _COMPONENT)
+        self._source = source = Source(config.system_id, _COMPONENT)
+        self._outbox: list[Message] = []
+        reporter = StatusReporter(source, self._outbox)
+        self._firmware: Firmware = _FIRMWARE[config.flavour](config)
         self._origin = Origin(site, config.latitude, config.longitude, config.altitude)
-        self._flavour: Firmware = _FLAVOURS[config.flavour](config)
-        self._telemetry = Telemetry(usual_rates(config), self._flavour.reports_ekf)
-        self._guidance = Guidance(config)
-        self._home = Home(self._origin)
-        self._plant = Plant(
+        self._navigation = navigation = Navigation(config, self._firmware, self._origin, saved)
+        self._plant = plant = Plant(
             config,
             vehicle,
             weather or WeatherConfig(),
-            self._guidance,
+            navigation.guidance,
             self._origin,
-            self._flavour.coasting,
+            self._firmware.coasting,
             seed,
         )
-        self._outbox: list[Message] = []
-        voice = StatusReporter(self._source, self._outbox)
-        steering = SetpointReception(self._flavour, self._guidance, self._origin, self._home, voice)
-        self._plans = Plans(saved.plans)
-        bytewise = self._flavour.bytewise
-        itinerary = Itinerary(
-            self._plans,
-            self._guidance,
-            self._home,
-            self._origin,
-            config,
-            self._flavour.first_item,
-            px4=bytewise,
+        self._battery = (
+            None if config.battery is None else Battery(config.battery, hover_speeds(vehicle).tolist())
         )
-        following = Following(self._guidance, self._origin, self._home, config.follow, px4=bytewise)
-        returning = Returning(self._guidance, self._home, config)
-        self._autonomous_modes = AutonomousModes(itinerary, returning, following, self._guidance)
-        self._commander = Commander(
-            config,
-            self._flavour,
-            self._guidance,
-            steering,
-            self._plant.estimate,
-            self._home,
-            self._autonomous_modes,
-            voice,
-        )
-        self._battery = None
-        if config.battery is not None:
-            self._battery = Battery(config.battery, hover_speeds(vehicle).tolist())
-        self._failsafes = Failsafes(
-            self._flavour,
-            self._commander,
-            Fences(self._plans, self._origin, self._home),
-            self._battery,
-            self._plant.estimate,
-            voice,
-        )
-        self._commander.doubts = self._failsafes.doubts
-        home_commands = HomeCommands(
-            self._home,
-            self._origin,
-            self._telemetry,
-            self._plant.estimate,
-            lambda: self._commander.ready,
-            voice,
-        )
+        control = FlightControl(config, self._firmware, navigation, plant.estimate, self._battery, reporter)
+        self._commander, self._failsafes = control.commander, control.failsafes
+        self._telemetry = Telemetry(usual_rates(config), self._firmware.reports_ekf)
         self._missions = MissionService(
-            self._source,
-            self._plans,
-            itinerary,
+            source,
+            navigation.plans,
+            navigation.itinerary,
             self._commander,
             self._telemetry,
             self._outbox,
-            voice,
-            asks_int=bytewise,
+            reporter,
+            asks_int=self._firmware.bytewise,
         )
         self._services = Services(
-            self._source,
-            self._flavour,
+            source,
+            self._firmware,
             self._values,
             self._telemetry,
-            home_commands,
+            HomeCommands(
+                navigation.home,
+                self._origin,
+                self._telemetry,
+                plant.estimate,
+                lambda: self._commander.ready,
+                reporter,
+            ),
             self._missions,
-            Failures(self._plant, self._battery, lambda: self.config),
+            Failures(plant, self._battery, lambda: self.config),
             self._outbox,
-            voice,
+            reporter,
             self._configure,
         )
-        self._gauges = SnapshotReader(
+        self._snapshots = SnapshotReader(
             config,
             vehicle,
-            self._source,
+            source,
             self._origin,
-            self._home,
-            self._flavour,
+            navigation.home,
+            self._firmware,
             self._commander,
-            self._guidance,
-            self._plant,
+            navigation.guidance,
+            plant,
             self._battery,
             self._missions.current,
             self._failsafes,
         )
-        maneuvers = Maneuvers(
-            self._commander,
-            self._flavour,
-            self._guidance,
-            self._origin,
-            self._home,
-            itinerary,
-            following,
-            self._plant.estimate,
-            self._failsafes.say_doubts,
-        )
-        commands = self._services.commands | maneuvers.commands
+        commands = self._services.commands | control.maneuvers.commands
         self._reception = Reception(
-            self._source,
+            source,
             self._outbox,
-            voice,
+            reporter,
             self._commander,
-            Orders(self._commander, self._flavour, commands),
-            steering,
-            following,
+            Orders(self._commander, self._firmware, commands),
+            control.steering,
+            navigation.following,
             self._services.handlers,
-            self._flavour.set_mode_ack,
+            self._firmware.set_mode_ack,
         )
-        if signing is None and config.signing_setup == "obeyed":
-            signing = Signing()
-        if signing is not None:
-            signing.resume(saved.signed_until)
-        self._signing = signing
-        self._trust = Trust(self._source, signing, config.signing_setup, lambda: self._commander.armed, voice)
+        self._signing = signing = _resumed(signing, config, saved)
+        self._trust = Trust(source, signing, config.signing_setup, lambda: self._commander.armed, reporter)
         self._services.handlers[SetupSigning] = self._trust.set_up
-        heard = _HEARD | {BY_TYPE[kind].id for kind in self._services.handlers}
-        self._codec = Codec(lambda message_id, _system, _component: message_id in heard, signing)
+        received = _RECEIVED | {BY_TYPE[kind].id for kind in self._services.handlers}
+        self._codec = Codec(lambda message_id, _system, _component: message_id in received, signing)
         # These values are cached because they are empty or not due in nearly every step.
-        self._reached = itinerary.reached
+        self._reached = navigation.itinerary.reached
         self._work_due = self._services.next_due
         # A real ArduCopter sends HEARTBEAT at once after a mode change. Quiet flights do not.
-        self._announces = config.streams == "normal" and not bytewise
+        self._announces = config.streams == "normal" and not self._firmware.bytewise
         self.untold = 0
         """Number of messages that could not be encoded."""
         self._boot: int | None = None
@@ -303,7 +243,7 @@ class Autopilot:
             self._work_due = self._services.next_due
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
-            told = self._telemetry.collect(self._now, self._gauges.read(self._now))
+            told = self._telemetry.collect(self._now, self._snapshots.read(self._now))
             # If there are many answers, the messages sent first are more likely to fit the link.
             messages = told + messages if len(messages) > _ANSWERS else messages + told
         if not messages:
@@ -330,14 +270,20 @@ class Autopilot:
         """
         changed = self._values.configured(self._configured)
         self.config = changed.model_copy(update={"system_id": self.config.system_id})
-        for part in (self._flavour, self._guidance, self._commander, self._autonomous_modes, self._gauges):
+        for part in (
+            self._firmware,
+            self._navigation.guidance,
+            self._commander,
+            self._navigation.modes,
+            self._snapshots,
+        ):
             part.configure(self.config)
 
     @property
     def saved(self) -> Saved:
         """Data to keep for the next boot."""
         until = 0 if self._signing is None else self._signing.newest
-        return Saved(parameters=self._values.changed, plans=self._plans.all, signed_until=until)
+        return Saved(parameters=self._values.changed, plans=self._navigation.plans.all, signed_until=until)
 
     # Events and faults, effective from the next step
 
@@ -413,7 +359,7 @@ class Autopilot:
     @property
     def custom_mode(self) -> int:
         """Flight mode as encoded in HEARTBEAT (0)."""
-        return self._flavour.custom_mode(self._commander.mode)
+        return self._firmware.custom_mode(self._commander.mode)
 
     @property
     def charge(self) -> float:
@@ -434,3 +380,12 @@ class Autopilot:
     def reference(self) -> Reference | None:
         """Reference tracked now (site NED, in terms of the estimate), or None."""
         return self._plant.course.reference
+
+
+def _resumed(signing: Signing | None, config: AutopilotConfig, saved: Saved) -> Signing | None:
+    """Return the signing to use, continued after what an earlier run signed."""
+    if signing is None and config.signing_setup == "obeyed":
+        signing = Signing()
+    if signing is not None:
+        signing.resume(saved.signed_until)
+    return signing
