@@ -52,7 +52,7 @@ from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 from mavlink_bridge.wire.roster import unpack as unpack_roster
 from mavlink_bridge.wire.signing import Signing
 
-HELM = 191
+BACKUP = 191
 """MAV_COMP_ID_ONBOARD_COMPUTER."""
 _AGREES = 0.3
 """Largest distance (m) between a set-point and the own plan: what is flown while the set-point travels."""
@@ -75,7 +75,7 @@ class BackupNode:
     ) -> None:
         self.name = f"helm-{system}"
         self._config, self._fleet = config, fleet
-        self._own = Source(system, HELM)
+        self._own = Source(system, BACKUP)
         self._codecs = {
             "autopilot": Codec(
                 lambda identifier, sender, component: (
@@ -126,7 +126,7 @@ class BackupNode:
         if now - since <= _SILENT * period:
             return beat
         horizon = self._horizon(now)
-        if horizon is None or now > horizon.end + self._config.certified.helm_us:
+        if horizon is None or now > horizon.end + self._config.certified.backup_hover_us:
             return beat
         self._next = now + period
         self.carried += 1

@@ -83,7 +83,7 @@ class Companion:
         self._setpoints = Setpoints(config, own, pilot, self.avoidance, self._planning)
         self._sharing = Sharing(config, own, fleet)
         self._round_trips = RoundTrips(own)
-        self.reporter = StatusReporter(config.voice, own)
+        self.reporter = StatusReporter(config.ground_messages, own)
         self._checks = HealthChecks(config, world, pilot, self.avoidance, self._round_trips, self.reporter)
         self.health = self._checks.monitor
         self._started = False
@@ -210,7 +210,7 @@ class Companion:
 
     def _reports(self, now: int) -> dict[str, list[Message]]:
         """Return the messages for the ground by link: events and metrics."""
-        settings = self.config.voice
+        settings = self.config.ground_messages
         if not (settings.texts or settings.values):
             return {}
         report_silence(now, self.world, self.reporter)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from companion.values.settings import Positive, Settings, WireStep
 
 Weight = Annotated[float, Field(ge=0.0, le=1e4)]
 
 
-class StallConfig(Settings):
+class DeadlockConfig(Settings):
     """Turn of the goal to the side when a plan is pushed back and makes no progress."""
 
     bend: Positive = Field(0.8, description="rad, the largest turn at first")
@@ -30,6 +30,17 @@ class StallConfig(Settings):
 class CertifiedConfig(Settings):
     """Committed plans, planes and epochs."""
 
+    model_config = ConfigDict(
+        json_schema_extra={
+            "renamed": {
+                "helm_us": "backup_hover_us",
+                "stall": "deadlock",
+                "stranger_speed": "noncooperative_speed",
+                "stranger_acceleration": "noncooperative_acceleration",
+            }
+        }
+    )
+
     dt_us: WireStep = Field(200_000, description="knots of the plans, µs: absolute, k·dt")
     epoch_us: int = Field(200_000, gt=0, le=2_000_000, multiple_of=4, description="µs; a whole number of dt")
     last_call_us: int = Field(
@@ -41,7 +52,7 @@ class CertifiedConfig(Settings):
     tube: Positive = Field(0.25, description="m, largest tracking error that the promise allows for")
     sigmas: float = Field(3.0, ge=0.0, le=6.0, description="k of k·σ of the position estimate")
     clock_us: int = Field(5_000, ge=0, le=100_000, description="µs that a clock may differ from fleet time")
-    helm_us: int = Field(
+    backup_hover_us: int = Field(
         10_000_000,
         ge=0,
         le=600_000_000,
@@ -50,8 +61,8 @@ class CertifiedConfig(Settings):
     fleet: tuple[int, ...] = Field(
         (), max_length=255, description="system ids that take part: nobody moves before all are heard"
     )
-    stranger_speed: Positive = Field(1.0, description="m/s, of those that share no plan")
-    stranger_acceleration: Positive = Field(1.0, description="m/s², of those that share no plan")
+    noncooperative_speed: Positive = Field(1.0, description="m/s, of those that share no plan")
+    noncooperative_acceleration: Positive = Field(1.0, description="m/s², of those that share no plan")
     omega_end: Positive = Field(30.0, description="weight of where the plan comes to rest")
     omega_place: Weight = Field(0.3, description="weight of where it is after each step before")
     omega_speed: Weight = Field(0.1, description="weight of its speeds")
@@ -59,7 +70,7 @@ class CertifiedConfig(Settings):
     omega_field: Weight = Field(0.3, description="weight of the field of those that share no plan")
     omega_jerk: Weight = Field(0.3, description="weight of the change of a from step to step")
     spare: Positive = Field(0.01, description="m wanted beyond the least distance, for rounding")
-    stall: StallConfig = StallConfig()
+    deadlock: DeadlockConfig = DeadlockConfig()
 
     @property
     def knots(self) -> int:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from companion.config.certified import CertifiedConfig
 from companion.config.estimation import TrackConfig
-from companion.config.flight import GuardConfig, RatesConfig, TrackingConfig, VoiceConfig
+from companion.config.flight import GroundMessagesConfig, GuardConfig, RatesConfig, TrackingConfig
 from companion.config.formation import FormationConfig, Nearest
 from companion.config.obstacles import (
     Moving,
@@ -64,6 +64,8 @@ class OwnSurface(Settings):
 
 class CompanionConfig(Settings):
     """All settings of one companion, except its links."""
+
+    model_config = ConfigDict(json_schema_extra={"renamed": {"voice": "ground_messages"}})
 
     task: Literal["escort", "goto"] = "escort"
     methods: tuple[MethodName, ...] = ("tangential",)
@@ -125,7 +127,7 @@ class CompanionConfig(Settings):
     certified: CertifiedConfig = CertifiedConfig()
     guard: GuardConfig = GuardConfig()
     rates: RatesConfig = RatesConfig()
-    voice: VoiceConfig = VoiceConfig()
+    ground_messages: GroundMessagesConfig = GroundMessagesConfig()
 
     def surface_of(self, system: int) -> Surface:
         """Return the surface of the vehicle with the id ``system``."""

@@ -111,7 +111,7 @@ class TrackingConfig(Settings):
         return self.most if self.compensate else 0.0
 
 
-class VoiceConfig(Settings):
+class GroundMessagesConfig(Settings):
     """Messages to the ground, and the links that carry them.
 
     The autopilot's link is usually the narrowest, and whether the autopilot forwards what it receives depends

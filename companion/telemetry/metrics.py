@@ -18,7 +18,7 @@ class Metrics:
 
     def __init__(self, config: CompanionConfig, own: Source) -> None:
         certified = config.avoidance == "certified"
-        self._on = config.voice.values
+        self._on = config.ground_messages.values
         self._own = own
         self._period_ns = 1000 * (config.certified.epoch_us if certified else config.rates.replan_us)
         self._boot: int | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from companion.config.flight import VoiceConfig
+from companion.config.flight import GroundMessagesConfig
 from mavlink_bridge.messages import Source, StatusText
 
 _EVERY, _AT_ONCE = 1_000_000, 5
@@ -29,7 +29,7 @@ class StatusReporter:
     Texts wait here until ``due`` returns them. If ``config.texts`` is off all texts are discarded.
     """
 
-    def __init__(self, config: VoiceConfig, own: Source) -> None:
+    def __init__(self, config: GroundMessagesConfig, own: Source) -> None:
         self._on = config.texts
         self._own = own
         self._waiting: list[tuple[Severity, str]] = []

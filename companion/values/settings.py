@@ -15,6 +15,10 @@ It is a type of its own: a bound given in addition to one that a type already ha
 
 
 class Settings(BaseModel):
-    """Settings that refuse unknown keys and do not change after load."""
+    """Settings that refuse unknown keys and do not change after load.
+
+    A model with renamed keys states ``renamed`` (former name: present name) in its JSON Schema, from which
+    the loader of files takes it.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

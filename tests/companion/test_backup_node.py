@@ -1,4 +1,4 @@
-"""The helm says nothing while its companion speaks, and what the committed plan says when it is silent."""
+"""The backup node sends nothing while its companion does, and the committed plan when that falls silent."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ YAW = 0.7
 
 
 class Bench:
-    """A helm, and a companion that speaks until it is told not to."""
+    """A backup node, and a companion that speaks until it is told not to."""
 
     def __init__(self, key: Key | None = None, companions: Key | None = None) -> None:
-        """``key``: the helm's; ``companions``: its companion's, and the autopilot's."""
-        self.helm = BackupNode(CONFIG, SYSTEM, FLEET, None if key is None else Signing(key))
+        """``key``: the backup node's; ``companions``: its companion's, and the autopilot's."""
+        self.node = BackupNode(CONFIG, SYSTEM, FLEET, None if key is None else Signing(key))
         signing = Signing(companions)
         signing.present(BEGIN)
         self.codec, self.reader = Codec(None, signing), Codec()
@@ -53,17 +53,17 @@ class Bench:
         self.speaks = self.beats = True
         self.mode, self.armed = GUIDED, True
         self.origin = np.zeros(3)
-        """Of the vehicle's local frame, as the helm hears it; the companion's is the fleet's."""
+        """Of the vehicle's local frame, as the backup node hears it; the companion's is the fleet's."""
         self.ahead = 0
-        """µs by which the companion's clock is ahead of the helm's."""
+        """µs by which the companion's clock is ahead of the backup node's."""
         self.plans = [plan_from(BEGIN)]
         self.sent: list[tuple[int, SetpointLocal]] = []
 
     def run(self, seconds: float) -> list[tuple[int, SetpointLocal]]:
-        """Go on for so long; what the helm sent meanwhile."""
+        """Go on for so long; what the backup node sent meanwhile."""
         before = len(self.sent)
         for _ in range(round(seconds * 1e6 / TICK)):
-            for link, data in self.helm.step(self.now, self._inbox()):
+            for link, data in self.node.step(self.now, self._inbox()):
                 assert link == "autopilot"
                 for message in self.reader.feed(data):
                     if isinstance(message, SetpointLocal):
@@ -127,7 +127,7 @@ def test_it_sends_the_committed_plan_to_its_end_and_some_seconds_of_hover() -> N
     since = sent[0][0] - bench.now + round(30.0 * 1e6)
     assert since <= 120_000
     horizon = horizon_of(bench.plans[0])
-    assert abs(sent[-1][0] - horizon.end - CONFIG.certified.helm_us) <= TICK
+    assert abs(sent[-1][0] - horizon.end - CONFIG.certified.backup_hover_us) <= TICK
     times = [time for time, _ in sent]
     assert set(np.diff(times)) == {CONFIG.rates.setpoint_us}
     for time, message in sent:
@@ -178,7 +178,7 @@ def test_a_vehicle_that_somebody_else_has_is_left_alone(how: str) -> None:
 
 
 def test_what_the_companion_does_not_fly_is_not_carried_on() -> None:
-    """Another clock, another origin, another plan: then what the helm knows is not what others count on."""
+    """Another clock, origin or plan: then the backup node does not know what the others rely on."""
     late, elsewhere, other = Bench(), Bench(), Bench()
     late.ahead = 1_500_000
     elsewhere.origin = np.array([0.5, 0.0, 0.0])
@@ -187,7 +187,7 @@ def test_what_the_companion_does_not_fly_is_not_carried_on() -> None:
     other.run(1.0)
     # The last set-point is of a plan that was never told.
     strange = SetpointLocal(COMPANION, 0, SYSTEM, 1, 1, 0, (9.0, 9.0, -5.0), (0.0,) * 3, (0.0,) * 3, YAW, 0.0)
-    other.helm.step(other.now, [other.tell("autopilot", strange)])
+    other.node.step(other.now, [other.tell("autopilot", strange)])
     other.speaks = False
     assert other.run(3.0) == []
 
@@ -203,7 +203,7 @@ def test_after_an_order_to_land_it_is_silent() -> None:
     bench = Bench()
     bench.run(1.0)
     land = CommandLong(COMPANION, SYSTEM, 1, 21, 0, (0.0,) * 7)
-    bench.helm.step(bench.now, [bench.tell("autopilot", land)])
+    bench.node.step(bench.now, [bench.tell("autopilot", land)])
     bench.speaks = False
     assert bench.run(3.0) == []
 
@@ -213,7 +213,7 @@ def test_after_a_farewell_it_is_silent() -> None:
     bench = Bench()
     bench.run(1.0)
     farewell = Tunnel(COMPANION, 0, 0, ROSTER, pack_roster(Roster(BEGIN, frozenset(), True)))
-    bench.helm.step(bench.now, [bench.tell("swarm", farewell)])
+    bench.node.step(bench.now, [bench.tell("swarm", farewell)])
     bench.speaks = False
     assert bench.run(3.0) == []
 
@@ -222,14 +222,14 @@ def test_another_companions_plan_is_not_flown() -> None:
     bench = Bench()
     bench.plans = []
     for source in (Source(12, COMPONENT), Source(SYSTEM, 1)):
-        bench.helm.step(bench.now, [bench.tell("swarm", told(plan_from(BEGIN), source))])
+        bench.node.step(bench.now, [bench.tell("swarm", told(plan_from(BEGIN), source))])
     assert silent(bench).run(3.0) == []
 
 
 @given(st.lists(st.tuples(st.sampled_from(["autopilot", "swarm"]), st.binary(max_size=300)), max_size=6))
 def test_garbage_is_harmless(garbage: list[tuple[str, bytes]]) -> None:
     bench = silent(Bench())
-    bench.helm.step(bench.now, [Datagram(link, data) for link, data in garbage])
+    bench.node.step(bench.now, [Datagram(link, data) for link, data in garbage])
     assert bench.run(0.5)
 
 

@@ -172,7 +172,7 @@ SENSED = st.tuples(st.sampled_from(("autopilot", "swarm", "target")), seeming({1
 @given(told=st.lists(SENSED, min_size=1, max_size=12))
 def test_whatever_sensors_receivers_and_cameras_say_no_set_point_leaves_the_limits(kind, told):
     bench = Bench(
-        task="escort", target_source={"kind": kind}, proximity={}, traffic={}, voice={"texts": True}
+        task="escort", target_source={"kind": kind}, proximity={}, traffic={}, ground_messages={"texts": True}
     ).take_off(5.0)
     sent = []
     for link, frame in told:

@@ -38,7 +38,7 @@ def test_what_tells_of_the_target_and_of_obstacles_can_be_told() -> None:
     assert found.target_source.kind == "follow_target"
     assert found.proximity is not None
     assert found.traffic is not None
-    assert found.voice.texts
+    assert found.ground_messages.texts
 
 
 def test_its_rough_world_is_one() -> None:

@@ -34,7 +34,11 @@ SYSTEM, TARGET, TICK = 11, 100, 10_000
 BOOT = 1_767_225_600_000_000
 OPERATOR = Source(255, 190)
 TAKEOFF, LAND, RETURN, MODE = 22, 21, 20, 176
-SETTINGS: dict[str, Any] = {"task": "goto", "rates": {"replan_us": 100_000}, "voice": {"texts": True}}
+SETTINGS: dict[str, Any] = {
+    "task": "goto",
+    "rates": {"replan_us": 100_000},
+    "ground_messages": {"texts": True},
+}
 
 M = TypeVar("M", bound=Message)
 

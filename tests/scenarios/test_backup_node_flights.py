@@ -35,7 +35,7 @@ def test_a_plan_is_kept_whose_companion_is_silent(
     silent = flight.backup_nodes[1]
     # Only the helm of the one that was silent had anything to do.
     assert silent.carried > 40
-    assert [helm.carried for helm in flight.backup_nodes if helm is not silent] == [0, 0]
+    assert [backup_node.carried for backup_node in flight.backup_nodes if backup_node is not silent] == [0, 0]
     assert flown.summary["d_min_violations"] == 0
     assert flown.summary["anchored_anew"] == 0
     separation = flown.summary["min_separation_m"]
@@ -49,5 +49,5 @@ def test_in_a_sound_flight_it_never_speaks(flavour: str, tmp_path: Path) -> None
     """From the ground to the ground: nor while its companion lands."""
     of = scenario("antipodal-8", {**SWAP, "vehicles": 2, "airborne": False, "flavour": flavour})
     flown = fly(of, 1, tmp_path)
-    assert [helm.carried for helm in flown.flight.backup_nodes] == [0, 0]
+    assert [backup_node.carried for backup_node in flown.flight.backup_nodes] == [0, 0]
     assert flown.summary["converged"] is True

@@ -38,7 +38,7 @@ REAL32 = 9
 def shipped(flavour, **changes):
     """Of the shipped file, with another task; nobody tells of a target here."""
     settings = load(find("companions", flavour), FlyConfig).companion.model_dump()
-    return {**settings, "task": "goto", "voice": {"texts": True}, **changes}
+    return {**settings, "task": "goto", "ground_messages": {"texts": True}, **changes}
 
 
 def ready(flavour, parameters=None, **changes):

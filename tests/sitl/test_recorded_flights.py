@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.figure_eight import FIRST, FULL, PVY, SECOND, Part, distances, settings, trajectory, turns
-from benchmarks.recorded_flights import RecordedFlight, Told, fly, read_flight
+from benchmarks.recorded_flights import RecordedFlight, Sent, fly, read_flight
 from benchmarks.recorded_swarms import SwarmVehicle, read_swarm
 from benchmarks.response import SWARMS
 from benchmarks.swarm_responses import Deviations, Followed, closest, follow
@@ -37,7 +37,7 @@ class Pair(NamedTuple):
     """A recorded flight, and what ours told when it was sent the same."""
 
     flight: RecordedFlight
-    ours: Told
+    ours: Sent
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def pairs() -> dict[str, Pair]:
     }
 
 
-def answers(flight: RecordedFlight, told: Told) -> list[tuple[float, int, list[int]]]:
+def answers(flight: RecordedFlight, told: Sent) -> list[tuple[float, int, list[int]]]:
     """When each command was sent, which, and the results until the next was; the same one again (PX4 does so
     for DO_SET_MODE) counts once."""
     asked = [(time, m.command) for time, m in flight.sent if isinstance(m, CommandLong)]

@@ -48,7 +48,7 @@ CONFIG = CompanionConfig.model_validate(
         "field": {"position_sigma": PROFILES[SENSORS].worst_axis},
         "guard": {"fence_radius": FENCE, "fence_height": 25.0},
         "rates": {"replan_us": 100_000, "setpoint_us": 40_000},
-        "voice": {"texts": True},
+        "ground_messages": {"texts": True},
     }
 )
 

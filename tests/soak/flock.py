@@ -143,7 +143,7 @@ companion:
   field: {d_min: 0.95, d_safe: 3.0}
   guard: {fence_radius: 100.0, fence_height: 40.0, battery_low: 0.7, battery_critical: 0.6}
   rates: {replan_us: 100000, setpoint_us: 40000}
-  voice: {texts: true}
+  ground_messages: {texts: true}
 period_us: 20000
 """
     )

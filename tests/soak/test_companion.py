@@ -40,7 +40,7 @@ def in_flight(seed: int) -> Bench:
     """An escort or an own goal, on either autopilot, with sensors or without; the target is an obstacle."""
     flavour = ("ardupilot", "px4")[seed % 2]
     task = ("escort", "goto")[seed // 2 % 2]
-    sensing = {"proximity": {}, "traffic": {}, "voice": {"texts": True}} if seed // 4 % 2 else {}
+    sensing = {"proximity": {}, "traffic": {}, "ground_messages": {"texts": True}} if seed // 4 % 2 else {}
     bench = Bench(flavour, task=task, target_d_min=1.0, target_d_safe=3.0, **sensing)
     bench.target = seen_at(TARGET, PLACE)
     return bench.take_off(5.0)

@@ -67,7 +67,7 @@ class Plan:
         document: dict[str, Any] = yaml.safe_load(find("companions", flavour).read_text(encoding="utf-8"))
         document["target"] = TARGET
         companion = document["companion"]
-        companion["voice"] = {"texts": True, "values": True}
+        companion["ground_messages"] = {"texts": True, "values": True}
         if self.origin is not None:
             document["origin"] = self.origin.model_dump()
         if not self.autopilots:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from companion.config.certified import StallConfig
+from companion.config.certified import DeadlockConfig
 from companion.values.bearings import turned
 from companion.values.horizon import Array
 
@@ -31,7 +31,7 @@ class DeadlockTurn:
     ``pull``: gradient of the cost per metre of error. ``sense``: +1 turns right.
     """
 
-    def __init__(self, config: StallConfig, pull: float, sense: float = 1.0) -> None:
+    def __init__(self, config: DeadlockConfig, pull: float, sense: float = 1.0) -> None:
         self._config, self._pull, self._sense = config, pull, sense
         self.angle = 0.0
         """Angle (rad) by which the goal is turned now, to the side of ``sense``."""

@@ -35,8 +35,8 @@ class CertifiedFlight:
         program = SeparationQp(
             steps, config.limits.within(config.field.margin(1)), certified, planar=config.planar
         )
-        self._stall = DeadlockTurn(certified.stall, program.pull, _SENSES.get(config.turning_sense, 1.0))
-        self.commitment = Commitment(certified, program, self._stall, fleet.fingerprint, planar=config.planar)
+        self._turn = DeadlockTurn(certified.deadlock, program.pull, _SENSES.get(config.turning_sense, 1.0))
+        self.commitment = Commitment(certified, program, self._turn, fleet.fingerprint, planar=config.planar)
         self.peers = PeerPlans(
             own.system,
             frozenset(certified.fleet),
@@ -137,7 +137,7 @@ class CertifiedFlight:
         start = commitment.start()
         own = commitment.own()
         others, field = self._sources.around(now, commitment.epoch(now), own, self.peers, world, view)
-        goal = self._stall.turned(start.position_m, aim.destination)
+        goal = self._turn.turned(start.position_m, aim.destination)
         places = goal + self._before_end[:, None] * aim.velocity
         wish = Objective(places, np.broadcast_to(aim.velocity, places.shape), field)
         return commitment.replan(wish, aim.destination, others)

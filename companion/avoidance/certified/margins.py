@@ -47,7 +47,7 @@ def _strays(config: CertifiedConfig, limits: LimitsConfig) -> float:
     return config.tube + 1e-6 * config.clock_us * fastest(limits)
 
 
-def stranger(
+def reachable(
     position: Array, velocity: Array, age: float, seconds: Array, speed: float, acceleration: float
 ) -> tuple[Array, Array]:
     """Return balls that hold a non-cooperative vehicle: centres (n, 3, 3) and radii (n,), m.

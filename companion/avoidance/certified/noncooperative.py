@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.avoidance.certified.margins import between, margin, stranger
+from companion.avoidance.certified.margins import between, margin, reachable
 from companion.avoidance.field.forces import repulsion
 from companion.config import CompanionConfig
 from companion.config.obstacles import MovingPost
@@ -75,10 +75,13 @@ class NonCooperative:
 
         ``own`` (n, 3, 3), m, are the control points of the own plan.
         """
-        bounds = self._config.certified.stranger_speed, self._config.certified.stranger_acceleration
+        bounds = (
+            self._config.certified.noncooperative_speed,
+            self._config.certified.noncooperative_acceleration,
+        )
         found = []
         for one in seen:
-            centres, reach = stranger(one.position, one.velocity, one.age, self._seconds, *bounds)
+            centres, reach = reachable(one.position, one.velocity, one.age, self._seconds, *bounds)
             radii = reach + one.least
             if one.upright:
                 centres[..., 2] = own[..., 2]

@@ -173,9 +173,9 @@ def test_strangers_are_no_target(source):
     assert not target("follow_target").receive(
         START, *told("follow_target", np.zeros(3), None, source=source)
     )
-    stranger = source.system == 2
+    reachable = source.system == 2
     anyone = target("follow_target", anyone=True)
-    assert anyone.receive(START, *told("follow_target", np.zeros(3), None, source=source)) == stranger
+    assert anyone.receive(START, *told("follow_target", np.zeros(3), None, source=source)) == reachable
 
 
 def test_a_camera_that_does_not_track_tells_nothing():

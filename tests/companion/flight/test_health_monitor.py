@@ -269,7 +269,7 @@ def test_a_neighbour_that_is_silent_is_said_and_still_kept_away_from(flying):
 
 
 def test_the_ground_is_told_of_what_begins_and_of_what_is_over():
-    bench = Bench(voice={"texts": True}).take_off(5.0)
+    bench = Bench(ground_messages={"texts": True}).take_off(5.0)
     bench.autopilot.battery = 0.15
     sent = bench.fly(2.0)
     texts = [m.text for m in only(StatusText, sent, "ground")]

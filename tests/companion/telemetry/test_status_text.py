@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
-from companion.config.flight import VoiceConfig
+from companion.config.flight import GroundMessagesConfig
 from companion.telemetry.metrics import Metrics
 from companion.telemetry.status_text import Severity, StatusReporter
 from companion.values.components import COMPONENT
@@ -17,18 +17,18 @@ from tests.companion.bench import AUTOPILOT, START, SYSTEM, TICK, Bench, only, s
 from tests.companion.obstacles.test_proximity import scan
 
 OWN = Source(SYSTEM, COMPONENT)
-ON = VoiceConfig(texts=True)
+ON = GroundMessagesConfig(texts=True)
 severities = st.sampled_from(list(Severity))
 EVENTS = st.lists(st.tuples(st.integers(0, 3_000_000), severities, st.integers(0, 30).map(str)), max_size=60)
 
 
 @given(EVENTS)
 def test_never_more_than_five_at_once_and_one_a_second(events):
-    voice, now, said = StatusReporter(ON, OWN), START, []
+    reporter, now, said = StatusReporter(ON, OWN), START, []
     for later, severity, text in events:
         now += later
-        voice.say(severity, text)
-        said += [now] * len(voice.due(now))
+        reporter.say(severity, text)
+        said += [now] * len(reporter.due(now))
     for k, first in enumerate(said):
         for j in range(k, len(said)):
             assert j - k + 1 <= 5 + (said[j] - first) // 1_000_000
@@ -36,10 +36,10 @@ def test_never_more_than_five_at_once_and_one_a_second(events):
 
 @given(EVENTS)
 def test_the_most_severe_is_said_first_and_lost_last(events):
-    voice = StatusReporter(ON, OWN)
+    reporter = StatusReporter(ON, OWN)
     for _, severity, text in events:
-        voice.say(severity, text)
-    said = [text for k in range(30) for text in voice.due(START + k * 10_000_000)]
+        reporter.say(severity, text)
+    said = [text for k in range(30) for text in reporter.due(START + k * 10_000_000)]
     assert [text.severity for text in said] == sorted(text.severity for text in said)
     assert len(said) <= 16
     assert len({text.text for text in said}) == len(said)
@@ -53,19 +53,19 @@ def _first_of_each(events):
 
 @given(st.lists(st.booleans(), max_size=40))
 def test_what_goes_wrong_is_said_when_it_begins_and_when_it_ends(states):
-    voice, said = StatusReporter(ON, OWN), []
+    reporter, said = StatusReporter(ON, OWN), []
     for k, wrong in enumerate(states):
-        voice.watch(wrong, "gone", "back")
-        said += [text.text for text in voice.due(START + k * 1_000_000)]
+        reporter.watch(wrong, "gone", "back")
+        said += [text.text for text in reporter.due(START + k * 1_000_000)]
     begun = [b for a, b in zip([False, *states], states, strict=False) if a != b]
     assert said == ["gone" if wrong else "back" for wrong in begun]
 
 
 def test_unless_asked_nothing_is_said():
-    voice = StatusReporter(VoiceConfig(), OWN)
-    voice.say(Severity.CRITICAL, "on fire")
-    voice.watch(True, "gone", "back")
-    assert voice.due(START) == []
+    reporter = StatusReporter(GroundMessagesConfig(), OWN)
+    reporter.say(Severity.CRITICAL, "on fire")
+    reporter.watch(True, "gone", "back")
+    assert reporter.due(START) == []
     bench = Bench(task="escort", proximity={})
     bench.target = seen_at(1, np.array([8.0, 0.0, 0.0]))
     bench.take_off(5.0)
@@ -79,7 +79,7 @@ def texts(bench, link="ground"):
 
 
 def test_a_target_that_falls_silent_and_comes_back_is_told_of_once_each():
-    bench = Bench(task="escort", voice={"texts": True})
+    bench = Bench(task="escort", ground_messages={"texts": True})
     bench.target = target = seen_at(1, np.array([8.0, 0.0, 0.0]))
     bench.take_off(5.0).fly(1.0)
     assert texts(bench) == []
@@ -97,7 +97,7 @@ def test_a_target_that_falls_silent_and_comes_back_is_told_of_once_each():
 
 
 def test_a_sensor_that_falls_silent_is_told_of():
-    bench = Bench(proximity={}, voice={"texts": True}).take_off(5.0)
+    bench = Bench(proximity={}, ground_messages={"texts": True}).take_off(5.0)
     for _ in range(10):
         bench.step(bench.datagram("autopilot", scan({0: 9.0}, 0, source=AUTOPILOT)))
         bench.fly(0.1)
@@ -111,7 +111,7 @@ def test_a_sensor_that_falls_silent_is_told_of():
 
 @pytest.mark.parametrize("links", [("ground",), ("autopilot",), ("ground", "autopilot")])
 def test_figures_come_once_a_second_by_the_links_that_are_named(links):
-    bench = Bench(task="escort", voice={"values": True, "links": links})
+    bench = Bench(task="escort", ground_messages={"values": True, "links": links})
     bench.target = seen_at(1, np.array([8.0, 0.0, 0.0]))
     bench.take_off(5.0)
     sent = bench.fly(10.0)
@@ -126,7 +126,7 @@ def test_figures_come_once_a_second_by_the_links_that_are_named(links):
 
 def test_figures_are_the_same_whoever_takes_the_readings_away():
     def told(shedding):
-        bench = Bench(task="escort", voice={"values": True}, rates={"replan_us": 20_000})
+        bench = Bench(task="escort", ground_messages={"values": True}, rates={"replan_us": 20_000})
         bench.target = seen_at(1, np.array([8.0, 0.0, 0.0]))
         bench.take_off(5.0)
         sent = []
@@ -140,18 +140,18 @@ def test_figures_are_the_same_whoever_takes_the_readings_away():
 
 
 def test_figures_are_those_of_the_plans():
-    dials = Metrics(CompanionConfig(voice=VoiceConfig(values=True)), OWN)
+    metrics = Metrics(CompanionConfig(ground_messages=GroundMessagesConfig(values=True)), OWN)
     period = CompanionConfig().rates.replan_us * 1000
     for reading in (2_000_000, period, 3_000_000):
-        dials.note(reading)
+        metrics.note(reading)
 
     def told(now, held):
-        return {m.name: m.value for m in dials.due(now, held, None)}
+        return {m.name: m.value for m in metrics.due(now, held, None)}
 
     assert told(START, 0) == {"plan_ms": period * 1e-6, "misses": 0.0, "held": 0.0}
     assert told(START + TICK, 0) == {}
     for reading in (period + 1, 5):
-        dials.note(reading)
+        metrics.note(reading)
     assert told(START + 1_000_000, 2) == {"plan_ms": (period + 1) * 1e-6, "misses": 1.0, "held": 2.0}
     assert told(START + 5_500_000, 2) == {"misses": 1.0, "held": 2.0}
     assert told(START + 6_000_000, 2) == {"misses": 1.0, "held": 2.0}

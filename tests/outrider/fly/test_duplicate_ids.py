@@ -110,7 +110,7 @@ def test_what_was_said_before_this_process_and_comes_late_is_nobody() -> None:
 def test_a_dry_run_beside_the_companion_is_no_alarm(kind: type[Companion]) -> None:
     """It has ids of its own."""
     air = Air()
-    settings = CompanionConfig.model_validate({"voice": {"texts": True}})
+    settings = CompanionConfig.model_validate({"ground_messages": {"texts": True}})
     node = kind(settings, 1, 100, FleetFrame(47.4, 8.5, 488.0), time.thread_time_ns)
     supervised = SupervisedNode(node, air.clock, None, None, air.duplicates)
     told: list[dict[str, object]] = []

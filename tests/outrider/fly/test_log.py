@@ -57,7 +57,7 @@ def logs() -> list[object]:
     return found
 
 
-def rehearsed(run: Run, log: Path, config: str, system: int, *more: str) -> Ended:
+def dry_run_of_log(run: Run, log: Path, config: str, system: int, *more: str) -> Ended:
     return run(
         "fly", "--dry-run", f"--autopilot=tlog:{log}", f"--config={config}", f"--system={system}", *more
     )
@@ -79,7 +79,7 @@ def places(log: Path, system: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(("flown", "log"), logs())
 def test_what_would_have_been_sent_is_sound(flown: Flown, log: Path, run: Run, tmp_path: Path) -> None:
     """Against the log and the limits themselves, not the figures that the command makes of them."""
-    ended = rehearsed(run, log, flown.config, flown.system, "--json", "--out=said")
+    ended = dry_run_of_log(run, log, flown.config, flown.system, "--json", "--out=said")
     document = json.loads(ended.out)
     assert (ended.status, document["setpoint_faults"]) == (0, [])
     assert document["autopilot"] == {"ardupilot": "ArduPilot", "px4": "PX4"}[flown.config]
@@ -186,7 +186,7 @@ def test_what_is_not_sound_is_found_out(
 
     monkeypatch.setattr(node, "setpoint", mutated)
     monkeypatch.setattr(node, "is_finite", lambda _message: True)
-    ended = rehearsed(run, piece, "ardupilot", 9)
+    ended = dry_run_of_log(run, piece, "ardupilot", 9)
     wrong = [line for line in ended.err.splitlines() if line.startswith("wrong: ")]
     assert ended.status == (1 if words else 0)
     assert any(words in line for line in wrong) if words else not wrong
@@ -199,23 +199,23 @@ def test_who_would_have_sent_nothing_is_not_well(piece: Path, run: Run, tmp_path
         for record in records:
             if record.frame[7] != ATTITUDE:
                 writer.write(record.time | record.link, record.link, record.frame)
-    ended = rehearsed(run, log, "ardupilot", 9)
+    ended = dry_run_of_log(run, log, "ardupilot", 9)
     assert (ended.status, "wrong: no set-point at all" in ended.err) == (1, True)
 
 
 def test_who_is_there_and_what_is_allowed_is_said(run: Run, tmp_path: Path) -> None:
     copter, submarine = CUT / "copter-full.tlog.gz", CUT / "submarine.tlog.gz"
-    ended = rehearsed(run, copter, "ardupilot", 1)
+    ended = dry_run_of_log(run, copter, "ardupilot", 1)
     assert (ended.status, ended.err.count("\n")) == (2, 1)
     assert "there: 9 (ArduPilot); allowed: --system 9" in ended.err
-    ended = rehearsed(run, submarine, "ardupilot", 1)
+    ended = dry_run_of_log(run, submarine, "ardupilot", 1)
     assert (ended.status, "never knows where on the globe it is" in ended.err) == (2, True)
-    ended = rehearsed(run, CUT / "quadrotor.tlog.gz", "ardupilot", 1)
+    ended = dry_run_of_log(run, CUT / "quadrotor.tlog.gz", "ardupilot", 1)
     assert (ended.status, "allowed: one near -35.36" in ended.err) == (2, True)
     empty = tmp_path / "empty.tlog.gz"
     with gzip.open(empty, "wb"):
         pass
-    ended = rehearsed(run, empty, "px4", 1)
+    ended = dry_run_of_log(run, empty, "px4", 1)
     assert (ended.status, ended.err.count("\n")) == (2, 1)
 
 

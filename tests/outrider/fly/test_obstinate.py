@@ -124,16 +124,16 @@ def test_a_process_that_cannot_be_killed_is_not_waited_for(
         def is_alive(self) -> bool:
             return True
 
-    crew = ChildProcess(cast(Worker, SimpleNamespace(main=None)))
-    monkeypatch.setattr(crew, "_process", Stuck())
-    crew.kill()
-    crew.join()
+    child = ChildProcess(cast(Worker, SimpleNamespace(main=None)))
+    monkeypatch.setattr(child, "_process", Stuck())
+    child.kill()
+    child.join()
     assert done == ["killed", KILLED]
     # Nor where it had time to end by itself.
     done.clear()
-    crew = ChildProcess(cast(Worker, SimpleNamespace(main=None)))
-    monkeypatch.setattr(crew, "_process", Stuck())
-    crew.join()
+    child = ChildProcess(cast(Worker, SimpleNamespace(main=None)))
+    monkeypatch.setattr(child, "_process", Stuck())
+    child.join()
     assert done == [FAREWELL, "killed", KILLED]
 
 

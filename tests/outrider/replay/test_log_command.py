@@ -25,7 +25,7 @@ from outrider.logs.timeline import on_one_line
 from outrider.replay.telemetry import TELEMETRY, Forwarder, paced
 from outrider.shadow.roles import Cast, Part, survey
 from outrider.shadow.setpoints import facts
-from outrider.shadow.shadow_run import STEP, rehearse, steps
+from outrider.shadow.shadow_run import STEP, shadow_flight, steps
 from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
 from tests.outrider.said import Run
@@ -82,7 +82,7 @@ def test_a_companion_listens_to_a_flight_of_others(log: Path, run: Run, tmp_path
 def test_the_same_log_gives_the_same_set_points(log: Path) -> None:
     config, cast = CompanionConfig(), Cast(11)
     seen = survey(read_tlog(log), 11, "log")
-    once, again = (rehearse(config, cast, seen, read_tlog(log)) for _ in range(2))
+    once, again = (shadow_flight(config, cast, seen, read_tlog(log)) for _ in range(2))
     assert once == again
     continuous(once.would, config)
 
@@ -90,7 +90,7 @@ def test_the_same_log_gives_the_same_set_points(log: Path) -> None:
 def test_what_a_log_lacks_is_put_in(log: Path, tmp_path: Path) -> None:
     """Without GPS_GLOBAL_ORIGIN, or without LOCAL_POSITION_NED, nearly the same is said."""
     config, cast = CompanionConfig(), Cast(11)
-    whole = rehearse(config, cast, survey(read_tlog(log), 11, "log"), read_tlog(log))
+    whole = shadow_flight(config, cast, survey(read_tlog(log), 11, "log"), read_tlog(log))
     for missing in ({49}, {32, 49}):
         path = tmp_path / f"without-{len(missing)}.tlog"
         with TlogWriter(path) as writer:
@@ -99,7 +99,7 @@ def test_what_a_log_lacks_is_put_in(log: Path, tmp_path: Path) -> None:
                     writer.write(record.time | record.link, record.link, record.frame)
         seen = survey(read_tlog(path), 11, "log")
         assert seen.local == (32 not in missing)
-        found = rehearse(config, cast, seen, read_tlog(path))
+        found = shadow_flight(config, cast, seen, read_tlog(path))
         assert facts(found.would).finite
         assert len(found.would) > 0.5 * len(whole.would)
 
@@ -110,7 +110,7 @@ def test_logs_of_real_autopilots_give_sound_set_points(name: str, own: int) -> N
     if not path.exists():
         pytest.skip("the shared logs are not beside this checkout")
     config = CompanionConfig()
-    found = rehearse(config, Cast(own), survey(read_tlog(path), own, name), read_tlog(path))
+    found = shadow_flight(config, Cast(own), survey(read_tlog(path), own, name), read_tlog(path))
     continuous(found.would, config)
     assert len(found.sent) >= 2000
 
@@ -325,7 +325,7 @@ def test_a_damaged_log_is_listened_to_all_the_same(damage: list[tuple[int, bytes
             seen = survey(read_tlog(path), 9, "damaged")
         except (InputError, LogError):
             return
-        found = facts(rehearse(config, Cast(9), seen, read_tlog(path)).would)
+        found = facts(shadow_flight(config, Cast(9), seen, read_tlog(path)).would)
     assert found.finite
     assert (found.max_speed_m_s or 0.0) <= np.linalg.norm(config.limits.v_max)
     assert (found.max_acceleration_m_s2 or 0.0) <= config.limits.a_total + 1e-3

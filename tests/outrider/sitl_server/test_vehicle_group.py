@@ -97,8 +97,8 @@ def test_a_vehicle_hears_its_own_link_and_speaks_on_it() -> None:
         False,
     ]
     field.run(1.0, {4: [arming(14), arming(15)]})
-    assert [field.board.gauges(index).armed for index in range(5)] == [False] * 4 + [True]
-    assert [field.board.gauges(index).up for index in range(5)] == [False, True, False, True, True]
+    assert [field.board.snapshot(index).armed for index in range(5)] == [False] * 4 + [True]
+    assert [field.board.snapshot(index).up for index in range(5)] == [False, True, False, True, True]
 
 
 def test_what_is_shown_is_so() -> None:
@@ -107,17 +107,17 @@ def test_what_is_shown_is_so() -> None:
     early = field.run(0.5)
     heard = field.run(1.5, {2: [Heartbeat(GCS, 6, 8, 0, 0, 4)] * 3})
     for index in range(4):
-        gauges, node = field.board.gauges(index), field.group.slots[index].node
-        assert gauges.position == pytest.approx(request.place(index), abs=0.5)
-        assert np.linalg.norm(gauges.velocity) < 0.1
-        assert gauges.custom_mode == node.custom_mode
-        assert gauges.battery == pytest.approx(node.charge, abs=1e-3)
-        assert gauges.clients == 1
-        assert gauges.received == (3 if index == 2 else 0)
+        snapshot, node = field.board.snapshot(index), field.group.slots[index].node
+        assert snapshot.position == pytest.approx(request.place(index), abs=0.5)
+        assert np.linalg.norm(snapshot.velocity) < 0.1
+        assert snapshot.custom_mode == node.custom_mode
+        assert snapshot.battery == pytest.approx(node.charge, abs=1e-3)
+        assert snapshot.clients == 1
+        assert snapshot.received == (3 if index == 2 else 0)
         # It was looked at a fifth of a second ago at most.
         every = len(early[str(index)]) + len(heard[str(index)])
-        assert every * 0.8 <= gauges.sent <= every
-        assert 2.0 - SPREAD * 1e-6 - 0.4 <= gauges.time <= 2.0
+        assert every * 0.8 <= snapshot.sent <= every
+        assert 2.0 - SPREAD * 1e-6 - 0.4 <= snapshot.time <= 2.0
 
 
 def test_vehicles_do_not_all_speak_at_once() -> None:
@@ -155,7 +155,7 @@ def test_with_a_key_only_who_has_it_is_obeyed(tmp_path: Path) -> None:
         assert all(frame.signed for frame in Framer().feed(data))
     field.now += PERIOD
     field.run(0.5)
-    assert [field.board.gauges(index).armed for index in range(2)] == [False, True]
+    assert [field.board.snapshot(index).armed for index in range(2)] == [False, True]
     # Its newest stamp changes all the time, and is written when all ends.
     field.persistence.keep(field.group)
     assert not any((tmp_path / "kept").iterdir())
@@ -229,21 +229,21 @@ GAUGES = st.builds(
 
 @given(st.lists(GAUGES, min_size=1, max_size=4), st.lists(st.tuples(NUMBER, NUMBER), min_size=1, max_size=3))
 def test_what_is_written_on_the_board_can_be_read_there(
-    gauges: list[VehicleSnapshot], times: list[tuple[float, float]]
+    snapshot: list[VehicleSnapshot], times: list[tuple[float, float]]
 ) -> None:
-    board = SharedPage(len(gauges), len(times))
-    assert not any(board.gauges(index).up for index in range(len(gauges)))
+    board = SharedPage(len(snapshot), len(times))
+    assert not any(board.snapshot(index).up for index in range(len(snapshot)))
     paces = [Pace(*time, 3, 2, 1, 0.5, 1.5, 7) for time in times]
-    for index, one in enumerate(gauges):
+    for index, one in enumerate(snapshot):
         board.show(index, one)
         board.say(index, SAYINGS + index, f"{index} é")
     for group, pace in enumerate(paces):
         board.show_pace(group, pace)
         board.fail(group, "x" * 1000)
     board.stop = True
-    assert [board.gauges(index) for index in range(len(gauges))] == gauges
+    assert [board.snapshot(index) for index in range(len(snapshot))] == snapshot
     assert board.paces() == paces
-    assert all(board.saying(index, SAYINGS + index) == f"{index} é" for index in range(len(gauges)))
+    assert all(board.saying(index, SAYINGS + index) == f"{index} é" for index in range(len(snapshot)))
     assert {len(board.fault(group)) for group in range(len(times))} == {255}
     assert board.stop
 

@@ -20,7 +20,7 @@ from tests.outrider.shipped import FIREFLY, LOGS, scenario
 from tests.outrider.view.flights import flown, line, logs, moments, small
 
 
-class Told(LockStepView):
+class Sent(LockStepView):
     """Tells every sample, whatever the wall says, and does what ``act`` wants at each."""
 
     def __init__(self, ours: DatagramChannel) -> None:
@@ -33,7 +33,7 @@ class Told(LockStepView):
         super().__call__(flight, now)
 
 
-class Kills(Told):
+class Kills(Sent):
     """Kills the view in the middle of the flight."""
 
     def __init__(self, viewer: ViewerClient, which: signal.Signals) -> None:
@@ -59,7 +59,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 def test_who_is_only_seen_flies_as_alone(alone: dict[str, bytes], tmp_path: Path) -> None:
     """Nobody empties the line either: it fills up, and what does not fit is dropped."""
     with line(room=16_000) as (ours, theirs):
-        view = Told(ours)
+        view = Sent(ours)
         flown(small(), tmp_path, view)
         assert logs(tmp_path) == alone
         assert ours.dropped > 0
@@ -107,17 +107,17 @@ def test_a_moment_is_what_is_true() -> None:
     assert np.linalg.norm(last.plan[:, 0, :3] - last.position, axis=1).max() < 0.5
 
 
-class Changes(Told):
+class Changes(Sent):
     """Says once, in the middle, what is wished."""
 
-    def __init__(self, ours: DatagramChannel, theirs: DatagramChannel, wishes: ViewCommands) -> None:
+    def __init__(self, ours: DatagramChannel, theirs: DatagramChannel, commands: ViewCommands) -> None:
         super().__init__(ours)
-        self._theirs, self._wishes = theirs, wishes
+        self._theirs, self._commands = theirs, commands
 
     def __call__(self, flight: Flight, now: int) -> None:
         self._theirs.receive()
         if self.count == 40:
-            self._theirs.send(encoded(self._wishes))
+            self._theirs.send(encoded(self._commands))
         super().__call__(flight, now)
 
 

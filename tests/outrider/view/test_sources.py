@@ -62,20 +62,20 @@ def test_a_run_is_played_as_it_was(made: Made) -> None:
 def test_pause_step_speed_and_a_time_that_is_chosen(made: Made) -> None:
     player = load(made.directory)
     player.poll(0.0)
-    player.wish(ViewCommands(paused=True), None)
+    player.command(ViewCommands(paused=True), None)
     assert seen(player, 5.0) == []
-    player.wish(ViewCommands(paused=True, steps=2), None)
+    player.command(ViewCommands(paused=True, steps=2), None)
     assert [one.time for one in seen(player, 6.0)] == pytest.approx([-0.8])
-    player.wish(ViewCommands(speed=4.0, steps=2), None)
+    player.command(ViewCommands(speed=4.0, steps=2), None)
     assert [one.time for one in seen(player, 6.5)] == pytest.approx([1.2])
-    player.wish(ViewCommands(paused=True, steps=2), 3.0)
+    player.command(ViewCommands(paused=True, steps=2), 3.0)
     found = seen(player, 7.0)
     # Of what was before there is a trail again.
     assert found[-1].time == 3.0
     times = [one.time for one in found]
     assert times == sorted(times)
     assert times[0] == pytest.approx(player.span[0])
-    player.wish(ViewCommands(speed=None, steps=2), None)
+    player.command(ViewCommands(speed=None, steps=2), None)
     assert seen(player, 100.0)[-1].time == player.span[1]
     assert seen(player, 101.0) == []
 
@@ -279,14 +279,14 @@ def test_a_row_of_the_window_is_as_it_was_shown(k: int, mode: str, age: float, h
     assert NO_PLAN.shape == plan.shape
 
 
-def test_wishes_through_the_window() -> None:
+def test_commands_through_the_window() -> None:
     window = Window(1)
-    assert (window.wishes, window.methods, window.loss, window.moves) == (0, (), None, 0)
-    window.wish(Change(methods="swivel+tangential"))
-    window.wish(Change(loss=0.25))
-    window.wish(Change(target=(1.0, 2.0, 3.0)))
-    assert (window.wishes, window.loss, window.moves) == (3, 0.25, 1)
+    assert (window.commands, window.methods, window.loss, window.moves) == (0, (), None, 0)
+    window.command(Change(methods="swivel+tangential"))
+    window.command(Change(loss=0.25))
+    window.command(Change(target=(1.0, 2.0, 3.0)))
+    assert (window.commands, window.loss, window.moves) == (3, 0.25, 1)
     assert set(window.methods) == {"swivel", "tangential"}
     assert window.place.tolist() == [1.0, 2.0, 3.0]
-    window.wish(Change(methods="baseline"))
+    window.command(Change(methods="baseline"))
     assert window.methods == ("baseline",)

@@ -36,8 +36,8 @@ JSON = st.recursive(
 
 
 @given(WISHES)
-def test_wishes_arrive_as_they_were_made(wishes: ViewCommands) -> None:
-    assert decoded(encoded(wishes)) == wishes
+def test_wishes_arrive_as_they_were_made(commands: ViewCommands) -> None:
+    assert decoded(encoded(commands)) == commands
 
 
 @given(st.binary() | JSON.map(lambda value: json.dumps(value).encode()))
@@ -62,12 +62,12 @@ def paced(wall: Wall) -> Pace:
     return Pace(lambda: wall.now, wall.nap)
 
 
-def fly(pace: Pace, wall: Wall, seconds: float, wishes: ViewCommands | None, begin: int = 0) -> None:
+def fly(pace: Pace, wall: Wall, seconds: float, commands: ViewCommands | None, begin: int = 0) -> None:
     """Ticks of 20 ms that take no time. Who is at the view says again and again what they wish."""
 
     def say(now: int) -> None:
-        if wishes is not None:
-            pace.receive(wishes, now)
+        if commands is not None:
+            pace.receive(commands, now)
 
     for now in range(begin, begin + round(1e6 * seconds), 20_000):
         say(now)
@@ -81,19 +81,19 @@ def test_a_simulation_goes_at_the_speed_that_is_wished(speed: float) -> None:
     assert wall.now == pytest.approx(10.0 / speed, rel=0.01, abs=0.05)
 
 
-@pytest.mark.parametrize("wishes", [None, ViewCommands()])
-def test_nobody_who_wishes_nothing_is_waited_for(wishes: ViewCommands | None) -> None:
+@pytest.mark.parametrize("commands", [None, ViewCommands()])
+def test_nobody_who_wishes_nothing_is_waited_for(commands: ViewCommands | None) -> None:
     wall = Wall()
-    fly(paced(wall), wall, 10.0, wishes)
+    fly(paced(wall), wall, 10.0, commands)
     assert wall.now == 0.0
 
 
-@pytest.mark.parametrize("wishes", [ViewCommands(paused=True), ViewCommands(speed=0.01)])
-def test_what_is_no_longer_said_no_longer_counts(wishes: ViewCommands) -> None:
+@pytest.mark.parametrize("commands", [ViewCommands(paused=True), ViewCommands(speed=0.01)])
+def test_what_is_no_longer_said_no_longer_counts(commands: ViewCommands) -> None:
     """A view that is killed or hangs while the flight is paused holds it for the lease, and no longer."""
     wall = Wall()
     pace = paced(wall)
-    pace.receive(wishes, 0)
+    pace.receive(commands, 0)
     fly(pace, wall, 10.0, None)
     assert LEASE <= wall.now < LEASE + 0.1
 
@@ -132,7 +132,7 @@ def test_each_change_counts_once_and_is_kept(tmp_path: Path) -> None:
         ViewCommands(methods="swivel", target=(1.0, 2.0, 3.0), moves=1, loss=0.5),
         ViewCommands(methods="swivel", target=(1.0, 2.0, 3.0), moves=2, loss=0.5),
     ]
-    found = [orders.new(wishes, float(at)) for at, wishes in enumerate(said)]
+    found = [orders.new(commands, float(at)) for at, commands in enumerate(said)]
     moved = Change(target=(1.0, 2.0, 3.0))
     assert found == [None, Change(methods="swivel"), None, moved, Change(loss=0.5), moved]
     orders.write(tmp_path)

@@ -95,10 +95,10 @@ def _strange(terms: Terms, logs: tuple[Log, ...]) -> list[Finding]:
         for log in logs
         for one in log.garbled
     ]
-    strangers = {s.sender: s.time for log in logs for s in log.sightings if s.sender not in known}
+    unknown = {s.sender: s.time for log in logs for s in log.sightings if s.sender not in known}
     findings += [
         Finding("a plan of one that is not of the fleet", (system,), time, "")
-        for system, time in strangers.items()
+        for system, time in unknown.items()
     ]
     return findings
 

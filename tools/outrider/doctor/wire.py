@@ -41,11 +41,11 @@ def _namesakes(case: Case) -> Iterator[Finding]:
             "Their positions are mixed, and both obey what is meant for one.",
             "Give each an id of its own: SYSID_THISMAV (ArduPilot), MAV_SYS_ID (PX4), then restart it.",
         )
-    twins = [one for one in case.hearing.autopilots if one is not vehicle and one.source.system == number]
-    if twins:
-        components = listed(sorted(one.source.component for one in [vehicle, *twins]))
+    others = [one for one in case.hearing.autopilots if one is not vehicle and one.source.system == number]
+    if others:
+        components = listed(sorted(one.source.component for one in [vehicle, *others]))
         yield Finding(
-            f"{len(twins) + 1} autopilots in system {number}: components {components}",
+            f"{len(others) + 1} autopilots in system {number}: components {components}",
             Severity.WARNING,
             f"Only component {vehicle.source.component} was looked at; orders to the whole system reach all.",
             "An escort talks to component 1 only. See which of them flies the vehicle.",

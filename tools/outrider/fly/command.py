@@ -43,9 +43,9 @@ def run(asked: Request) -> int:
     if the autopilot is not that of the own vehicle.
     """
     if asked.log is not None:
-        from outrider.fly.shadow_run import rehearsed
+        from outrider.fly.shadow_run import dry_run_of_log
 
-        return rehearsed(asked, asked.log)
+        return dry_run_of_log(asked, asked.log)
     with nullcontext() if asked.dry_run else instance_lock(asked.system, asked.endpoints["autopilot"]):
         return _live(asked)
 

@@ -96,7 +96,7 @@ class Flight:
         an autopilot that is not the own one.
         """
         place = self._directory
-        crew, desk, orders = self._crew(place)
+        child, desk, orders = self._child(place)
         if not self._identify():
             desk.close()
             orders.release()
@@ -104,12 +104,12 @@ class Flight:
         while True:
             self._wiring.drain()
             try:
-                self.event_log.note("process", f"the companion flies in process {crew.start()}")
+                self.event_log.note("process", f"the companion flies in process {child.start()}")
                 self._wiring.lend()
                 self._left, self._watchdog = False, Watchdog(time.monotonic())
-                self._look_after(desk, crew)
+                self._look_after(desk, child)
             finally:
-                self._finish(desk, crew)
+                self._finish(desk, child)
                 # Not earlier: once no process has this end open, the next beat discards the messages that
                 # wait at the parent's end.
                 orders.release()
@@ -124,9 +124,9 @@ class Flight:
                 # measures again.
                 self._simulated = self.state.simulated
             self.state, self.waiting = State(), ""
-            crew, desk, orders = self._crew(place)
+            child, desk, orders = self._child(place)
 
-    def _crew(self, place: Path) -> tuple[ChildProcess, Channel, OrderLink]:
+    def _child(self, place: Path) -> tuple[ChildProcess, Channel, OrderLink]:
         """Return a process ready to fork, and both ends of its channel; its log goes to ``place``."""
         desk, orders = intercom()
         wiring = self._wiring
@@ -158,19 +158,19 @@ class Flight:
             time.sleep(LOOK)
         return False
 
-    def _look_after(self, desk: Channel, crew: ChildProcess) -> None:
+    def _look_after(self, desk: Channel, child: ChildProcess) -> None:
         while not self._over():
-            wait([desk.fileno(), crew.sentinel], LOOK)
+            wait([desk.fileno(), child.sentinel], LOOK)
             desk.beat(time.monotonic())
             self._obey(desk)
             self._look()
             self._hear(desk)
-            if self._left or crew.status is not None:
-                ended = "gave up" if crew.status is None else f"ended with status {crew.status}"
+            if self._left or child.status is not None:
+                ended = "gave up" if child.status is None else f"ended with status {child.status}"
                 self._lose(f"its process {ended}")
                 return
             if self._watchdog.stopped(time.monotonic()):
-                crew.kill()
+                child.kill()
                 self._lose("its process is not heard any more")
                 return
             if self.state.phase == Phase.DONE.value and not self.ended:
@@ -258,31 +258,31 @@ class Flight:
         self.event_log.note("order", word)
         desk.order(self._orders.frame(word))
 
-    def _finish(self, desk: Channel, crew: ChildProcess) -> None:
+    def _finish(self, desk: Channel, child: ChildProcess) -> None:
         """End the flying process; then, whatever happens meanwhile, ask the vehicle to hold."""
         try:
-            self._dismiss(desk, crew)
+            self._dismiss(desk, child)
         finally:
             try:
                 self._say_last_word()
             finally:
-                crew.join()
+                child.join()
         self._hear(desk)
         desk.close()
 
-    def _dismiss(self, desk: Channel, crew: ChildProcess) -> None:
+    def _dismiss(self, desk: Channel, child: ChildProcess) -> None:
         desk.stop()
-        if crew.killed:
-            crew.join()
+        if child.killed:
+            child.join()
             return
         until = time.monotonic() + _LEAVING
-        while not (self._left or crew.status is not None):
+        while not (self._left or child.status is not None):
             if self._at_once() or time.monotonic() > until:
-                crew.kill()
-                crew.join()
+                child.kill()
+                child.join()
                 self.event_log.note("process", "the companion's process does not end: killed")
                 return
-            wait([desk.fileno(), crew.sentinel], _QUICK)
+            wait([desk.fileno(), child.sentinel], _QUICK)
             self._hear(desk)
 
     def _at_once(self) -> bool:

@@ -22,7 +22,7 @@ from outrider.fly.trajectory_comparison import likeness
 from outrider.runs.directories import new_directory
 from outrider.shadow.findings import document_of, leave
 from outrider.shadow.roles import Cast, Survey, survey
-from outrider.shadow.shadow_run import ShadowRun, rehearse
+from outrider.shadow.shadow_run import ShadowRun, shadow_flight
 from outrider.terminal.lines import say
 from outrider.terminal.share_progress import share_progress
 
@@ -31,7 +31,7 @@ _FAR: Final = 20_000.0
 _HEARTBEAT: Final = 0
 
 
-def rehearsed(asked: Request, log: Path) -> int:
+def dry_run_of_log(asked: Request, log: Path) -> int:
     """Replay the log at full speed and return the exit status: 0 for no fault, 1 for faulty set-points.
 
     Raises InputError for a log without the vehicle, or from another place.
@@ -47,7 +47,7 @@ def rehearsed(asked: Request, log: Path) -> int:
             def told(now: int, _read: int) -> None:
                 watch(log.name, (now - seen.begin) / max(seen.end - seen.begin, 1))
 
-            found = rehearse(
+            found = shadow_flight(
                 config.settings,
                 Cast(config.system, None, target),
                 seen,

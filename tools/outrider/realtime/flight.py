@@ -91,7 +91,7 @@ class RealTimeFlight:
             first.step(now, [])
         window = None if self._view is None else Window(self.scenario.size)
         board = SharedPage(self.scenario.size, window)
-        wiring = wire(self.scenario.size, self._clock, len(self.scenario.moving), len(self.fleet.helmed))
+        wiring = wire(self.scenario.size, self._clock, len(self.scenario.moving), len(self.fleet.with_backup))
         with TemporaryDirectory() as folder, self._interruptible():
             scratch = Path(folder)
             start = self._clock.now() + (_START_WITH_PRIORITY if self._priority else _START)
@@ -242,7 +242,7 @@ class _Leader:
         moving = [one.motion(now).position for one in self._moving]
         view.show(now, Seen(since, conductor.stage.value, board.positions, place, moving), window)
         for change in view.changes(seconds):
-            window.wish(change)
+            window.command(change)
             if change.target is not None:
                 self._target.move(now, np.array(change.target))
                 self.moves.append((now, np.array(change.target)))

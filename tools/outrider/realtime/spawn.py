@@ -57,10 +57,10 @@ def spawn(
                 k, companion, system, logs, Seat(behind, every, wiring.companions[k], clock, board), cuts
             )
         )
-    for index, k in enumerate(fleet.helmed):
-        helm = fleet.helm(k)
+    for index, k in enumerate(fleet.with_backup):
+        backup_node = fleet.backup_of(k)
         # Both ends of its link to the autopilot count as the companion's: they are on one computer.
-        behind = rough(fleet, helm, {"autopilot": names.companion(fleet.systems[k]), "swarm": None})
+        behind = rough(fleet, backup_node, {"autopilot": names.companion(fleet.systems[k]), "swarm": None})
         turn = start + staggered(2 * len(fleet.systems) + index, _slots(fleet), timing.companion_us)
         every = Scheduled(behind, timing.companion_us, turn, fleet.clock(k, start))
         workers.append(Worker(Seat(behind, every, wiring.backup_nodes[index], clock, board)))
@@ -98,7 +98,7 @@ def _slots(fleet: Fleet) -> int:
     There is one for each autopilot, companion and backup node, one for all nodes that the harness plays, and
     the operator's.
     """
-    return 2 * len(fleet.systems) + len(fleet.helmed) + 2
+    return 2 * len(fleet.systems) + len(fleet.with_backup) + 2
 
 
 def staggered(k: int, count: int, period: int) -> int:

@@ -83,7 +83,7 @@ class RealTimeView:
     def changes(self, seconds: float | None) -> Iterator[Change]:
         """Yield the new changes, which are dated ``seconds`` after the goal event."""
         for data in self._line.receive():
-            wishes = decoded(data)
-            change = None if wishes is None else self.orders.new(wishes, seconds)
+            commands = decoded(data)
+            change = None if commands is None else self.orders.new(commands, seconds)
             if change is not None:
                 yield change

@@ -33,10 +33,10 @@ class Window:
     def __init__(self, vehicles: int) -> None:
         memory = mmap.mmap(-1, 8 * (_WISHES + vehicles * _ROW))
         numbers = np.frombuffer(memory, dtype=np.float64)
-        self._wishes: NDArray[np.float64] = numbers[:_WISHES]
+        self._commands: NDArray[np.float64] = numbers[:_WISHES]
         self._rows: NDArray[np.float64] = numbers[_WISHES:].reshape(vehicles, _ROW)
         self._rows[:] = np.nan
-        self._wishes[1:3] = np.nan
+        self._commands[1:3] = np.nan
 
     def show_attitude(self, k: int, attitude: Array) -> None:
         """Write the attitude of vehicle ``k``: (4,) w x y z, FRD in NED."""
@@ -68,9 +68,9 @@ class Window:
             for mode, age, spent, held in self._rows[:, 4:8]
         )
 
-    def wish(self, change: Change) -> None:
+    def command(self, change: Change) -> None:
         """Write a change for the processes, which read it at their next snapshot."""
-        found = self._wishes
+        found = self._commands
         if change.methods is not None:
             asked = ViewCommands(methods=change.methods).method_names
             found[1] = sum(1 << bit for bit, name in enumerate(_METHODS) if name in asked)
@@ -82,14 +82,14 @@ class Window:
         found[0] += 1
 
     @property
-    def wishes(self) -> int:
+    def commands(self) -> int:
         """Number of commands so far."""
-        return int(self._wishes[0])
+        return int(self._commands[0])
 
     @property
     def methods(self) -> tuple[MethodName, ...]:
         """Commanded methods; empty: those of the scenario."""
-        bits = self._wishes[1]
+        bits = self._commands[1]
         if np.isnan(bits):
             return ()
         return tuple(name for bit, name in enumerate(_METHODS) if int(bits) >> bit & 1)
@@ -97,15 +97,15 @@ class Window:
     @property
     def loss(self) -> float | None:
         """Commanded share of lost datagrams; None: that of the scenario."""
-        loss = float(self._wishes[2])
+        loss = float(self._commands[2])
         return None if np.isnan(loss) else loss
 
     @property
     def moves(self) -> int:
         """Number of moves of the target."""
-        return int(self._wishes[3])
+        return int(self._commands[3])
 
     @property
     def place(self) -> Array:
         """Place of the last move (3,), a copy."""
-        return self._wishes[4:7].copy()
+        return self._commands[4:7].copy()

@@ -77,17 +77,22 @@ def wire(vehicles: int, clock: Clock, moving: int = 0, backup_nodes: int = 0) ->
                 }
             )
             operator.append(opening(f"udpout:{_HOST}:{_port(ground)}"))
-        helmed = []
+        backups = []
         for autopilot, companion in list(zip(autopilots, companions, strict=True))[:backup_nodes]:
             # The backup node sends its set-points to the autopilot. It receives the data of both, and so
             # detects whether the companion sends.
             ends = [opening(f"udpin:{_HOST}:0"), opening(f"udpin:{_HOST}:0")]
             for node, end in zip((autopilot, companion), ends, strict=True):
                 node["autopilot"].append(opening(f"udpout:{_HOST}:{_port(end)}"))
-            helmed.append({"autopilot": ends, "swarm": [opening(swarm)]})
+            backups.append({"autopilot": ends, "swarm": [opening(swarm)]})
         obstacles = [{"swarm": [opening(swarm)]} for _ in range(moving)]
         wiring = Wiring(
-            autopilots, companions, helmed, {"target": [opening(target)]}, obstacles, {"ground": operator}
+            autopilots,
+            companions,
+            backups,
+            {"target": [opening(target)]},
+            obstacles,
+            {"ground": operator},
         )
         opened.pop_all()
     return wiring

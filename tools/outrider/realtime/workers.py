@@ -211,7 +211,7 @@ class CompanionWorker(Worker):
         self._k, self._node = k, node
         self._system, self._logs = system, logs
         self._thaws = 0
-        self._next_glimpse = self._wishes = 0
+        self._next_glimpse = self._commands = 0
         self._shown: tuple[bool, str] | None = None
         self._first: Tally | None = None
         self._last: Tally | None = None
@@ -249,9 +249,9 @@ class CompanionWorker(Worker):
     def _look_on(self, now: int, window: Window) -> None:
         """Write the node's snapshot for the view, and apply the view's commands."""
         window.show_companion(self._k, companion_snapshot(self._node, now))
-        if window.wishes == self._wishes:
+        if window.commands == self._commands:
             return
-        self._wishes = window.wishes
+        self._commands = window.commands
         if window.methods and not isinstance(self._node, Bystander):
             self._node.use(window.methods)
         if window.loss is not None:

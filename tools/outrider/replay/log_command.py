@@ -21,7 +21,7 @@ from outrider.runs.directories import new_directory
 from outrider.scenarios.scenario import FIRST_SYSTEM, Scenario
 from outrider.shadow.findings import document_of, leave
 from outrider.shadow.roles import Cast, check, survey
-from outrider.shadow.shadow_run import ShadowRun, rehearse
+from outrider.shadow.shadow_run import ShadowRun, shadow_flight
 from outrider.simulation.console import progress
 from outrider.swarm.command import fly
 from outrider.terminal.share_progress import share_progress
@@ -31,7 +31,7 @@ Pacing = Callable[[Iterable[Record]], Iterable[Record]]
 """Filter that passes records on when they are due."""
 
 
-def rehearsal(log: Path, cast: Cast, like: str, out: Path | None, as_json: bool, pacing: Pacing) -> int:
+def replay_log(log: Path, cast: Cast, like: str, out: Path | None, as_json: bool, pacing: Pacing) -> int:
     """Run a companion over ``log`` with the settings of scenario ``like``, report, and return 0.
 
     The report says what it would have sent. ``setpoints.csv``, ``replay.json`` and ``replay.png`` are written
@@ -50,7 +50,7 @@ def rehearsal(log: Path, cast: Cast, like: str, out: Path | None, as_json: bool,
             def told(now: int, _read: int) -> None:
                 watch(log.name, (now - seen.begin) / max(seen.end - seen.begin, 1))
 
-            found = rehearse(config, cast, seen, pacing(read_tlog(log)), told)
+            found = shadow_flight(config, cast, seen, pacing(read_tlog(log)), told)
     except LogError as error:
         raise InputError(str(error)) from None
     _tell(f"{log.name} · vehicle {cast.own}", found, directory, as_json)

@@ -15,7 +15,7 @@ from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import InputError
 from outrider.replay.command import replay as reenacting
-from outrider.replay.log_command import Pacing, chasing, rehearsal
+from outrider.replay.log_command import Pacing, chasing, replay_log
 from outrider.replay.telemetry import Forwarder, paced
 from outrider.shadow.roles import Cast
 from outrider.terminal.share_progress import share_progress
@@ -58,7 +58,7 @@ class Request(NamedTuple):
             return self._send()
         cast = Cast(self.own, _systems(self.neighbours), self.target)
         with self._paced() as pacing:
-            return rehearsal(self.log, cast, self.like, self.out, self.as_json, pacing)
+            return replay_log(self.log, cast, self.like, self.out, self.as_json, pacing)
 
     def _send(self) -> int:
         """Send the log's telemetry to the endpoint."""

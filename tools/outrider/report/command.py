@@ -61,16 +61,16 @@ def report(directory: Path, out: Path | None = None, as_json: bool = False) -> i
 
 def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
     """Return the page of a run without writing it. Raises InputError if the directory holds no run."""
-    ledger, ahead = Ledger(), dict[int, float]()
+    counting, ahead = Ledger(), dict[int, float]()
 
     def sift(log: Log, motions: Motions | None) -> Log:
         if motions is not None:
             ahead[log.owner] = clocks.offset(log, motions)
-        ledger.take(log, ahead.get(log.owner))
+        counting.take(log, ahead.get(log.owner))
         return log._replace(heard={})
 
     run = read(directory, watch, sift)
-    motions, lost = run.motions, ledger.close()
+    motions, lost = run.motions, counting.close()
     near = [] if motions is None else encounters(motions, _d_min(run), run.scenario)
     happened = events(run, near, ahead, 0.0 if motions is None else float(motions.time[-1]))
     replay = None if motions is None else _replay(run, motions, lost, ahead, happened)

@@ -12,7 +12,7 @@ def companion(system: int) -> str:
     return f"companion-{system}"
 
 
-def helm(system: int) -> str:
+def backup_node(system: int) -> str:
     """Return the name of the backup node, which continues the plan when the companion is silent."""
     return f"helm-{system}"
 

@@ -27,13 +27,13 @@ class Orders:
         self.given: list[tuple[float | None, Change]] = []
         self._last = ViewCommands()
 
-    def new(self, wishes: ViewCommands, seconds: float | None) -> Change | None:
+    def new(self, commands: ViewCommands, seconds: float | None) -> Change | None:
         """Return what is new in ``wishes``, and record it; None if nothing is."""
-        last, self._last = self._last, wishes
+        last, self._last = self._last, commands
         change = Change(
-            wishes.methods if wishes.methods != last.methods else None,
-            wishes.loss if wishes.loss != last.loss else None,
-            wishes.target if wishes.moves > last.moves else None,
+            commands.methods if commands.methods != last.methods else None,
+            commands.loss if commands.loss != last.loss else None,
+            commands.target if commands.moves > last.moves else None,
         )
         if change == Change():
             return None

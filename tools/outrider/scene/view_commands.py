@@ -47,9 +47,9 @@ class ViewCommands(NamedTuple):
         return tuple(name for name in METHODS if name in asked)
 
 
-def encoded(wishes: ViewCommands) -> bytes:
+def encoded(commands: ViewCommands) -> bytes:
     """Encode ``wishes`` for ``decoded``."""
-    return json.dumps(wishes._asdict()).encode()
+    return json.dumps(commands._asdict()).encode()
 
 
 def decoded(data: bytes) -> ViewCommands | None:
@@ -59,18 +59,18 @@ def decoded(data: bytes) -> ViewCommands | None:
     try:
         found = json.loads(data)
         place = found.get("target")
-        wishes = ViewCommands(**{**found, "target": None if place is None else tuple(place)})
+        commands = ViewCommands(**{**found, "target": None if place is None else tuple(place)})
     except (ValueError, TypeError, AttributeError, RecursionError):
         return None
-    return wishes if _sensible(wishes) else None
+    return commands if _sensible(commands) else None
 
 
-def _sensible(wishes: ViewCommands) -> bool:
-    speed, loss, target, methods = wishes.speed, wishes.loss, wishes.target, wishes.methods
+def _sensible(commands: ViewCommands) -> bool:
+    speed, loss, target, methods = commands.speed, commands.loss, commands.target, commands.methods
     return (
         (speed is None or (_number(speed) and 0.0 < speed <= FASTEST))
-        and isinstance(wishes.paused, bool)
-        and all(type(count) is int and 0 <= count < _MOST for count in (wishes.steps, wishes.moves))
+        and isinstance(commands.paused, bool)
+        and all(type(count) is int and 0 <= count < _MOST for count in (commands.steps, commands.moves))
         and (methods is None or (isinstance(methods, str) and set(methods.split("+")) <= set(METHODS)))
         and (loss is None or (_number(loss) and 0.0 <= loss <= 1.0))
         and (target is None or (len(target) == 3 and all(_number(x) and abs(x) < _FAR for x in target)))

@@ -36,7 +36,7 @@ STEP = 10_000
 """µs"""
 _RATE_HZ = 5.0
 
-Told = tuple[int, SetpointLocal]
+Sent = tuple[int, SetpointLocal]
 
 
 @dataclass
@@ -48,15 +48,15 @@ class ShadowRun:
     ``reasons``: steps of 10 ms without a set-point, by what was missing; ``holds``: plans that were held.
     """
 
-    would: list[Told] = field(default_factory=list)
-    sent: list[Told] = field(default_factory=list)
+    would: list[Sent] = field(default_factory=list)
+    sent: list[Sent] = field(default_factory=list)
     places: list[tuple[int, tuple[float, float, float]]] = field(default_factory=list)
     reasons: Counter[str] = field(default_factory=Counter)
     holds: int = 0
     records: int = 0
 
 
-def rehearse(
+def shadow_flight(
     config: CompanionConfig,
     cast: Cast,
     seen: Survey,

@@ -113,12 +113,12 @@ class Fleet:
         return kind(config, self.systems[k], self.target_system, self.frame, stopwatch)
 
     @property
-    def helmed(self) -> list[int]:
+    def with_backup(self) -> list[int]:
         """Indices of the vehicles with a backup node: those on whose plans others rely."""
         certified = self.scenario.companion.avoidance == "certified"
         return list(range(self.scenario.vehicles)) if certified else []
 
-    def helm(self, k: int) -> BackupNode:
+    def backup_of(self, k: int) -> BackupNode:
         """Return the backup node of vehicle ``k``."""
         return BackupNode(self.companion_config_of(k), self.systems[k], self.frame)
 
@@ -174,13 +174,13 @@ class Fleet:
             }
             for link, other in ends.items():
                 ends_here = [End(name, link, words), other]
-                if link == "autopilot" and k in self.helmed:
-                    ends_here.append(End(names.helm(system), link, words))
+                if link == "autopilot" and k in self.with_backup:
+                    ends_here.append(End(names.backup_node(system), link, words))
                 channels.append(_channel(f"{link}-{name}", ends_here, getattr(links, link)))
-            if k in self.helmed:
+            if k in self.with_backup:
                 # On the same computer nothing is lost.
                 channels.append(
-                    Channel(f"helm-{name}", {name: "swarm", names.helm(system): "swarm"}, Faults())
+                    Channel(f"helm-{name}", {name: "swarm", names.backup_node(system): "swarm"}, Faults())
                 )
         swarm = [End(name, "swarm", words) for name, words in companions]
         swarm += [End(names.moving(s), "swarm", ("moving", s)) for s in self.scenario.moving_systems]

@@ -67,7 +67,7 @@ class Flight:
         self.moving = fleet.moving()
         self.autopilots = [fleet.autopilot(k) for k in range(scenario.size)]
         self.companions = [fleet.companion(k, stopwatch) for k in range(scenario.size)]
-        self.backup_nodes = [fleet.helm(k) for k in fleet.helmed]
+        self.backup_nodes = [fleet.backup_of(k) for k in fleet.with_backup]
         self.operator = fleet.operator()
         self.truth = truth_of(scenario)
         self.network = SimulatedNetwork(fleet.channels(), seed, scenario.timing.base_tick_us)
@@ -120,7 +120,7 @@ class Flight:
         for k, (companion, phase) in enumerate(zip(self.companions, self.fleet.phases(), strict=True)):
             clock = self.fleet.clock(k, EPOCH)
             nodes.append(Scheduled(companion, timing.companion_us, EPOCH + phase, clock))
-        for k in self.fleet.helmed:
+        for k in self.fleet.with_backup:
             clock = self.fleet.clock(k, EPOCH)
             nodes.append(Scheduled(self.backup_nodes[k], timing.companion_us, EPOCH, clock))
         nodes.append(Scheduled(self.target, timing.companion_us, EPOCH))

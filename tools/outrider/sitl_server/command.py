@@ -47,24 +47,24 @@ def run(asked: Request, terms: Terms) -> int:
     began = time.monotonic()
     prepare(terms.state, asked.flavour, asked.systems)
     places = _addresses(asked, terms)
-    crew = Processes(asked, wire(places, WallClock()), terms.state)
+    processes = Processes(asked, wire(places, WallClock()), terms.state)
     with noted((signal.SIGINT, signal.SIGTERM)) as stopped:
         try:
             announce(asked)
-            crew.start()
-            _wait(crew, stopped, asked.count)
+            processes.start()
+            _wait(processes, stopped, asked.count)
             until = math.inf if terms.seconds is None else time.monotonic() + terms.seconds
             if terms.as_json and not stopped:
                 _say(ready(asked, places))
-            with watching(asked, places, crew.board) as look:
+            with watching(asked, places, processes.board) as look:
                 while not stopped and time.monotonic() < until:
                     time.sleep(_LOOK)
-                    crew.check()
+                    processes.check()
                     look()
         finally:
-            crew.stop()
+            processes.stop()
     if terms.as_json:
-        _say(summary(asked, crew.board, time.monotonic() - began))
+        _say(summary(asked, processes.board, time.monotonic() - began))
     return 0
 
 
@@ -83,11 +83,11 @@ def _addresses(asked: Request, terms: Terms) -> list[Address]:
     return places
 
 
-def _wait(crew: Processes, stopped: Sequence[object], count: int) -> None:
+def _wait(processes: Processes, stopped: Sequence[object], count: int) -> None:
     """Wait until all vehicles are up."""
-    while not stopped and not all(crew.board.gauges(index).up for index in range(count)):
+    while not stopped and not all(processes.board.snapshot(index).up for index in range(count)):
         time.sleep(0.02)
-        crew.check()
+        processes.check()
 
 
 def _say(value: dict[str, Value]) -> None:

@@ -37,10 +37,10 @@ def watching(asked: Request, places: Sequence[Address], board: SharedPage) -> It
     for system, place in zip(asked.systems, places, strict=True):
         ends = " ".join(map(str, place.endpoints))
         say(f"vehicle {system} ({asked.flavour}, {asked.vehicle.name}): {ends}")
-    chronicle = EventFeed(asked, board)
+    feed = EventFeed(asked, board)
 
     def look() -> None:
-        for line in chronicle.look():
+        for line in feed.look():
             say(line)
 
     yield look

@@ -20,7 +20,7 @@ class EventFeed:
         """Return one line for each event since the last call: time since boot (s), vehicle, event."""
         lines = []
         for index, system in enumerate(self._asked.systems):
-            now = self._board.gauges(index)
+            now = self._board.snapshot(index)
             if now.up:
                 what = self._changes(index, self._before[index], now)
                 lines += [f"{now.time:8.1f} s  vehicle {system}: {one}" for one in what]

@@ -34,8 +34,8 @@ def summary(asked: Request, board: SharedPage, wall: float) -> dict[str, Value]:
     paces, times = board.paces(), os.times()
     vehicles: list[Value] = []
     for index, system in enumerate(asked.systems):
-        gauges = board.gauges(index)
-        vehicles.append({"system_id": system, "received": gauges.received, "sent": gauges.sent})
+        snapshot = board.snapshot(index)
+        vehicles.append({"system_id": system, "received": snapshot.received, "sent": snapshot.sent})
     return {
         "vehicles": vehicles,
         "simulated_s": round(min(pace.simulated for pace in paces), 3),

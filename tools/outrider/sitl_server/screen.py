@@ -73,8 +73,8 @@ class Screen:
             self.live.update(self._picture(now), refresh=True)
 
     def _picture(self, now: float) -> Group:
-        every = [self._board.gauges(index) for index in range(self._asked.count)]
-        self._counts.append((now, [(gauges.received, gauges.sent) for gauges in every]))
+        every = [self._board.snapshot(index) for index in range(self._asked.count)]
+        self._counts.append((now, [(snapshot.received, snapshot.sent) for snapshot in every]))
         shown = max(1, min(self._asked.count, self._console.size.height - _FRAME - _EVENTS))
         table = Table(
             title=self._title(), title_justify="left", box=box.SIMPLE, padding=(0, 1, 0, 0), show_edge=False
@@ -97,7 +97,7 @@ class Screen:
             f" · {factor(last, first):.2f} × real time · {late:.1f} ms late (p99)"
         )
 
-    def _row(self, index: int, gauges: VehicleSnapshot) -> tuple[str, ...]:
+    def _row(self, index: int, snapshot: VehicleSnapshot) -> tuple[str, ...]:
         (then, before), (now, counts) = self._counts[0], self._counts[-1]
         elapsed = max(now - then, 1e-3)
         received, sent = (
@@ -110,13 +110,13 @@ class Screen:
         return (
             str(self._asked.systems[index]),
             place,
-            mode_name(self._asked.flavour, gauges.custom_mode),
-            "yes" if gauges.armed else "",
+            mode_name(self._asked.flavour, snapshot.custom_mode),
+            "yes" if snapshot.armed else "",
             # The sum turns −0.0 of a vehicle on the ground into 0.0.
-            *(f"{round(part, 1) + 0.0:.1f}" for part in gauges.position),
-            f"{math.hypot(*gauges.velocity):.1f}",
-            f"{100.0 * gauges.battery:.0f}%",
+            *(f"{round(part, 1) + 0.0:.1f}" for part in snapshot.position),
+            f"{math.hypot(*snapshot.velocity):.1f}",
+            f"{100.0 * snapshot.battery:.0f}%",
             f"{received:.0f}",
             f"{sent:.0f}",
-            str(gauges.clients),
+            str(snapshot.clients),
         )

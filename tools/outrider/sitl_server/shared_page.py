@@ -96,12 +96,12 @@ class SharedPage:
     def lost(self, value: int) -> None:
         self._flags[1] = value
 
-    def show(self, index: int, gauges: VehicleSnapshot) -> None:
+    def show(self, index: int, snapshot: VehicleSnapshot) -> None:
         """Write the snapshot of vehicle ``index``."""
-        up, armed, mode, position, velocity, *rest = gauges
+        up, armed, mode, position, velocity, *rest = snapshot
         self._vehicles[index] = (up, armed, mode, *position, *velocity, *rest)
 
-    def gauges(self, index: int) -> VehicleSnapshot:
+    def snapshot(self, index: int) -> VehicleSnapshot:
         """Return the snapshot of vehicle ``index``; not ``up`` until its process has written one."""
         up, armed, mode, x, y, z, u, v, w, battery, *counts, time = self._vehicles[index].tolist()
         received, sent, clients, said = map(int, counts)

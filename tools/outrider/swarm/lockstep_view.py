@@ -40,12 +40,12 @@ class LockStepView:
 
     def _listen(self, flight: Flight, now: int) -> None:
         for data in self._line.receive():
-            wishes = decoded(data)
-            if wishes is None:
+            commands = decoded(data)
+            if commands is None:
                 continue
-            self._pace.receive(wishes, now)
+            self._pace.receive(commands, now)
             start = flight.conductor.clock_start
-            change = self.orders.new(wishes, None if start is None else 1e-6 * (now - start))
+            change = self.orders.new(commands, None if start is None else 1e-6 * (now - start))
             if change is not None:
                 obey(flight, now, change)
 

@@ -21,20 +21,20 @@ class Pace:
         self, clock: Callable[[], float] = time.monotonic, nap: Callable[[float], None] = time.sleep
     ) -> None:
         self._clock, self._nap = clock, nap
-        self._wishes = ViewCommands()
+        self._commands = ViewCommands()
         self._said = -LEASE
         self._steps: int | None = None
         self._until = 0
         self._anchor: tuple[float, int, float | None] | None = None
 
-    def receive(self, wishes: ViewCommands, now: int) -> None:
+    def receive(self, commands: ViewCommands, now: int) -> None:
         """Take commands, while the simulation is at ``now`` (µs)."""
         if self._steps is None:
-            self._steps = wishes.steps
-        if wishes.steps > self._steps:
-            self._until = max(self._until, now) + STEP * (wishes.steps - self._steps)
-            self._steps = wishes.steps
-        self._wishes, self._said = wishes, self._clock()
+            self._steps = commands.steps
+        if commands.steps > self._steps:
+            self._until = max(self._until, now) + STEP * (commands.steps - self._steps)
+            self._steps = commands.steps
+        self._commands, self._said = commands, self._clock()
 
     def wait(self, now: int, listen: Callable[[], None]) -> None:
         """Wait before the simulation continues from ``now`` (µs), for as long as is commanded.
@@ -47,21 +47,21 @@ class Pace:
 
     def _rest(self, now: int) -> float:
         """Return the time to wait (s) by the present commands."""
-        clock, wishes = self._clock(), self._wishes
+        clock, commands = self._clock(), self._commands
         if clock - self._said > LEASE:
             self._anchor = None
             return 0.0
-        if wishes.paused:
+        if commands.paused:
             self._anchor = None
             return 0.0 if now < self._until else _NAP
         self._until = 0
-        if wishes.speed is None:
+        if commands.speed is None:
             self._anchor = None
             return 0.0
-        if self._anchor is None or self._anchor[2] != wishes.speed:
-            self._anchor = clock, now, wishes.speed
+        if self._anchor is None or self._anchor[2] != commands.speed:
+            self._anchor = clock, now, commands.speed
         since, begin, speed = self._anchor
-        due = since + 1e-6 * (now - begin) / wishes.speed
+        due = since + 1e-6 * (now - begin) / commands.speed
         if due < clock - 0.5:
             # A simulation that cannot keep up does not catch up afterwards.
             self._anchor = clock, now, speed

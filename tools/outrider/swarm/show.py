@@ -55,9 +55,9 @@ class Show:
             sys.stderr.write(f"{self._viewer.url} plays the run; Ctrl-C ends it\n")
             self._viewer.wait()
 
-    def _begin(self, prepared: Prepared, seed: int, levers: frozenset[Lever], wishes: ViewCommands) -> None:
+    def _begin(self, prepared: Prepared, seed: int, levers: frozenset[Lever], commands: ViewCommands) -> None:
         scene = staged(prepared.scenario, seed, prepared.vehicle.span, levers)
-        self._viewer.begin(scene, wishes)
+        self._viewer.begin(scene, commands)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from outrider.errors import InputError
 from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
 from outrider.shadow.roles import Cast, check, survey
-from outrider.shadow.shadow_run import rehearse
+from outrider.shadow.shadow_run import shadow_flight
 from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
 from outrider.testing.flown import Flown, Replayed
@@ -52,7 +52,7 @@ def replayed(
     except LogError as error:
         raise InputError(str(error)) from None
     check(log, cast, seen)
-    return Replayed(f"{log.name}, vehicle {own}", rehearse(config, cast, seen, read_tlog(log)), golden)
+    return Replayed(f"{log.name}, vehicle {own}", shadow_flight(config, cast, seen, read_tlog(log)), golden)
 
 
 def changed(name: str, changes: dict[str, Any]) -> Scenario:

@@ -111,7 +111,7 @@ class Listener:
             found.append(self._moment(wall))
         return found
 
-    def wish(self, wishes: ViewCommands, sought: float | None) -> None:
+    def command(self, commands: ViewCommands, sought: float | None) -> None:
         """Ignore view commands, because nothing is sent."""
 
     def _hear(self, wall: float, message: Message) -> None:

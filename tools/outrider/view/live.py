@@ -25,7 +25,7 @@ class Begin(NamedTuple):
     """Start of a flight: its ``scene``, and the initial view commands."""
 
     scene: Scene
-    wishes: ViewCommands
+    commands: ViewCommands
 
 
 class Landed(NamedTuple):
@@ -66,7 +66,7 @@ class Live:
             # Received from the process that started this one, over a socket that no other process has.
             told = pickle.loads(data)
             if isinstance(told, Begin):
-                self._begin = told.wishes
+                self._begin = told.commands
                 found.append(told.scene)
             elif isinstance(told, Snapshot):
                 found.append(told)
@@ -75,9 +75,9 @@ class Live:
                 return self._player.poll(wall)
         return found
 
-    def wish(self, wishes: ViewCommands, sought: float | None) -> None:
+    def command(self, commands: ViewCommands, sought: float | None) -> None:
         """Pass the view commands on; a flight that is not simulated ignores them."""
         if self._player is not None:
-            self._player.wish(wishes, sought)
+            self._player.command(commands, sought)
         else:
-            self._line.send(encoded(wishes))
+            self._line.send(encoded(commands))

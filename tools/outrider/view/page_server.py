@@ -45,7 +45,7 @@ class PageServer:
 
     def run(self, source: Source, over: Callable[[], bool]) -> None:
         """Show ``source`` and pass view commands to it until ``over`` returns true."""
-        said, last_wishes = 0.0, None
+        said, last_commands = 0.0, None
         while not over():
             wall = time.monotonic()
             self.show(source, wall)
@@ -54,11 +54,11 @@ class PageServer:
                 if source.span is None:
                     panel.watch(bool(self.server.get_clients()))
                 sought, panel.sought = panel.sought, None
-                if panel.wishes != last_wishes:
+                if panel.commands != last_commands:
                     panel.head()
-                if sought is not None or panel.wishes != last_wishes or wall - said > _SAY:
-                    said, last_wishes = wall, panel.wishes
-                    source.wish(panel.wishes, sought)
+                if sought is not None or panel.commands != last_commands or wall - said > _SAY:
+                    said, last_commands = wall, panel.commands
+                    source.command(panel.commands, sought)
             time.sleep(max(PICTURE - (time.monotonic() - wall), 0.005))
 
     def show(self, source: Source, wall: float) -> None:

@@ -41,7 +41,7 @@ class Panel:
         hint: str = "",
     ) -> None:
         self._server, self._stage, self._gui = server, stage, server.gui
-        self.wishes = self._begin = begin
+        self.commands = self._begin = begin
         self._watched = False
         self._last: Snapshot | None = None
         self._speed: viser.GuiDropdownHandle[str] | None = None
@@ -87,9 +87,9 @@ class Panel:
         self._watched = watched
         if watched and self._begin.speed is None:
             self._speed.value = "1"  # type: ignore[misc]
-            self.wishes = self.wishes._replace(speed=1.0)
+            self.commands = self.commands._replace(speed=1.0)
         elif not watched:
-            self.wishes = self.wishes._replace(speed=self._begin.speed, paused=False)
+            self.commands = self.commands._replace(speed=self._begin.speed, paused=False)
 
     def see(self, moment: Snapshot) -> None:
         """Add a point to the plot. A time before the last one clears the plot."""
@@ -129,27 +129,27 @@ class Panel:
         near = ""
         if isfinite(pair.distance):
             near = f" · nearest {pair.distance:.2f} m ({scene.systems[pair.one]}–{scene.systems[pair.other]})"
-        paused = " · paused" if self.wishes.paused and "pace" in scene.levers else ""
+        paused = " · paused" if self.commands.paused and "pace" in scene.levers else ""
         return f"**{moment.time:.1f} s** · {moment.stage}{paused}{near}"
 
     def _add_pace(self, span: tuple[float, float] | None) -> None:
         gui = self._gui
         pause = gui.add_button_group("Time", ("pause", "play", "step"))
-        now = self.wishes.speed
+        now = self.commands.speed
         first = SPEEDS[-1] if now is None else f"{now:g}"
         self._speed = speed = gui.add_dropdown("Speed", SPEEDS, initial_value=first)
 
         @pause.on_click
         def _(_event: object) -> None:
             if pause.value == "step":
-                self.wishes = self.wishes._replace(paused=True, steps=self.wishes.steps + 1)
+                self.commands = self.commands._replace(paused=True, steps=self.commands.steps + 1)
             else:
-                self.wishes = self.wishes._replace(paused=pause.value == "pause")
+                self.commands = self.commands._replace(paused=pause.value == "pause")
 
         @speed.on_update
         def _(_event: object) -> None:
             value = None if speed.value == SPEEDS[-1] else float(speed.value)
-            self.wishes = self.wishes._replace(speed=value)
+            self.commands = self.commands._replace(speed=value)
 
         if span is not None:
             self._slider = slider = gui.add_slider("At, s", *span, 0.02, span[0])
@@ -168,14 +168,14 @@ class Panel:
 
                 @method.on_update
                 def _(_event: object) -> None:
-                    self.wishes = self.wishes._replace(methods=method.value)
+                    self.commands = self.commands._replace(methods=method.value)
 
             if "loss" in scene.levers:
                 loss = gui.add_slider("Loss, %", 0.0, 100.0, 1.0, round(100.0 * scene.loss))
 
                 @loss.on_update
                 def _(_event: object) -> None:
-                    self.wishes = self.wishes._replace(loss=loss.value / 100.0)
+                    self.commands = self.commands._replace(loss=loss.value / 100.0)
 
             if "target" in scene.levers:
                 clicks = gui.add_checkbox("A click moves the target", False)
@@ -195,7 +195,7 @@ class Panel:
         place = struck(event.ray_origin, event.ray_direction, self._target_height - self._stage.focus[2])
         if place is not None:
             x, y, z = (place + self._stage.focus).tolist()
-            self.wishes = self.wishes._replace(target=(x, y, z), moves=self.wishes.moves + 1)
+            self.commands = self.commands._replace(target=(x, y, z), moves=self.commands.moves + 1)
 
     _target_height = 0.0
 

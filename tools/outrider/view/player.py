@@ -45,7 +45,7 @@ class Player:
         self.begin = ViewCommands(speed=1.0)
         self.hint = ""
         self._spent = [_of(plan_times, system) for system in scene.systems]
-        self._wishes = self.begin
+        self._commands = self.begin
         # Before that the vehicles only take off.
         self._at = min(max(self.span[0], -1.0), self.span[1])
         self._wall: float | None = None
@@ -58,8 +58,8 @@ class Player:
         if self._wall is None:
             found.append(self.scene)
             self._wall = wall
-        speed = FAST if self._wishes.speed is None else self._wishes.speed
-        if not self._wishes.paused:
+        speed = FAST if self._commands.speed is None else self._commands.speed
+        if not self._commands.paused:
             self._at = min(self._at + speed * (wall - self._wall), self.span[1])
         self._wall = wall
         if self._sought:
@@ -72,11 +72,11 @@ class Player:
             found.append(self.moment(self._at))
         return found
 
-    def wish(self, wishes: ViewCommands, sought: float | None) -> None:
+    def command(self, commands: ViewCommands, sought: float | None) -> None:
         """Apply pause, steps and speed, and jump to the time ``sought``."""
-        if wishes.paused and wishes.steps > self._wishes.steps:
-            self._at = min(self._at + _STEP * (wishes.steps - self._wishes.steps), self.span[1])
-        self._wishes = wishes
+        if commands.paused and commands.steps > self._commands.steps:
+            self._at = min(self._at + _STEP * (commands.steps - self._commands.steps), self.span[1])
+        self._commands = commands
         if sought is not None:
             self._at = min(max(sought, self.span[0]), self.span[1])
             self._sought = True

@@ -35,7 +35,7 @@ class Source(Protocol):
         """
         ...
 
-    def wish(self, wishes: ViewCommands, sought: float | None) -> None:
+    def command(self, commands: ViewCommands, sought: float | None) -> None:
         """Apply view commands. It is called repeatedly.
 
         ``sought`` is a time (s) that a user has just chosen, or None.

@@ -50,9 +50,9 @@ class ViewerClient:
             raise InputError(f"--view: no page at {host}:{port}: {ready.error}")
         self.url = ready.url
 
-    def begin(self, scene: Scene, wishes: ViewCommands) -> None:
+    def begin(self, scene: Scene, commands: ViewCommands) -> None:
         """Report that a flight of ``scene`` begins."""
-        self.line.send(pickle.dumps(Begin(scene, wishes)))
+        self.line.send(pickle.dumps(Begin(scene, commands)))
 
     def landed(self, directory: Path) -> None:
         """Report that the flight has ended; the view then shows the run in ``directory``."""

@@ -7,6 +7,7 @@ Types are strict: text never becomes a number, nor a number text.
 from __future__ import annotations
 
 import json
+import sys
 from bisect import bisect_right
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +18,7 @@ from pydantic import BaseModel, ValidationError
 from outrider.errors import Fault, InputError
 from outrider.suggestions import neighbours
 from outrider.yaml_files.model_faults import model_flaws
+from outrider.yaml_files.renamed_keys import present_names
 from outrider.yaml_files.schema_nodes import Schema, listing
 from outrider.yaml_files.tree import Flaw, Mapping, parse, plain
 
@@ -48,6 +50,10 @@ def read(data: bytes, name: str, model: type[Model]) -> Model:
     if not isinstance(tree, Mapping):
         wrong = Flaw(0, "is empty") if tree is None else Flaw(tree.at, "is no mapping")
         raise _input_error(text, name, [*flaws, Flaw(wrong.at, f"{wrong.what}; needed: {schema.describe()}")])
+    tree, remarks, more = present_names(tree, schema)
+    flaws = [*flaws, *more]
+    for line in () if flaws else str(_input_error(text, name, remarks)).splitlines():
+        _remark(line)
     # JSON has lists, but neither tuples nor enumerations: strict mode accepts them only from JSON.
     document = json.dumps(plain(tree), allow_nan=False)
     try:
@@ -58,6 +64,12 @@ def read(data: bytes, name: str, model: type[Model]) -> Model:
     if flaws:
         raise _input_error(text, name, flaws)
     return value
+
+
+@lru_cache(maxsize=256)
+def _remark(line: str) -> None:
+    """Print ``line`` on standard error, once in a process."""
+    sys.stderr.write(f"outrider: {line}\n")
 
 
 @lru_cache(maxsize=32)

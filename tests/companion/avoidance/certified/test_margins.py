@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.margins import between, margin, stranger
+from companion.avoidance.certified.margins import between, margin, reachable
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import FieldConfig, LimitsConfig
 from companion.values.horizon import Array
@@ -48,7 +48,7 @@ def test_the_balls_hold_every_motion_within_the_bounds(
     rng = np.random.default_rng(seed)
     direction = rng.normal(size=3)
     velocity = rng.uniform() ** 0.3 * speed * direction / np.linalg.norm(direction)
-    centres, radii = stranger(np.zeros(3), velocity, age, SECONDS, speed, acceleration)
+    centres, radii = reachable(np.zeros(3), velocity, age, SECONDS, speed, acceleration)
     flown = any_motion(rng, velocity, age, speed, acceleration)
     off = np.linalg.norm(flown - curves(centres, FINE + 1), axis=-1)
     assert (off <= radii[:, None] + 1e-9).all()
@@ -57,7 +57,7 @@ def test_the_balls_hold_every_motion_within_the_bounds(
 @given(seeds, st.floats(0.0, 5.0))
 def test_who_was_heard_longer_ago_may_be_further_off(seed: int, age: float) -> None:
     velocity = np.random.default_rng(seed).normal(size=3)
-    radii = [stranger(np.zeros(3), velocity, a, SECONDS, 1.0, 1.0)[1] for a in (age, age + 0.1)]
+    radii = [reachable(np.zeros(3), velocity, a, SECONDS, 1.0, 1.0)[1] for a in (age, age + 0.1)]
     assert (radii[1] > radii[0]).all()
     assert (np.diff(radii[0]) > 0.0).all()
     assert (radii[0] <= age + SECONDS[1:]).all()

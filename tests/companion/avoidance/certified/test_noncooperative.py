@@ -26,7 +26,7 @@ angles = st.floats(0.0, 2.0 * np.pi)
 
 def config(kind: str | None = None, **certified: float) -> CompanionConfig:
     moving = [] if kind is None else [{"system": OTHER, "kind": kind, "radius": 0.4}]
-    given = {"stranger_speed": 3.0} | certified
+    given = {"noncooperative_speed": 3.0} | certified
     return CompanionConfig.model_validate(
         {"task": "goto", "avoidance": "certified", "moving": moving, "certified": given}
     )
