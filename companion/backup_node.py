@@ -97,7 +97,7 @@ class BackupNode:
         self._signing = signing
         self._plans: dict[int, WirePlan] = {}
         self._flown: tuple[WirePlan, Horizon] | None = None
-        self._heard: tuple[int, SetpointLocal] | None = None
+        self._received: tuple[int, SetpointLocal] | None = None
         self._beat: tuple[int, Heartbeat] | None = None
         self._local: LocalFrame | None = None
         self._origins = Origins()
@@ -119,10 +119,10 @@ class BackupNode:
         if profile is None:
             # Another controller has the vehicle, or may have it: plans made before no longer count.
             self._forget()
-        if now < self._next or profile is None or self._local is None or self._heard is None:
+        if now < self._next or profile is None or self._local is None or self._received is None:
             return beat
         period = self._config.rates.setpoint_us
-        since, last = self._heard
+        since, last = self._received
         if now - since <= _SILENT * period:
             return beat
         horizon = self._horizon(now)
@@ -152,7 +152,7 @@ class BackupNode:
             case GpsGlobalOrigin() if self._origins.counts(now, message):
                 self._local = self._fleet.local(message.latitude, message.longitude, message.altitude)
             case SetpointLocal():
-                self._heard = (now, message) if self._agrees(now, message) else None
+                self._received = (now, message) if self._agrees(now, message) else None
             case CommandLong(command=command) if command == NAV_LAND:
                 self._forget()
             case Tunnel():
@@ -200,7 +200,7 @@ class BackupNode:
 
     def _forget(self) -> None:
         self._plans.clear()
-        self._heard = None
+        self._received = None
 
     def _profile(self, now: int) -> Profile | None:
         """Return the autopilot's profile if it is armed and follows set-points; else None."""

@@ -41,7 +41,7 @@ class _Asking(Onlooker):
         """Return requests for messages and parameters alone."""
         super().step(now, view)
         self.lacking = self._readiness.missing(view, go=self._height is not None)
-        wishes = self._readiness.wishes(now) if self._readiness.heard else []
+        wishes = self._readiness.wishes(now) if self._readiness.received else []
         return [*self._readiness.requests(now), *wishes]
 
 

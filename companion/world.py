@@ -221,7 +221,7 @@ class World:
             yaw = None
         most = config.neighbour.extrapolate_us
         known = np.array(
-            [x + 1e-6 * min(when - time, most) * v for _, time, x, v in self.neighbours.last_heard()]
+            [x + 1e-6 * min(when - time, most) * v for _, time, x, v in self.neighbours.last_received()]
         ).reshape(-1, 3)
         self.sensed.receive_distances(now, message, Stance(when, place, yaw, local.yaw_to_fleet(0.0)), known)
 

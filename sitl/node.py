@@ -180,7 +180,7 @@ class Autopilot:
         self._work_due = self._services.next_due
         # A real ArduCopter sends HEARTBEAT at once after a mode change. Quiet flights do not.
         self._announces = config.streams == "normal" and not self._firmware.bytewise
-        self.untold = 0
+        self.not_encoded = 0
         """Number of messages that could not be encoded."""
         self._boot: int | None = None
         self._now = 0
@@ -243,9 +243,9 @@ class Autopilot:
             self._work_due = self._services.next_due
         messages = self._outbox
         if self._now >= self._telemetry.next_due:
-            told = self._telemetry.collect(self._now, self._snapshots.read(self._now))
+            reported = self._telemetry.collect(self._now, self._snapshots.read(self._now))
             # If there are many answers, the messages sent first are more likely to fit the link.
-            messages = told + messages if len(messages) > _ANSWERS else messages + told
+            messages = reported + messages if len(messages) > _ANSWERS else messages + reported
         if not messages:
             return []
         data = parcels([encoded for message in messages if (encoded := self._encoded(message))])
@@ -260,7 +260,7 @@ class Autopilot:
         try:
             return self._codec.encode(message)
         except EncodeError:
-            self.untold += 1
+            self.not_encoded += 1
             return b""
 
     def _configure(self) -> None:

@@ -60,8 +60,8 @@ class SnapshotReader:
         self._version = version(source, config.flavour)
         self._rotors = len(vehicle.rotors)
         self._hovering = _squares(hover_speeds(vehicle).tolist())
-        told = config.streams == "normal" and config.flavour == "ardupilot"
-        self._unbreached = _GEOFENCE if told else 0
+        reported = config.streams == "normal" and config.flavour == "ardupilot"
+        self._unbreached = _GEOFENCE if reported else 0
         self._now = 0
 
     def configure(self, config: AutopilotConfig) -> None:

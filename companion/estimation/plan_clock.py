@@ -71,6 +71,6 @@ class PlanClock:
             return None
         estimate = dated.time + self._clock.skew
         possible = now - self._stale <= epoch <= now + dt
-        if abs(estimate - epoch) <= _NEAR or (possible and self._clock.heard < _MANY):
+        if abs(estimate - epoch) <= _NEAR or (possible and self._clock.support < _MANY):
             return epoch
-        return estimate if self._clock.heard >= _ENOUGH else None
+        return estimate if self._clock.support >= _ENOUGH else None

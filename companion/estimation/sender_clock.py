@@ -115,7 +115,7 @@ class SenderClock:
 
     ``delay``: the least age of a message at its arrival. ``latest``: how far in time other messages may
     overtake one that is still dated, at least two seconds. ``skew``: the companion's time minus the track's
-    own, as of the last message. ``heard``: number of messages that support the line; ``laid``: number of
+    own, as of the last message. ``support``: number of messages that support the line; ``laid``: number of
     times that a new line was set. ``brief``: the line is computed from the last few messages alone. This is
     for a simulation's clock, which stops whenever its machine is busy; a growing delay is then not detected.
     ``lost``: time that the sender's clock has lost against the companion's, according to its answers.
@@ -142,15 +142,15 @@ class SenderClock:
         "_timed",
         "_tolerance",
         "brief",
-        "heard",
         "laid",
         "lost",
         "skew",
+        "support",
     )
 
     def __init__(self, delay: int, latest: int) -> None:
         self.skew = 0
-        self.heard = 0
+        self.support = 0
         self.laid = 0
         self.brief = False
         self.lost = 0
@@ -200,7 +200,7 @@ class SenderClock:
                 return self._by_arrival(received)
         if self._suspects:
             self._suspects.clear()
-        self.heard += 1
+        self.support += 1
         self._lag = lag
         self._lately.append(lag)
         self._follow(received, lag, expected)
@@ -258,7 +258,7 @@ class SenderClock:
             self._timed, self.skew = True, received - self._delay
         return Dated(received - self._delay - self.skew, False)
 
-    def _begin(self, last: _Suspect, lag: int, heard: int) -> Dated:
+    def _begin(self, last: _Suspect, lag: int, support: int) -> Dated:
         """Set the line through ``lag``; the track's time continues, as its skew stays unchanged."""
         received, stamp = last
         if not self._timed:
@@ -275,7 +275,7 @@ class SenderClock:
         self._received, self._line, self._rate = received, float(lag), 0.0
         self._pieces.clear()
         self._least = _Least(received, received, lag, 0.0)
-        self.heard = heard
+        self.support = support
         return Dated(stamp + self._base, True)
 
     def _suspect(self, new: _Suspect) -> Dated | None:

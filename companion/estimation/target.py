@@ -36,7 +36,7 @@ class Target:
             self._fixed = State(np.array(source.at), np.zeros(3), 0, 0.0)
         self._track = self._before = Track(config.target)
         self._speaker: Source | None = None
-        self._heard = 0
+        self._received = 0
         self.refused = 0
 
     def receive(self, now: int, link: str, message: Message) -> bool:
@@ -48,7 +48,7 @@ class Target:
             return False
         if not self._measure(now, message):
             return False
-        self._heard = now
+        self._received = now
         return True
 
     def at(self, now: int) -> State | None:
@@ -92,11 +92,11 @@ class Target:
         if source == self._speaker:
             return True
         if self._speaker is not None:
-            if now - self._heard <= self._config.guard.target_stale_us:
+            if now - self._received <= self._config.guard.target_stale_us:
                 return False
             # The new sender has another clock and other errors.
             self._before, self._track = self._known, Track(self._config.target)
-        self._speaker, self._heard = source, now
+        self._speaker, self._received = source, now
         return True
 
     def _measure(self, now: int, message: Message) -> bool:

@@ -74,13 +74,13 @@ def lowered(limits: LimitsConfig, profile: Profile, parameters: Mapping[str, flo
             "j_max": _jerk(limits, able),
         }
     )
-    told = tuple(
+    reported = tuple(
         f"{what} ({' '.join((name, f'{value:g}'))})"
         for what, limit in _changes(limits, found, able)
         for name, value in (deciding(profile.autopilot, parameters, limit),)
     )
     # If the limits are lower only by rounding they stay as configured.
-    return Lowered(found if told else limits, room, _loop(profile, able), told)
+    return Lowered(found if reported else limits, room, _loop(profile, able), reported)
 
 
 def _jerk(limits: LimitsConfig, able: Limits) -> tuple[float, float, float] | None:

@@ -62,7 +62,7 @@ class Readiness:
         self.limits.forget()
 
     @property
-    def heard(self) -> bool:
+    def received(self) -> bool:
         """Whether the autopilot has answered the requests for all required messages."""
         return all(self._commands.answered(*call) for call in _NEEDED)
 
@@ -110,7 +110,7 @@ class Readiness:
             return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
         if not vehicle.healthy:
             return f"the autopilot's pre-arm checks{self._starving()}"
-        if not self.heard:
+        if not self.received:
             return "the autopilot's answers to SET_MESSAGE_INTERVAL"
         if waiting := self.limits.waiting:
             return waiting

@@ -253,7 +253,7 @@ class Pilot:
         """Return the commands to send at ``now`` (µs)."""
         self.vehicle.tick(now)
         commands = self._act(now, view)
-        connected = self.phase is not Phase.CONNECT or self._readiness.heard
+        connected = self.phase is not Phase.CONNECT or self._readiness.received
         return [*commands, *self._readiness.wishes(now)] if connected else commands
 
     def _act(self, now: int, view: View) -> list[Message]:

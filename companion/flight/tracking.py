@@ -187,12 +187,12 @@ class Tracking:
 
     def _shape(self, dt: float, reference: Motion, shaping: Shaping | None) -> None:
         """Advance the prediction of the autopilot's own trajectory by one step."""
-        told = reference.acceleration[:2] + self.compensation[:2]
+        reported = reference.acceleration[:2] + self.compensation[:2]
         if shaping is None:
-            self._fed = told
+            self._fed = reported
             return
         place, speed = self._ahead
-        wanted = told - shaping.velocity * (speed + shaping.position * place)
+        wanted = reported - shaping.velocity * (speed + shaping.position * place)
         self._fed = self._fed + _limited(wanted - self._fed, shaping.jerk * dt)
         speed = speed + dt * (self._fed - reference.acceleration[:2])
         self._ahead = np.stack([place + dt * speed, speed])

@@ -43,7 +43,7 @@ class Vehicle:
         """Text of the last warning; usually the reason for a refusal."""
         self.texts: deque[StatusText] = deque(maxlen=_TEXTS)
         """The last texts of any severity; ``told`` counts all of them."""
-        self.told = 0
+        self.reported = 0
         self.status: SysStatus | None = None
         self.positioning = Positioning()
         self._extended: ExtendedSysState | None = None
@@ -65,7 +65,7 @@ class Vehicle:
             self.positioning.receive(message)
         elif isinstance(message, StatusText):
             self.texts.append(message)
-            self.told += 1
+            self.reported += 1
             if message.severity <= WARNING:
                 self.said = message.text
 

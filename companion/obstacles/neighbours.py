@@ -143,8 +143,8 @@ class Neighbours:
             track.brief = self._brief
         placed = _placed(self._fleet, message, self._config.neighbour.velocity_up)
         refused, before = track.refused, track.time
-        told = track.take(now, placed, message.time_boot) or track.refused > refused
-        if told and not by_autopilot:
+        reported = track.take(now, placed, message.time_boot) or track.refused > refused
+        if reported and not by_autopilot:
             # Unusable positions, such as those of a receiver without a fix, do not suppress the autopilot's
             # messages.
             self._spoken[system] = now
@@ -355,7 +355,7 @@ class Neighbours:
             fresh[self._rows[system]] = False
         return fresh
 
-    def last_heard(self) -> list[tuple[int, int, Array, Array]]:
+    def last_received(self) -> list[tuple[int, int, Array, Array]]:
         """Return system id, time (µs), position (3,) and velocity (3,) of each neighbour's last state."""
         self._put_down()
         return [

@@ -98,7 +98,7 @@ class Proximity:
         self._config = config
         self._posts: list[_Post] = []
         self._next_id = FIRST_ID
-        self._heard: dict[tuple[Source, int], int] = {}
+        self._received: dict[tuple[Source, int], int] = {}
         self._lately: dict[_Look, int] = {}
         self.refused = 0
 
@@ -112,15 +112,15 @@ class Proximity:
         """
         sensor = scan.source, scan.sensor
         look = _Look(*sensor, scan.frame, scan.offset, scan.increment)
-        self._lately = {one: heard for one, heard in self._lately.items() if now - heard < _OFTEN}
+        self._lately = {one: received for one, received in self._lately.items() if now - received < _OFTEN}
         if look in self._lately:
             return
         found = returns(scan, self._config.reach)
-        full = len(self._lately) >= _SENSORS or (sensor not in self._heard and not self._room(now))
+        full = len(self._lately) >= _SENSORS or (sensor not in self._received and not self._room(now))
         if found is None or full:
             self.refused += 1
             return
-        self._heard[sensor] = self._lately[look] = now
+        self._received[sensor] = self._lately[look] = now
         direction = zero - found.angles
         points = place[:2] + found.ranges[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])
         arcs = 2.0 * found.ranges * sin(0.25 * min(abs(scan.increment), 2.0 * pi))
@@ -149,7 +149,7 @@ class Proximity:
 
     def silent(self, now: int) -> bool:
         """Return whether any sensor has been received, but none within the last ``age_us``."""
-        return bool(self._heard) and now - max(self._heard.values()) > self._config.age_us
+        return bool(self._received) and now - max(self._received.values()) > self._config.age_us
 
     def _room(self, now: int) -> bool:
         """Return whether another sensor can be accepted.
@@ -157,11 +157,11 @@ class Proximity:
         If there is no room, the sensor that has been silent longest is removed, provided that it has been
         silent for ``age_us``.
         """
-        if len(self._heard) >= _SENSORS:
-            oldest = min(self._heard, key=self._heard.__getitem__)
-            if now - self._heard[oldest] <= self._config.age_us:
+        if len(self._received) >= _SENSORS:
+            oldest = min(self._received, key=self._received.__getitem__)
+            if now - self._received[oldest] <= self._config.age_us:
                 return False
-            del self._heard[oldest]
+            del self._received[oldest]
         return True
 
     def _forget(self, now: int) -> None:

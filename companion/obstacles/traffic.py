@@ -49,11 +49,11 @@ class Traffic:
 
     def __init__(self, config: TrafficConfig) -> None:
         self._config = config
-        self._heard: dict[int, _Aircraft] = {}
+        self._received: dict[int, _Aircraft] = {}
         self.refused = 0
 
     def __len__(self) -> int:
-        return len(self._heard)
+        return len(self._received)
 
     def receive(self, now: int, message: AdsbVehicle, place: Array, here: Array) -> bool:
         """Receive a message that arrived at ``now`` (µs); return whether it was accepted.
@@ -72,7 +72,7 @@ class Traffic:
         """
         self._forget(now)
         ids, positions = [], []
-        for address, one in self._heard.items():
+        for address, one in self._received.items():
             nearest = self._nearest(now, one, prediction)
             off = nearest - prediction
             if (np.vecdot(off, off) <= (reach + self._config.radius) ** 2).any():
@@ -110,15 +110,15 @@ class Traffic:
         flat = (0.0, 0.0) if course is None else (speed * sin(course), speed * cos(course))
         half = inf if message.altitude is None else self._config.height_error
         one = _Aircraft(now - message.age, place, np.array([*flat, climb]), half)
-        before = self._heard.get(message.address)
+        before = self._received.get(message.address)
         if before is not None:
             moved = place[:2] - before.place[:2]
             explained = _STRAYS + _FASTEST * 1e-6 * abs(one.when - before.when)
             if one.when < before.when or float(moved @ moved) > explained**2:
                 return False
-        elif len(self._heard) >= self._config.most and not self._make_room(off, here):
+        elif len(self._received) >= self._config.most and not self._make_room(off, here):
             return False
-        self._heard[message.address] = one
+        self._received[message.address] = one
         return True
 
     def _make_room(self, off: Array, here: Array) -> bool:
@@ -126,11 +126,11 @@ class Traffic:
 
         ``off`` (2,), m: position of the new one relative to ``here``.
         """
-        far = {address: float(np.hypot(*(one.place - here)[:2])) for address, one in self._heard.items()}
+        far = {address: float(np.hypot(*(one.place - here)[:2])) for address, one in self._received.items()}
         furthest = max(far, key=far.__getitem__)
         if far[furthest] <= float(np.hypot(*off)):
             return False
-        del self._heard[furthest]
+        del self._received[furthest]
         return True
 
     def _nearest(self, now: int, one: _Aircraft, prediction: Array) -> Array:
@@ -151,5 +151,5 @@ class Traffic:
         return nearest
 
     def _forget(self, now: int) -> None:
-        for address in [a for a, one in self._heard.items() if now - one.when > self._config.age_us]:
-            del self._heard[address]
+        for address in [a for a, one in self._received.items() if now - one.when > self._config.age_us]:
+            del self._received[address]

@@ -19,24 +19,24 @@ class ReportedUncertainty:
     """Reported uncertainties, by system id."""
 
     def __init__(self) -> None:
-        self._told: dict[int, tuple[int, float]] = {}
+        self._reported: dict[int, tuple[int, float]] = {}
 
     def receive(self, now: int, system: int, payload: bytes) -> None:
         """Receive a TUNNEL payload at ``now`` (µs); raises PlanWireError if it is not valid."""
         radius = min(unpack(payload), _MOST)
         if radius > 0.0:
-            self._told[system] = now, radius
+            self._reported[system] = now, radius
         else:
-            self._told.pop(system, None)
+            self._reported.pop(system, None)
 
     def systems(self, now: int) -> frozenset[int]:
         """Return the systems with a valid report at ``now`` (µs)."""
-        if self._told:
-            gone = [system for system, (time, _) in self._told.items() if now - time > _LASTS]
+        if self._reported:
+            gone = [system for system, (time, _) in self._reported.items() if now - time > _LASTS]
             for system in gone:
-                del self._told[system]
-        return frozenset(self._told)
+                del self._reported[system]
+        return frozenset(self._reported)
 
     def radii(self, ids: Iterable[int]) -> Array:
         """Return the uncertainty (m) of each of ``ids``, (M,); 0 without a report."""
-        return np.array([self._told[system][1] if system in self._told else 0.0 for system in ids])
+        return np.array([self._reported[system][1] if system in self._reported else 0.0 for system in ids])

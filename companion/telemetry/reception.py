@@ -44,9 +44,9 @@ def accepts(
     source = config.target_source
     sensors = {_DISTANCES} if config.proximity is not None else set()
     sensors |= {_TRAFFIC} if config.traffic is not None else set()
-    told, speaker = message_of(source), speaker_of(source, system, target)
+    reported, speaker = message_of(source), speaker_of(source, system, target)
     if link == "autopilot":
-        camera = told if isinstance(source, CameraSource) else None
+        camera = reported if isinstance(source, CameraSource) else None
         return lambda identifier, sender, component: (
             (identifier in wanted and sender == system and component == AUTOPILOT)
             or (identifier in sensors and sender == system)
@@ -54,7 +54,7 @@ def accepts(
         )
     if link == "target":
         return lambda identifier, sender, _component: (
-            identifier == told and (speaker is None or sender == speaker)
+            identifier == reported and (speaker is None or sender == speaker)
         )
     if link == "swarm":
         wanted = wanted | (sensors & {_TRAFFIC})

@@ -28,7 +28,7 @@ class Ear(Protocol):
         """Observe frames that leave, by whichever end."""
         ...
 
-    def heard(self, header: Header, frame: bytes) -> None:
+    def received(self, header: Header, frame: bytes) -> None:
         """Observe a frame that arrives, whichever end gets it."""
         ...
 
@@ -59,7 +59,7 @@ class Dealer:
             ]
             if self._ear is not None:
                 for header, data in frames:
-                    self._ear.heard(header, data)
+                    self._ear.received(header, data)
             for end, wants in self._deal:
                 own = [data for header, data in frames if wants(header)]
                 if own:

@@ -61,7 +61,7 @@ class _Udp:
                 continue  # an earlier packet of this end was refused: that says nothing about what arrived
             except OSError:
                 break
-            if self._heard(source) and data:
+            if self._accepts(source) and data:
                 found.append(data)
         self._received += len(found)
         return found
@@ -78,7 +78,7 @@ class _Udp:
         self._receiver.close()
         self._sender.close()
 
-    def _heard(self, source: Address) -> bool:
+    def _accepts(self, source: Address) -> bool:
         """Return whether packets from ``source`` are accepted."""
         return True
 
@@ -127,7 +127,7 @@ class UdpListener(_Udp):
         now = self._clock.now()
         return sum(now - time <= REMEMBERED for time in self._peers.values())
 
-    def _heard(self, source: Address) -> bool:
+    def _accepts(self, source: Address) -> bool:
         # A new dictionary each time, because the sending thread may be iterating over the old one. The latest
         # sender comes last.
         now = self._clock.now()
@@ -219,5 +219,5 @@ class MulticastLink(_Udp):
         # Connected, it has one source address, by which its echo is recognised.
         sender.connect((endpoint.group, endpoint.port))
 
-    def _heard(self, source: Address) -> bool:
+    def _accepts(self, source: Address) -> bool:
         return source != self._own

@@ -40,7 +40,7 @@ class Following:
         self._px4 = px4
         self._offset: Vector | None = None
         self._course = 0.0
-        self._heard = -math.inf
+        self._received = -math.inf
         self._config = config
         self._system = round(config.system)
 
@@ -60,7 +60,7 @@ class Following:
         """Hold until the leader's position arrives."""
         self._guidance.hold()
         self._offset = None
-        self._heard = -math.inf
+        self._received = -math.inf
 
     def receive(self, message: FollowTarget | GlobalPosition, here: Pose, now: int) -> None:
         """Follow a position report received at ``now`` (µs).
@@ -73,7 +73,7 @@ class Following:
         there, velocity = self._motion(message)
         if math.dist(there, here.position) > (_FARTHEST if self._px4 else self._config.limit):
             return
-        self._heard = now
+        self._received = now
         station = self._station(there, message, velocity, here)
         north, east = there[0] - here.position[0], there[1] - here.position[1]
         yaw = math.atan2(east, north) if math.hypot(north, east) > _NEAR else None
@@ -82,7 +82,7 @@ class Following:
 
     def advance(self, now: int) -> None:
         """Hold if the leader is lost; call this in each step at ``now`` (µs)."""
-        lost = now - self._heard > self._config.patience * 1e6
+        lost = now - self._received > self._config.patience * 1e6
         if lost and self._guidance.activity is Activity.TRACK:
             self._guidance.hold()
 

@@ -33,7 +33,7 @@ class SensorProfile(BaseModel):
     drift_onset: Time = Field(
         2.0, description="how fast the wandering may turn: the filter's own time constant (s)"
     )
-    drift_told: bool = Field(
+    drift_reported: bool = Field(
         True, description="whether the velocity carries the wandering; if not, the two contradict each other"
     )
     position_white: Size = Field(0.0, description="σ of what no sample shares with the next, each axis (m)")
@@ -124,7 +124,7 @@ PROFILES: Final[dict[ProfileName, SensorProfile]] = {
         vertical_drift=0.3,
         drift_time=4.0,
         drift_onset=0.75,
-        drift_told=False,
+        drift_reported=False,
         position_white=0.005,
         velocity=0.03,
         tilt=math.radians(0.5),

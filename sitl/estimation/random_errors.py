@@ -60,8 +60,8 @@ class RandomErrors:
         drift = np.array([p.horizontal_drift, p.horizontal_drift, p.vertical_drift])
         self._drift = drift
         speed = drift / np.sqrt(p.drift_time * p.drift_onset)
-        self._told: Array = speed if p.drift_told else np.zeros(3)
-        self._untold: Array = speed - self._told
+        self._reported: Array = speed if p.drift_reported else np.zeros(3)
+        self._not_reported: Array = speed - self._reported
         self._sizes = np.array([p.velocity] * 3 + [p.tilt] * 2 + [p.yaw] + [p.rate_bias] * 3)
         self._white = np.array([p.position_white] * 3 + [p.rate_white] * 3)
         self._random = random
@@ -99,9 +99,9 @@ class RandomErrors:
         return np.hstack(
             [
                 self._drift * walks[:, 0] + white[:, :3],
-                self._told * walks[:, 1] + biases[:, :3],
+                self._reported * walks[:, 1] + biases[:, :3],
                 biases[:, 3:6],
                 biases[:, 6:] + white[:, 3:],
-                self._untold * walks[:, 1],
+                self._not_reported * walks[:, 1],
             ]
         )

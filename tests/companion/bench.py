@@ -70,7 +70,7 @@ class PerfectAutopilot:
         self.armed, self.mode, self.landing = False, 0, False
         self.mute = False
         self.battery = 0.9
-        self.heard: list[Message] = []
+        self.received: list[Message] = []
         self._local = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
         self._climb: float | None = None
         self._signing = Signing(key)
@@ -81,7 +81,7 @@ class PerfectAutopilot:
         answers: list[Message] = []
         self._signing.present(now)
         for message in self._codec.feed(data):
-            self.heard.append(message)
+            self.received.append(message)
             if isinstance(message, CommandLong):
                 answers += self._obey(message)
             elif isinstance(message, SetpointLocal) and self.armed and self._guided:

@@ -36,10 +36,10 @@ def target(x, velocity_ned=(0.0, 0.0, 0.0), source=TARGET):
     return GlobalPosition(source, 0, latitude, longitude, altitude, 0.0, velocity_ned, None)
 
 
-def world(*heard, config=CONFIG):
+def world(*received, config=CONFIG):
     """A world that heard (link, message) pairs at ``NOW``."""
     picture = World(config, AUTOPILOT.system, TARGET.system, FLEET)
-    for link, message in heard:
+    for link, message in received:
         picture.receive(NOW, link, message)
     return picture
 
@@ -58,8 +58,8 @@ def test_without_an_origin_a_local_position_means_nothing():
     ("ned", "enu"), [((1, 0, 0), (0, 1, 0)), ((0, 1, 0), (1, 0, 0)), ((0, 0, 1), (0, 0, -1))]
 )
 def test_ned_becomes_enu(ned, enu):
-    heard = local(np.multiply(ned, 7), np.multiply(ned, 2))
-    view = world(("autopilot", AT_FLEET_ZERO), ("autopilot", heard)).at(NOW - CONFIG.own.delay_us)
+    received = local(np.multiply(ned, 7), np.multiply(ned, 2))
+    view = world(("autopilot", AT_FLEET_ZERO), ("autopilot", received)).at(NOW - CONFIG.own.delay_us)
     np.testing.assert_allclose(view.own.position, np.multiply(enu, 7), atol=1e-6)
     np.testing.assert_allclose(view.own.velocity, np.multiply(enu, 2), atol=1e-6)
 
@@ -87,18 +87,18 @@ def test_the_own_origin_makes_no_difference(place, ned):
 
 @pytest.mark.parametrize("link", ["swarm", "target", "ground"])
 def test_the_own_state_comes_from_the_autopilots_link_alone(link):
-    heard = [(link, AT_FLEET_ZERO), (link, local((1, 2, -3))), (link, attitude(0.5))]
-    assert world(*heard).at(NOW) == View(None, None, None, None)
+    received = [(link, AT_FLEET_ZERO), (link, local((1, 2, -3))), (link, attitude(0.5))]
+    assert world(*received).at(NOW) == View(None, None, None, None)
 
 
 def test_another_systems_state_is_not_the_own():
     other = Source(12, 1)
-    heard = [
+    received = [
         ("autopilot", AT_FLEET_ZERO),
         ("autopilot", local((1, 2, -3), source=other)),
         ("autopilot", attitude(0.5, other)),
     ]
-    view = world(*heard).at(NOW)
+    view = world(*received).at(NOW)
     assert (view.own, view.yaw) == (None, None)
 
 
@@ -202,8 +202,8 @@ def test_another_origin_is_no_other_clock():
     for boot in (10_000_000, 1_000_000):
         for k in range(80):
             now += 20_000
-            heard = local((1, 2, -3))._replace(time_boot=boot + 20_000 * k)
-            picture.receive(now, "autopilot", heard)
+            received = local((1, 2, -3))._replace(time_boot=boot + 20_000 * k)
+            picture.receive(now, "autopilot", received)
     assert picture.clock_steps == 1
     picture.receive(now, "autopilot", AT_FLEET_ZERO._replace(latitude=FLEET.latitude + 1e-7))
     assert picture.clock_steps == 1
@@ -234,9 +234,9 @@ STALE = CONFIG.guard.own_stale_us
 def test_a_heading_that_is_too_old_is_none():
     """As long as the own state may be: after that nobody knows where the vehicle looks."""
     picture = world(("autopilot", AT_FLEET_ZERO), ("autopilot", attitude(0.0)))
-    heard = NOW - CONFIG.own.delay_us
-    assert picture.at(heard + STALE).yaw == pytest.approx(math.pi / 2)
-    assert picture.at(heard + STALE + 1).yaw is None
+    received = NOW - CONFIG.own.delay_us
+    assert picture.at(received + STALE).yaw == pytest.approx(math.pi / 2)
+    assert picture.at(received + STALE + 1).yaw is None
     picture.receive(NOW + 10 * STALE, "autopilot", attitude(math.pi / 2))
     assert picture.at(NOW + 10 * STALE).yaw == pytest.approx(0.0, abs=1e-9)
 

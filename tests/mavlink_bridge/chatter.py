@@ -15,12 +15,12 @@ class Chatter:
     def __init__(self, name: str) -> None:
         self.name = name
         self.steps: list[int] = []
-        self.heard: list[tuple[int, bytes]] = []
+        self.received: list[tuple[int, bytes]] = []
         self._digest = 1
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         self.steps.append(now)
         for _, data in inbox:
-            self.heard.append((now, data))
+            self.received.append((now, data))
             self._digest = (self._digest * 31 + int.from_bytes(data, "big")) % (1 << 61)
         return [Datagram("swarm", now.to_bytes(8, "big") + self._digest.to_bytes(8, "big"))]

@@ -38,12 +38,12 @@ def log(flown: Flown, system: int) -> Iterator[Heard]:
 
 def spoke(flown: Flown, listener: int, since: float = -60.0, until: float = 3600.0) -> set[int]:
     """Whom ``listener`` hears on the swarm link in a time (s after the goal event)."""
-    heard = {
+    received = {
         h.message.source.system
         for h in log(flown, listener)
         if h.link == LINK_NUMBERS["swarm"] and since < h.time < until
     }
-    return heard - {listener}
+    return received - {listener}
 
 
 def clock(flown: Flown) -> tuple[Samples, np.ndarray]:

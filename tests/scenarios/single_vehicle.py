@@ -59,7 +59,7 @@ class SingleVehicle:
         self.autopilot = Autopilot(config, FIREFLY, SITE, seed=1)
         self.config = CompanionConfig.model_validate({**SETTINGS, **(settings or {})})
         self.now, self._pace = BOOT, pace
-        self.heard: list[tuple[int, Message]] = []
+        self.received: list[tuple[int, Message]] = []
         self.sent: list[tuple[int, str, Message]] = []
         self._codec, self._reader, self._writer = Codec(), Codec(), Codec()
         self.timeless = False
@@ -104,7 +104,7 @@ class SingleVehicle:
             up = [Datagram(link, self._without(ParamRequestRead, data)) for link, data in up]
         inbox = self.autopilot.step(BOOT + self._pace(self.now - BOOT), up)
         for datagram in inbox:
-            self.heard += [(self.now, message) for message in self._codec.feed(datagram.data)]
+            self.received += [(self.now, message) for message in self._codec.feed(datagram.data)]
         if self.mute:
             inbox = [Datagram(link, self._without(LocalPosition, data)) for link, data in inbox]
         if orders:
@@ -159,4 +159,4 @@ class SingleVehicle:
         return self.until(Phase.ESCORT)
 
     def all(self, kind: type[M]) -> list[M]:
-        return [message for _, message in self.heard if isinstance(message, kind)]
+        return [message for _, message in self.received if isinstance(message, kind)]

@@ -40,9 +40,9 @@ FLAVOURS = ("ardupilot", "px4")
 def ordered(flown: Flown, system: int) -> list[int]:
     """Commands that the companion of ``system`` gave its autopilot."""
     found = []
-    for heard in log(flown, system):
-        message = heard.message
-        if heard.link == LINK_NUMBERS["autopilot"] and isinstance(message, CommandInt | CommandLong):
+    for received in log(flown, system):
+        message = received.message
+        if received.link == LINK_NUMBERS["autopilot"] and isinstance(message, CommandInt | CommandLong):
             assert (message.source.system, message.source.component) == (system, COMPONENT)
             found.append(message.command)
     return found

@@ -69,9 +69,9 @@ def test_those_who_hear_it_keep_as_much_further_away_on_both_sides():
     vehicle = SingleVehicle("px4").fly().run(2.0)
     vehicle.autopilot.lose_gps()
     near, before = Neighbours(CompanionConfig(), 12, SITE), None
-    heard = len(vehicle.sent)
+    received = len(vehicle.sent)
     vehicle.run(4.0)
-    for time, link, message in vehicle.sent[heard:]:
+    for time, link, message in vehicle.sent[received:]:
         if link != "swarm":
             continue
         if isinstance(message, GlobalPosition):

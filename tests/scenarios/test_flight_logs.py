@@ -98,16 +98,16 @@ def test_links_tell_who_spoke_where(flown: Flown) -> None:
 
 def test_what_one_hears_is_what_the_other_said(flown: Flown) -> None:
     said: dict[int, set[bytes]] = {}
-    heard: dict[int, set[bytes]] = {}
+    received: dict[int, set[bytes]] = {}
     for own, path in zip(flown.flight.systems, flown.logs, strict=True):
         for record in read_tlog(path):
             if LINKS[record.link] == "swarm":
-                who = said if record.frame[5] == own else heard
+                who = said if record.frame[5] == own else received
                 who.setdefault(record.frame[5], set()).add(record.frame)
     for system in flown.flight.systems:
         # All but what was under way when the flight ended.
-        assert heard[system] <= said[system]
-        assert len(said[system] - heard[system]) <= 2
+        assert received[system] <= said[system]
+        assert len(said[system] - received[system]) <= 2
 
 
 def test_setpoints_flow_evenly_and_without_jumps(flown: Flown) -> None:

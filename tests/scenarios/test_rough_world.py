@@ -173,7 +173,7 @@ def heard_none(flown: Flown) -> None:
 
 def lost_in_a_row(flown: Flown) -> None:
     """Of what one said to another some is missing, and more than a plan lives for at a time."""
-    said, heard = (
+    said, received = (
         [
             h.time
             for h in log(flown, system)
@@ -181,8 +181,8 @@ def lost_in_a_row(flown: Flown) -> None:
         ]
         for system in (11, 13)
     )
-    assert 0.3 < len(heard) / len(said) < 0.95
-    assert np.diff(heard).max() > 0.5
+    assert 0.3 < len(received) / len(said) < 0.95
+    assert np.diff(received).max() > 0.5
 
 
 def fault(kind: str, at_s: float = AT, **keys: Any) -> dict[str, Any]:

@@ -112,7 +112,7 @@ def test_a_target_that_jumps_is_followed_each_time(tmp_path: Path) -> None:
 
 def check_heard(flown: Flown, jumps: list[float]) -> None:
     """The target says at once that it has jumped: a message is heard the delay of its link later."""
-    heard = np.array(
+    received = np.array(
         [
             h.time
             for h in log(flown, 11)
@@ -120,7 +120,7 @@ def check_heard(flown: Flown, jumps: list[float]) -> None:
         ]
     )
     for jump in jumps:
-        after = heard[heard > jump]
+        after = received[received > jump]
         assert after[0] - jump < 0.06
 
 

@@ -75,7 +75,7 @@ class Rig:
         self.autopilot = Autopilot(self.config, FIREFLY, SITE, seed=1, saved=saved, signing=signing)
         self.now = 0
         self.tick = tick
-        self.heard: list[tuple[int, Message]] = []
+        self.received: list[tuple[int, Message]] = []
         self.bytes = b""
         self._codec = Codec()
         self._sender = Codec()
@@ -89,7 +89,7 @@ class Rig:
         assert len(out) <= 1
         for datagram in out:
             self.bytes += datagram.data
-            self.heard += [(self.now, message) for message in self._codec.feed(datagram.data)]
+            self.received += [(self.now, message) for message in self._codec.feed(datagram.data)]
         self.now += self.tick
 
     def run(self, seconds: float, *every: Message, hz: float = 50.0) -> None:
@@ -100,13 +100,15 @@ class Rig:
 
     def order(self, command: int, *params: float, to: tuple[int, int] = (11, 1)) -> list[int]:
         """The results that come back for a command."""
-        seen = len(self.heard)
+        seen = len(self.received)
         values = (*map(float, params), *([0.0] * 7))[:7]
         self.step(CommandLong(PILOT, *to, command, 0, values))
-        return [m.result for _, m in self.heard[seen:] if isinstance(m, CommandAck) and m.command == command]
+        return [
+            m.result for _, m in self.received[seen:] if isinstance(m, CommandAck) and m.command == command
+        ]
 
     def all(self, kind: type[M]) -> list[M]:
-        return [m for _, m in self.heard if isinstance(m, kind)]
+        return [m for _, m in self.received if isinstance(m, kind)]
 
     @property
     def texts(self) -> list[str]:

@@ -131,7 +131,7 @@ def flood(rig: Rig, data: Sequence[bytes], seconds: float, *mine: bytes) -> Iter
         yield [datagram.data for datagram in sent]
 
 
-def heard(sent: Sequence[bytes], kinds: type[Any] | tuple[type[Any], ...]) -> list[Any]:
+def received(sent: Sequence[bytes], kinds: type[Any] | tuple[type[Any], ...]) -> list[Any]:
     """The messages of some kinds; whatever was sent is sound."""
     codec = Codec(lambda message_id, _system, _component: message_id in wanted)
     wanted = {BY_TYPE[kind].id for kind in (kinds if isinstance(kinds, tuple) else (kinds,))}

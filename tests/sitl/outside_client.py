@@ -19,7 +19,7 @@ class Client:
         self.peer = dialect.MAVLink(None, srcSystem=source[0], srcComponent=source[1])
         self._v1 = v1
         self._read = len(rig.bytes)
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
 
     def send(self, *messages: Any) -> list[Any]:
         """What comes back in the step in which ``messages`` arrive."""
@@ -27,14 +27,14 @@ class Client:
 
     def wait(self, seconds: float) -> list[Any]:
         """What comes in so much time."""
-        first = len(self.heard)
+        first = len(self.received)
         for _ in range(round(seconds * 1e6 / self.rig.tick)):
             self._step(b"")
-        return self.heard[first:]
+        return self.received[first:]
 
     def of(self, name: str) -> list[Any]:
         """All that came of one type."""
-        return [m for m in self.heard if m.get_type() == name]
+        return [m for m in self.received if m.get_type() == name]
 
     def command(self, command: int, *params: float) -> int:
         """The result of a COMMAND_LONG."""
@@ -55,7 +55,7 @@ class Client:
         self._read = len(self.rig.bytes)
         found = self.peer.parse_buffer(bytearray(new)) or [] if new else []
         assert all(m.get_type() != "BAD_DATA" for m in found)
-        self.heard += found
+        self.received += found
         return found
 
 

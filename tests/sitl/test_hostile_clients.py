@@ -23,7 +23,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.packing import LONGEST
 from mavlink_bridge.wire.signing import Refusal, Signing
 from tests.sitl.autopilot_rig import FLAVOURS, Rig
-from tests.sitl.hostile import ASKED, STRANGER, command, crowd, flood, garbage, heard, orders
+from tests.sitl.hostile import ASKED, STRANGER, command, crowd, flood, garbage, orders, received
 from tests.sitl.mission_client import LAND, TAKEOFF, at, count, item, upload
 from tests.sitl.outside_client import Client
 
@@ -74,11 +74,11 @@ def test_a_mission_is_flown_as_if_nobody_asked_anything(flavour: str) -> None:
 def test_a_flood_takes_no_telemetry_from_others_and_no_answer_either(flavour: str) -> None:
     quiet, busy = (Rig(flavour, streams="normal", start_height=5.0) for _ in range(2))
     kinds = [kind for kind in ASKED if kind not in ("messages", "rates")]
-    expected = [Counter(map(type, heard(sent, TOLD))) for sent in flood(quiet, [], 3.0, ASK)]
+    expected = [Counter(map(type, received(sent, TOLD))) for sent in flood(quiet, [], 3.0, ASK)]
     steps = list(flood(busy, crowd(kinds=kinds), 3.0, ASK))
-    assert [Counter(map(type, heard(sent, TOLD))) for sent in steps] == expected
+    assert [Counter(map(type, received(sent, TOLD))) for sent in steps] == expected
     for sent in steps:
-        acks = [ack for ack in heard(sent, CommandAck) if (ack.target_system, ack.target_component) == ME]
+        acks = [ack for ack in received(sent, CommandAck) if (ack.target_system, ack.target_component) == ME]
         assert [ack.command for ack in acks] == [520]
         assert all(len(data) <= LONGEST for data in sent)
 
@@ -109,8 +109,8 @@ def test_nothing_of_a_flood_is_kept(kind: str) -> None:
 def test_what_one_datagram_asks_beyond_measure_is_not_answered_and_in_nobodys_way() -> None:
     rig = Rig(start_height=5.0)
     (sent,) = flood(rig, [], 0.005, b"".join(crowd(900, ("pings",))), ASK)
-    assert len(heard(sent, m.Ping)) == 32
-    assert len(heard(sent, CommandAck)) == 1
+    assert len(received(sent, m.Ping)) == 32
+    assert len(received(sent, CommandAck)) == 1
 
 
 def test_complaints_are_told_of_some_and_not_of_thousands() -> None:
@@ -118,7 +118,7 @@ def test_complaints_are_told_of_some_and_not_of_thousands() -> None:
     texts = []
     data = crowd(5_000, ("unknown commands", "unknown parameters", "settings of unknown parameters"))
     for sent in flood(rig, data, 3.0):
-        texts += heard(sent, m.StatusText)
+        texts += received(sent, m.StatusText)
     assert 3 <= len(texts) <= 4 * 32
 
 
@@ -131,7 +131,7 @@ def test_a_list_comes_to_its_end_however_often_others_begin_one(flavour: str) ->
     numbers: set[int] = set()
     total = len(rig.autopilot._values)
     for sent in flood(rig, crowd(2_000, ("lists of parameters",)), 1.0):
-        numbers |= {value.number for value in heard(sent, m.ParamValue)}
+        numbers |= {value.number for value in received(sent, m.ParamValue)}
     assert numbers - {0xFFFF} == set(range(total))
 
 
@@ -141,11 +141,11 @@ def test_who_asks_for_a_list_while_one_goes_out_gets_a_whole_one() -> None:
     total = len(rig.autopilot._values)
     list(flood(rig, [], 0.005, ask))
     list(flood(rig, [], 0.1))
-    values = [value.number for sent in flood(rig, [], 0.005, ask) for value in heard(sent, m.ParamValue)]
-    values += [value.number for sent in flood(rig, [], 2.0) for value in heard(sent, m.ParamValue)]
+    values = [value.number for sent in flood(rig, [], 0.005, ask) for value in received(sent, m.ParamValue)]
+    values += [value.number for sent in flood(rig, [], 2.0) for value in received(sent, m.ParamValue)]
     assert set(values) == set(range(total))
     assert len(values) < 2 * total
-    assert [value for sent in flood(rig, [], 1.0) for value in heard(sent, m.ParamValue)] == []
+    assert [value for sent in flood(rig, [], 1.0) for value in received(sent, m.ParamValue)] == []
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -177,7 +177,9 @@ def test_garbage_changes_nothing_and_holds_up_nobody(flavour: str) -> None:
     expected = path(quiet, flood(quiet, [], 4.0))
     for seed in range(2):
         for here, sent in zip(expected[400 * seed :], flood(busy, garbage(seed), 2.0, ASK), strict=False):
-            acks = [ack for ack in heard(sent, CommandAck) if (ack.target_system, ack.target_component) == ME]
+            acks = [
+                ack for ack in received(sent, CommandAck) if (ack.target_system, ack.target_component) == ME
+            ]
             assert [ack.command for ack in acks] == [520]
             np.testing.assert_array_equal(busy.autopilot.state.position, here)
 
@@ -236,9 +238,9 @@ def test_no_order_and_no_sequence_of_orders_ends_the_autopilot(
     for number, params, pause in asked:
         rig.run(pause)
         (sent,) = flood(rig, [], 0.005, Codec().encode(command(number, *params)))
-        assert len([ack for ack in heard(sent, CommandAck) if ack.command == number]) == 1
+        assert len([ack for ack in received(sent, CommandAck) if ack.command == number]) == 1
         assert np.isfinite(rig.autopilot.state.position).all()
     # The first two of these once were too much for it.
     for number, params in ((511, (30, 1e10)), (510, (30,)), (511, (30, 0)), (512, (30,))):
         (sent,) = flood(rig, [], 0.005, Codec().encode(command(number, *params)))
-        assert heard(sent, CommandAck)[-1].target_system == STRANGER.system
+        assert received(sent, CommandAck)[-1].target_system == STRANGER.system

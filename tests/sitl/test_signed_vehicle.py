@@ -63,7 +63,7 @@ def acks(found: list[Any]) -> list[int]:
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_client_of_pymavlink_with_the_key_flies_it(flavour: str) -> None:
     client = up(flavour)
-    assert client.peer.signing.goodsig_count == len(client.heard)
+    assert client.peer.signing.goodsig_count == len(client.received)
     assert client.of("LOCAL_POSITION_NED")
     guided = (1, 4) if flavour == "ardupilot" else None
     if guided:
@@ -89,14 +89,14 @@ def test_a_client_of_pymavlink_with_the_key_flies_it(flavour: str) -> None:
     client.wait(12.0)
     assert not client.rig.autopilot.armed
     assert client.peer.signing.badsig_count == 0
-    assert client.peer.signing.goodsig_count == len(client.heard)
+    assert client.peer.signing.goodsig_count == len(client.received)
 
 
 def test_a_client_whose_clock_is_behind_catches_up_by_listening() -> None:
     client = enter(Client(rig()), stamp=STAMP - 3_600 * 100_000)
     # It has heard nothing yet: its stamps are of an hour ago.
     assert client.send(command(520)) != []
-    assert acks(client.heard) == []
+    assert acks(client.received) == []
     assert client.command(520) == 0
 
 
@@ -190,7 +190,7 @@ def test_a_client_sets_a_key_changes_it_and_takes_it_away(flavour: str) -> None:
     stranger = Client(client.rig, (254, 190))
     stranger.peer.signing.allow_unsigned_callback = lambda *_: True
     stranger.send(command(520), setup(OTHER, stamp + 10))
-    assert acks(stranger.heard) == []
+    assert acks(stranger.received) == []
     # What confirms the change is signed with the new key already.
     client.peer.signing.allow_unsigned_callback = lambda *_: True
     client.send(setup(OTHER, stamp + 100))
@@ -222,7 +222,7 @@ def test_a_key_that_is_not_taken_changes_nothing(
     texts = [m.text for m in found if m.get_type() == "STATUSTEXT"]
     assert texts == ([f"Signing setup refused: {said}"] if said else [])
     assert client.command(520) == 0
-    assert not any(m.get_signed() for m in client.heard)
+    assert not any(m.get_signed() for m in client.received)
 
 
 def test_no_key_is_kept_or_shown_or_said() -> None:

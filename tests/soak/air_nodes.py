@@ -166,7 +166,7 @@ class Tower:
         self._writer = Codec(None, signing)
         self._reader = Codec(lambda identifier, _system, _component: identifier == 253)
         self._orders: list[Message] = []
-        self.heard: list[tuple[int, int, str]] = []
+        self.received: list[tuple[int, int, str]] = []
         """Time (µs), system, words."""
 
     def order(self, system: int, command: int, *params: float) -> None:
@@ -184,7 +184,7 @@ class Tower:
         for datagram in inbox:
             for message in self._reader.feed(datagram.data, whole=True):
                 if isinstance(message, StatusText):
-                    self.heard.append((now, message.source.system, message.text))
+                    self.received.append((now, message.source.system, message.text))
         if self._signing is not None:
             self._signing.present(now)
         data = b"".join(map(self._writer.encode, self._orders))

@@ -79,7 +79,7 @@ class Stranger:
         self.places = {f"autopilot-{system}": f"autopilot-{system}" for system in systems} | {
             "swarm": "swarm"
         }
-        self._heard: deque[bytes] = deque(maxlen=_REMEMBERED)
+        self._received: deque[bytes] = deque(maxlen=_REMEMBERED)
         self._codec = Codec()
         self._forger = Signing(OTHER)
         self._signed = Codec(None, self._forger, 0)
@@ -89,7 +89,7 @@ class Stranger:
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         for datagram in inbox:
-            self._heard.append(datagram.data)
+            self._received.append(datagram.data)
         if self.quiet:
             return []
         self._forger.present(now)
@@ -102,8 +102,10 @@ class Stranger:
     def _data(self, now: int, link: str) -> bytes:
         random = self._random
         kinds: dict[str, Callable[[], bytes]] = {
-            "replayed": lambda: random.choice(self._heard),
-            "replayed, damaged": lambda: damaged(random, random.choice(self._heard), self._known, WIRE_EDITS),
+            "replayed": lambda: random.choice(self._received),
+            "replayed, damaged": lambda: damaged(
+                random, random.choice(self._received), self._known, WIRE_EDITS
+            ),
             "recorded": lambda: random.choice(recorded()),
             "recorded, of others": lambda: self._renamed(link, random.choice(recorded())),
             "recorded, absurd": lambda: absurd(random, random.choice(recorded())),
@@ -116,7 +118,7 @@ class Stranger:
             "noise": lambda: random.randbytes(random.randrange(1, 600)),
         }
         name = random.choice(list(kinds))
-        if not self._heard and name.startswith("replayed"):
+        if not self._received and name.startswith("replayed"):
             name = "noise"
         self.said[name] += 1
         return kinds[name]() or b"\0"

@@ -110,7 +110,7 @@ class Sorties:
         self._down_since: dict[int, int] = {}
         self._last_orders: dict[int, int] = {}
         self._rested = 0
-        self._heard: deque[tuple[int, int, str]] = deque(maxlen=2000)
+        self._received: deque[tuple[int, int, str]] = deque(maxlen=2000)
         self.log: deque[str] = deque(maxlen=400)
         self.begun: Counter[str] = Counter()
         self.judged: Counter[str] = Counter()
@@ -247,8 +247,8 @@ class Sorties:
 
     def _was_said(self, craft: Craft, text: str, since: int) -> bool:
         return any(
-            heard == text and system == craft.system and at >= since - 200_000
-            for at, system, heard in self._heard
+            received == text and system == craft.system and at >= since - 200_000
+            for at, system, received in self._received
         )
 
     def _returns(self, craft: Craft) -> bool | None:
@@ -326,9 +326,9 @@ class Sorties:
 
     def _listen(self) -> None:
         tower = self.field.tower
-        self.texts += len(tower.heard)
-        self._heard.extend(tower.heard)
-        tower.heard.clear()
+        self.texts += len(tower.received)
+        self._received.extend(tower.received)
+        tower.received.clear()
 
     def _lead(self, craft: Craft, now: int) -> None:
         """Who is down goes up again; who waits for a go gets it, if nobody is above its pad."""

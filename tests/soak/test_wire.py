@@ -62,8 +62,8 @@ def test_any_stream_is_messages_and_counts(mutants: Mutants) -> None:
             # Nothing that begins in the damage reaches further than the longest frame.
             after = [message for _, frame in GOOD for message in whole.feed(frame)]
             late = [number for number, _ in GOOD[LONGEST_FRAME // len(GOOD[0][1]) + 2 :]]
-            heard = [m.custom_mode for m in after if isinstance(m, Heartbeat) and m.source == SENDER]
-            assert heard[-len(late) :] == late
+            received = [m.custom_mode for m in after if isinstance(m, Heartbeat) and m.source == SENDER]
+            assert received[-len(late) :] == late
             assert whole.pending_bytes == 0
 
 

@@ -128,9 +128,9 @@ def test_a_port_tells_each_vehicle_only_what_is_for_it() -> None:
             ends[system].connect(ear.address)
             ends[system].settimeout(5.0)
             ends[system].send(beat(system, False))
-        heard: list[bytes] = []
-        while len(heard) < 2:
-            heard += ear.receive()
+        received: list[bytes] = []
+        while len(received) < 2:
+            received += ear.receive()
         ear.tell(2, b"two")
         ear.tell(1, b"one")
         ear.tell(3, b"nobody")

@@ -102,32 +102,32 @@ class RecordedFlight(NamedTuple):
 def read_flight(path: Path) -> RecordedFlight:
     """Return the flight of the one vehicle in a log. Raises LogError and InputError."""
     codec = Codec()
-    heard = [(record.time, message) for record in read_tlog(path) for message in codec.feed(record.frame)]
-    beats = [m for _, m in heard if isinstance(m, Heartbeat) and m.source.component == _AUTOPILOT]
-    places = [(time, m.time_boot) for time, m in heard if isinstance(m, LocalPosition)]
+    received = [(record.time, message) for record in read_tlog(path) for message in codec.feed(record.frame)]
+    beats = [m for _, m in received if isinstance(m, Heartbeat) and m.source.component == _AUTOPILOT]
+    places = [(time, m.time_boot) for time, m in received if isinstance(m, LocalPosition)]
     if not beats or not places or beats[0].autopilot not in _FLAVOURS:
         raise InputError(f"{path}: holds no ArduPilot or PX4 that tells where it is")
     stamps, boot = np.array(places, dtype=np.float64).T
     # Beyond its ends the time continues at the clock's own rate.
     stamps = np.array([stamps[0] - 1e9, *stamps, stamps[-1] + 1e9])
     boot = np.array([boot[0] - 1e9, *boot, boot[-1] + 1e9])
-    begin = float(np.interp(heard[0][0], stamps, boot))
-    times = (np.interp([time for time, _ in heard], stamps, boot) - begin) * 1e-6
+    begin = float(np.interp(received[0][0], stamps, boot))
+    times = (np.interp([time for time, _ in received], stamps, boot) - begin) * 1e-6
     own = Source(beats[0].source.system, _AUTOPILOT)
-    rows = list(zip(times.tolist(), (message for _, message in heard), strict=True))
+    rows = list(zip(times.tolist(), (message for _, message in received), strict=True))
     sent = [Sent(time, message) for time, message in rows if message.source != own]
     told = tell((row for row in rows if row[1].source == own), begin)
     return RecordedFlight(own.system, _FLAVOURS[beats[0].autopilot], sent, told)
 
 
-def tell(heard: Iterable[tuple[float, Message]], begin: float = 0.0) -> Told:
+def tell(received: Iterable[tuple[float, Message]], begin: float = 0.0) -> Told:
     """Collect the data that a vehicle reported, from its messages and their times of arrival (s).
 
     The vehicle's own time stamps count from ``begin`` (µs).
     """
     told = Told([], [], [], np.empty(0), np.empty(0))
     track, headings = [], []
-    for time, message in heard:
+    for time, message in received:
         match message:
             case CommandAck():
                 told.acks.append(Ack(time, message.command, message.result))
@@ -164,7 +164,7 @@ def fly(flight: RecordedFlight, vehicle: VehicleConfig, **settings: Any) -> Told
     )
     autopilot = Autopilot(config, vehicle, _SITE, seed=1)
     sender, receiver = Codec(), Codec()
-    heard: list[tuple[float, Message]] = []
+    received: list[tuple[float, Message]] = []
     waiting = [(math.ceil(time * 1e6 / _TICK) * _TICK, message) for time, message in flight.sent]
     waiting.reverse()
     for now in range(0, round(flight.told.track[-1, 0] * 1e6), _TICK):
@@ -172,5 +172,5 @@ def fly(flight: RecordedFlight, vehicle: VehicleConfig, **settings: Any) -> Told
         while waiting and waiting[-1][0] <= now:
             inbox.append(Datagram(LINK, sender.encode(waiting.pop()[1])))
         for datagram in autopilot.step(now, inbox):
-            heard += [(now * 1e-6, message) for message in receiver.feed(datagram.data)]
-    return tell(heard)
+            received += [(now * 1e-6, message) for message in receiver.feed(datagram.data)]
+    return tell(received)

@@ -45,7 +45,7 @@ class Cost(NamedTuple):
     real_time: float
     vehicle_ms: float
     memory: int
-    heard: float
+    received: float
 
 
 class _EnoughError(Exception):
@@ -119,7 +119,7 @@ def main() -> None:
     for cost in costs:
         sys.stdout.write(
             f"| {cost.vehicles} | {cost.plan_ms:.2f} | {cost.real_time:.2f} | {cost.vehicle_ms:.0f} "
-            f"| {cost.memory} | {100.0 * cost.heard:.0f} % |\n"
+            f"| {cost.memory} | {100.0 * cost.received:.0f} % |\n"
         )
 
 

@@ -76,5 +76,5 @@ def _cut_the_swarm(stage: Stage) -> None:
     stage.swarm.cut = False
     for what in ("concern", "over"):
         for other in everyone:
-            heard = [system for system in everyone if system != other]
-            reports.of(heard, what, f"Neighbour {other} is not heard")
+            received = [system for system in everyone if system != other]
+            reports.of(received, what, f"Neighbour {other} is not heard")

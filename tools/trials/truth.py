@@ -37,7 +37,7 @@ class TrueSeen:
 
     def __init__(self) -> None:
         self.armed: bool | None = None
-        self.heard = 0
+        self.received = 0
         self.rows: list[tuple[int, tuple[float, float, float], bool]] = []
 
     def track(self, begin: int) -> Track:
@@ -122,7 +122,7 @@ class TruthObserver:
                         place = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
                         east, north, up = place.tolist()
                         one.rows.append((now, (east, north, up), bool(one.armed)))
-                        one.heard = now
+                        one.received = now
                     elif isinstance(message, Heartbeat):
                         one.armed = bool(message.base_mode & ARMED)
         if now >= self._next:
@@ -134,7 +134,7 @@ class TruthObserver:
             ear = self._ears[system]
             codec = self._codecs[id(ear)]
             ear.tell(system, codec.encode(Heartbeat(OWN, *_GROUND_STATION)))
-            if now - one.heard > _SILENT:
+            if now - one.received > _SILENT:
                 wanted = _SIM_STATE if self._flavours[system] == _ARDUPILOT else _HIL_STATE
                 params = (float(wanted), float(_PERIOD), 0.0, 0.0, 0.0, 0.0, 0.0)
                 ear.tell(system, codec.encode(CommandLong(OWN, system, 1, _SET_INTERVAL, 0, params)))

@@ -118,9 +118,9 @@ def _told(found: list[Nearest]) -> str | None:
 def _unsaid(stage: Stage) -> list[str]:
     """Return a fault for each text on the mishaps that the ground station did not receive."""
     faults = []
-    for system, heard in stage.station.texts.items():
+    for system, received in stage.station.texts.items():
         wanted = _SAID if system == ENDED else (*_SAID, f"Neighbour {ENDED} is not heard")
-        faults += [f"{system} did not tell the ground {text!r}" for text in wanted if text not in heard]
+        faults += [f"{system} did not tell the ground {text!r}" for text in wanted if text not in received]
     return faults
 
 

@@ -56,7 +56,7 @@ class Commitment:
         self._config, self._program, self._stall, self._origin = config, program, stall, origin
         self._planar = planar
         self._rounding = rounding(program.n, config.dt_us)
-        self.told_until = 0
+        self.announced_until = 0
         """Last epoch (µs) of which a plan was announced."""
         self.current: WirePlan | None = None
         # Caches of what is derived from ``current``, and from both plans: it is needed several times.
@@ -74,7 +74,7 @@ class Commitment:
         """Hold ``position`` (3,), m; the plan to announce is that of the first epoch not announced yet."""
         epoch, steps = self.epoch(now), self._program.n
         self.current = resting(epoch, self._config.dt_us, steps, position, self._origin)
-        free = max(epoch, self.told_until) + self._config.epoch_us
+        free = max(epoch, self.announced_until) + self._config.epoch_us
         self.following = self.current._replace(epoch=free)
 
     def turn(self, now: int) -> bool:
@@ -164,7 +164,7 @@ class Commitment:
             self._flown = self.current, self.following, horizon
         return self._flown[2]
 
-    def told(self) -> WirePlan | None:
+    def announced(self) -> WirePlan | None:
         """Return the plan to announce now."""
         return self.current if self.following is None else self.following
 

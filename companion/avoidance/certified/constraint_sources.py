@@ -116,7 +116,7 @@ class ConstraintSources:
         left = peers.left
         if not left:
             return found
-        for system, time, position, _ in world.neighbours.last_heard():
+        for system, time, position, _ in world.neighbours.last_received():
             if system not in left or time < left[system].plan.epoch:
                 continue
             apart = position - horizon_of(left[system].plan).at(time).position

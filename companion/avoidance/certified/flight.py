@@ -55,9 +55,9 @@ class CertifiedFlight:
         """Distance (m) of the vehicle from its plan: ``off`` now, ``excursion`` at most."""
         self.left_tube = 0
         """Number of times that the vehicle left the tube."""
-        self._outside = self._steers = self._told = False
+        self._outside = self._steers = self._announced = False
         self._asked: int | None = None
-        self._next_told = 0
+        self._next_announcement = 0
         self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
         """Time (s) from now to the end of the plan that is made next, at most."""
 
@@ -86,12 +86,12 @@ class CertifiedFlight:
         if horizon is not None:
             off = horizon.at(now).position - position
             inside = float(off @ off) <= self._config.certified.tube**2
-            if inside or commitment.told_until >= commitment.epoch(now):
+            if inside or commitment.announced_until >= commitment.epoch(now):
                 commitment.turn(now)
                 return
         commitment.begin(now, position)
-        commitment.anchored_anew += self._told
-        self._steers = self._told = False
+        commitment.anchored_anew += self._announced
+        self._steers = self._announced = False
 
     def due(self, now: int) -> bool:
         """Return whether the next epoch's plan is to be made now, by ``plan`` or otherwise.
@@ -145,7 +145,7 @@ class CertifiedFlight:
     def idle(self, now: int) -> bool:
         """Return whether there is nothing to make or to announce until something else is due."""
         following = self.commitment.following
-        waiting = following is not None and now < following.epoch and now < self._next_told
+        waiting = following is not None and now < following.epoch and now < self._next_announcement
         return waiting and not self._replies
 
     def horizon(self) -> Horizon | None:
@@ -167,18 +167,19 @@ class CertifiedFlight:
             farewell = self.commitment.following is None
         elif self._asked != now:
             self._steers = False
-        told = self.commitment.told()
-        if told is None or not (self._steers or farewell):
+        announced = self.commitment.announced()
+        if announced is None or not (self._steers or farewell):
             return sync
-        if told.epoch == self.commitment.told_until and now < self._next_told:
+        if announced.epoch == self.commitment.announced_until and now < self._next_announcement:
             return sync
-        self.commitment.told_until, self._next_told = told.epoch, now + self._config.certified.repeat_us
-        self._told = True
+        self.commitment.announced_until = announced.epoch
+        self._next_announcement = now + self._config.certified.repeat_us
+        self._announced = True
         if farewell:
-            self.peers.leave(told.epoch)
-        roster = Roster(told.epoch, self.peers.members, farewell)
+            self.peers.leave(announced.epoch)
+        roster = Roster(announced.epoch, self.peers.members, farewell)
         return [
             *sync,
-            Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(told)),
+            Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(announced)),
             Tunnel(self._own, 0, 0, ROSTER, pack_roster(roster)),
         ]

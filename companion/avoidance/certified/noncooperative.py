@@ -62,7 +62,7 @@ class NonCooperative:
     def seen(self, begins: int, members: Set[int], world: World) -> list[Stranger]:
         """Return the received vehicles except ``members``, for the epoch that begins at ``begins`` (µs)."""
         found = []
-        for system, time, position, velocity in world.neighbours.last_heard():
+        for system, time, position, velocity in world.neighbours.last_received():
             if system not in members:
                 age = max(1e-6 * (begins - time), 0.0)
                 found.append(

@@ -25,7 +25,7 @@ TELEPORT = np.array([20.0, -30.0, 5.0])
 
 
 @st.composite
-def heard(draw):
+def received(draw):
     """Measurements (stamp, position, velocity) with noise and teleports, and how late each arrives, below the
     window."""
     random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
@@ -61,7 +61,7 @@ def assert_same(one, other):
 
 
 @LAWS
-@given(flight=heard())
+@given(flight=received())
 def test_out_of_order_equals_in_order_exactly(flight):
     measured, late = flight
     in_order = listened(measured, [0] * len(late))
@@ -70,7 +70,7 @@ def test_out_of_order_equals_in_order_exactly(flight):
 
 
 @LAWS
-@given(flight=heard(), ahead=st.integers(0, 2_000_000))
+@given(flight=received(), ahead=st.integers(0, 2_000_000))
 def test_the_answers_are_the_same_too_while_the_clocks_are(flight, ahead):
     """Before there is a rate, the least lag is that of the first: same time, same state, same sigma."""
     measured, late = flight[0][:5], flight[1][:5]
@@ -82,7 +82,7 @@ def test_the_answers_are_the_same_too_while_the_clocks_are(flight, ahead):
 
 
 @LAWS
-@given(flight=heard(), again=st.lists(st.tuples(st.integers(0, 39), st.integers(0, 300_000)), max_size=20))
+@given(flight=received(), again=st.lists(st.tuples(st.integers(0, 39), st.integers(0, 300_000)), max_size=20))
 def test_duplicates_count_once(flight, again):
     measured, _ = flight
     once = listened(measured, [0] * len(measured))

@@ -14,7 +14,7 @@ NOW = 1_767_225_600_000_000
 DELAY, STALE, DT, PERIOD = 20_000, 500_000, 100_000, 100_000
 
 
-def hears(clock: PlanClock, off: int, delays: list[int]) -> list[int | None]:
+def receives(clock: PlanClock, off: int, delays: list[int]) -> list[int | None]:
     """How far each of a stream of plans is dated from when it was really made; ``off``: the sender's clock
     minus ours."""
     errors: list[int | None] = []
@@ -33,7 +33,7 @@ NEAR = 50_000
 @given(st.integers(-25_000, 25_000), st.lists(st.integers(DELAY, DELAY + 25_000), min_size=1, max_size=30))
 def test_the_epoch_of_a_good_clock_is_believed_to_the_microsecond(off: int, delays: list[int]) -> None:
     clock = PlanClock(DELAY, STALE)
-    assert hears(clock, off, delays) == [off] * len(delays)
+    assert receives(clock, off, delays) == [off] * len(delays)
 
 
 @LAWS
@@ -41,7 +41,7 @@ def test_the_epoch_of_a_good_clock_is_believed_to_the_microsecond(off: int, dela
 def test_a_link_that_becomes_slow_or_was_slow_at_first_changes_nothing(delays: list[int], quick: int) -> None:
     """One quick plan of the first ten tells that the clock is right."""
     delays.insert(min(quick, len(delays)), DELAY)
-    assert hears(PlanClock(DELAY, STALE), 0, delays) == [0] * len(delays)
+    assert receives(PlanClock(DELAY, STALE), 0, delays) == [0] * len(delays)
 
 
 @LAWS
@@ -54,7 +54,7 @@ def test_a_clock_that_is_wrong_by_less_than_a_plan_lives_is_seen_through_within_
     off: int, count: int, jitter: int
 ) -> None:
     delays = [DELAY] + [DELAY + 7919 * k % (jitter + 1) for k in range(1, count)]
-    errors = hears(PlanClock(DELAY, STALE), off, delays)
+    errors = receives(PlanClock(DELAY, STALE), off, delays)
     assert errors[:9] == [off] * 9
     assert all(error is not None and abs(error) <= 1000 for error in errors[9:])
 
@@ -64,8 +64,8 @@ def test_a_clock_that_is_wrong_by_less_than_a_plan_lives_is_seen_through_within_
 def test_a_plan_that_is_held_began_when_it_began(off: int, delay: int, times: int) -> None:
     """Told of again and again, it ages; a new one is dated as if the old had not been repeated."""
     clock, other = PlanClock(DELAY, STALE), PlanClock(DELAY, STALE)
-    hears(clock, off, [delay] * 12)
-    hears(other, off, [delay] * 12)
+    receives(clock, off, [delay] * 12)
+    receives(other, off, [delay] * 12)
     made = NOW + 12 * PERIOD
     first = clock.begins(made + delay, made + off, DT)
     other.begins(made + delay, made + off, DT)
@@ -82,7 +82,7 @@ def test_a_plan_that_is_held_began_when_it_began(off: int, delay: int, times: in
     st.lists(st.integers(DELAY, 60_000), min_size=10, max_size=40),
 )
 def test_a_wrong_clock_is_seen_through_after_some_evidence(off: int, delays: list[int]) -> None:
-    errors = hears(PlanClock(DELAY, STALE), off, delays)
+    errors = receives(PlanClock(DELAY, STALE), off, delays)
     assert errors[:2] == [None, None]
     late = max(delays) - DELAY
     assert all(error is not None and abs(error) <= late for error in errors[2:])
@@ -91,7 +91,7 @@ def test_a_wrong_clock_is_seen_through_after_some_evidence(off: int, delays: lis
 @pytest.mark.parametrize("off", [-3_600_000_000, 3_600_000_000])
 def test_one_plan_of_another_time_is_refused_and_changes_nothing(off: int) -> None:
     clock = PlanClock(DELAY, STALE)
-    assert hears(clock, 0, [DELAY] * 5) == [0] * 5
+    assert receives(clock, 0, [DELAY] * 5) == [0] * 5
     assert clock.begins(NOW + 600_000, NOW + 600_000 + off, DT) is None
     assert clock.begins(NOW + 700_000, NOW + 680_000, DT) == NOW + 680_000
 

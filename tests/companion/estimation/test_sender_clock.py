@@ -233,7 +233,7 @@ def test_other_messages_are_read_by_the_same_clock_and_teach_it_nothing(stamp, l
     # None is from the future, and one without a stamp is dated by its arrival.
     assert clock.reads(NOW + sent + late, stamp) <= NOW + sent + late - DELAY
     assert clock.reads(NOW + sent + late, 0) == NOW + sent + late - DELAY
-    assert (clock.skew, clock.heard) == (skew, 20)
+    assert (clock.skew, clock.support) == (skew, 20)
 
 
 @LAWS

@@ -61,7 +61,7 @@ def reports(random, path, period, delay, jitter, sigma, lost=0.0):
     """What arrives of a path, in the order of arrival: ``period``, ``delay``, ``jitter`` in ms, ``sigma`` of
     position and velocity on each axis. The sender's clock runs 30 ppm fast and tells whole milliseconds."""
     positions, velocities = path
-    heard = []
+    received = []
     for k in range(0, len(positions), round(period * 1e-3 / STEP)):
         if random.random() < lost:
             continue
@@ -69,13 +69,13 @@ def reports(random, path, period, delay, jitter, sigma, lost=0.0):
         arrival = true + round(1e3 * (delay + jitter * random.random()))
         stamp = (BOOT + round(true * 1.00003)) // 1000 * 1000
         z = positions[k] + sigma[0] * random.normal(size=3), velocities[k] + sigma[1] * random.normal(size=3)
-        heard.append(Report(arrival, stamp, *z))
-    return sorted(heard, key=lambda report: report.arrival)
+        received.append(Report(arrival, stamp, *z))
+    return sorted(received, key=lambda report: report.arrival)
 
 
-def errors(config, heard, positions):
+def errors(config, received, positions):
     """Position errors (m, 3) when asked at 10 Hz."""
-    track, waiting, found = Track(config), list(reversed(heard)), []
+    track, waiting, found = Track(config), list(reversed(received)), []
     for k in range(0, len(positions), 10):
         now = round(k * STEP * 1e6)
         while waiting and waiting[-1].arrival <= now:

@@ -62,9 +62,9 @@ class Rig:
         self.now, self.view = START, view
         self.sent = []
 
-    def tick(self, *heard: Message):
+    def tick(self, *received: Message):
         """One step: the commands sent, as (command, parameters without NaN)."""
-        for message in heard:
+        for message in received:
             # As a codec makes it: a new one each time.
             self.pilot.receive(message._replace())
         sent = [

@@ -140,10 +140,10 @@ def test_who_may_be_flying_is_never_told_to_take_off(flavour, airborne):
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("heard", [(), (landed(0),)], ids=["nothing said", "undefined"])
-def test_an_armed_vehicle_of_which_nobody_says_where_it_is_is_left_alone(flavour, heard):
+def test_an_armed_vehicle_of_which_nobody_says_where_it_is_is_left_alone(flavour, received):
     rig = Rig(flavour, READY._replace(own=state(8.0)))
     assert rig.pilot.go(HEIGHT)
-    sent = rig.run(4.0, beat(flavour, armed=True, guided=True), HEALTHY, *heard, acks=True)
+    sent = rig.run(4.0, beat(flavour, armed=True, guided=True), HEALTHY, *received, acks=True)
     assert rig.pilot.phase is Phase.CONNECT
     assert "EXTENDED_SYS_STATE" in rig.pilot.waiting_for
     assert not {command for command, _ in sent} & {TAKEOFF, ARM}

@@ -43,10 +43,10 @@ def limits(draw):
 
 @pytest.mark.parametrize("flavour", PROFILES)
 @pytest.mark.parametrize("heard", [True, False], ids=["read", "assumed"])
-def test_stock_firmware_follows_the_shipped_files(flavour, heard):
+def test_stock_firmware_follows_the_shipped_files(flavour, received):
     profile = PROFILES[flavour]
     config = load(find("companions", flavour), FlyConfig).companion
-    values = stock_parameters(profile.autopilot) if heard else {}
+    values = stock_parameters(profile.autopilot) if received else {}
     found = lowered(config.limits, profile, values)
     assert config.limits_from_autopilot
     assert (found.changes, found.lacking) == ((), "")

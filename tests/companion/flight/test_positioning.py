@@ -80,15 +80,15 @@ def test_trouble_is_named_grows_with_time_and_is_over_two_seconds_after_it_ends(
 
 @LAWS
 @given(
-    heard=st.lists(
+    received=st.lists(
         st.sampled_from([gps(0), gps(1), ekf(LOST), ekf(0x4A1), estimator(0xA1), estimator(0xA1, NAN)]),
         max_size=9,
     )
 )
-def test_who_never_had_gps_misses_none(heard):
+def test_who_never_had_gps_misses_none(received):
     """Cameras, or not ready yet."""
     found = Positioning()
-    for k, message in enumerate(heard):
+    for k, message in enumerate(received):
         found.receive(message)
         found.tick(k * SECOND)
         assert (found.trouble, found.radius) == ("", 0.0)

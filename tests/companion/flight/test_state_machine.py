@@ -47,7 +47,7 @@ class Want(NamedTuple):
     """What is known to the pilot, what it must then name as missing ("": nothing is), and whether the
     autopilot answers its requests."""
 
-    heard: tuple[Message, ...]
+    received: tuple[Message, ...]
     view: View
     go: bool
     missing: str
@@ -79,7 +79,7 @@ def test_connecting_waits_and_names_what_is_missing(name):
     rig = Rig(view=want.view)
     if want.go:
         assert rig.pilot.go(HEIGHT)
-    sent = rig.run(3.0, *want.heard, acks=want.answers)
+    sent = rig.run(3.0, *want.received, acks=want.answers)
     if want.missing:
         assert rig.pilot.phase is Phase.CONNECT
         assert want.missing in rig.pilot.waiting_for
@@ -165,14 +165,14 @@ def test_every_stream_is_asked_for_until_the_autopilot_has_heard_it(seed):
     """Half of the requests and a third of the answers are lost; an acknowledgement names no stream."""
     lossy = random.Random(seed)
     rig = Rig(view=READY._replace(local=None))
-    heard, answers = set(), []
+    received, answers = set(), []
     for _ in range(3000):
         new = rig.tick(beat("ardupilot"), *answers)
         arrived = [call for call in new if lossy.random() > 0.5]
-        heard |= {params[0] for command, params in arrived if command == INTERVAL}
+        received |= {params[0] for command, params in arrived if command == INTERVAL}
         answers = [ack(command) for command, _ in arrived if lossy.random() > 0.33]
     # And then for what tells how well it knows its place.
-    assert heard == {32.0, 30.0, 1.0, 245.0, 24.0, 193.0}
+    assert received == {32.0, 30.0, 1.0, 245.0, 24.0, 193.0}
 
 
 def test_an_autopilot_that_answers_no_request_is_asked_for_every_stream():

@@ -36,8 +36,8 @@ def carried_away(bench: Bench, place) -> Bench:
 def beside(bench: Bench, seconds: float, place) -> Bench:
     """Let time pass with a neighbour that hovers there, at most until it lands."""
     for _ in range(round(100 * seconds)):
-        heard = bench.datagram("swarm", seen_at(BESIDE, place))
-        bench.step(*([heard] if bench.now % 100_000 == 0 else []))
+        received = bench.datagram("swarm", seen_at(BESIDE, place))
+        bench.step(*([received] if bench.now % 100_000 == 0 else []))
         if bench.phase in (Phase.LAND, Phase.DONE):
             break
     return bench
@@ -176,15 +176,15 @@ def test_what_failed_is_over_when_somebody_takes_the_vehicle_over() -> None:
 def test_a_vehicle_with_a_lane_climbs_to_it_before_it_sets_off() -> None:
     """Lanes keep vehicles apart that are in them; while all climb, they are side by side."""
     bench = Bench(guard={"return_step": 3.0})
-    heard = bench.datagram("swarm", seen_at(SYSTEM - 1, (-15.0, 15.0, 5.0)))
-    bench.fly(0.5, heard)
+    received = bench.datagram("swarm", seen_at(SYSTEM - 1, (-15.0, 15.0, 5.0)))
+    bench.fly(0.5, received)
     bench.take_off()
     bench.go_to((15, 0, 5))
     bench.fly(12.0)
     assert off(bench, (15.0, 0.0)) < 0.5
     bench.order(RETURN)
     while off(bench, (15.0, 0.0)) < 1.0:
-        bench.step(*([heard] if bench.now % 100_000 == 0 else []))
+        bench.step(*([received] if bench.now % 100_000 == 0 else []))
         assert bench.phase is Phase.RETURN
     assert bench.autopilot.position[2] > 5.0 + 3.0 - 1.1
     bench.until(Phase.DONE, 60.0)

@@ -247,11 +247,11 @@ def test_who_says_nothing_of_use_keeps_no_autopilots_word_out(silent, v):
     with_it, without = (Neighbours(CONFIG, OWN, FLEET) for _ in range(2))
     for k, quiet in enumerate(silent):
         now = NOW + k * 100_000
-        heard = position(X + 0.1 * k * v, v)._replace(source=Source(OTHER, 1))
+        received = position(X + 0.1 * k * v, v)._replace(source=Source(OTHER, 1))
         if not quiet:
             with_it.receive_position(now + DELAY, nowhere())
         for neighbours in (with_it, without):
-            neighbours.receive_position(now + DELAY, heard)
+            neighbours.receive_position(now + DELAY, received)
         one, other = (neighbours.obstacles(now).positions for neighbours in (with_it, without))
         np.testing.assert_array_equal(one, other)
         np.testing.assert_allclose(one[0, 0], X + 0.1 * k * v, atol=2 * GRAIN)
@@ -290,9 +290,9 @@ def test_positions_that_overtake_each_other_tell_the_same(order, v):
     for turn in (range(6), order):
         neighbours = Neighbours(CONFIG, OWN, FLEET)
         for k in turn:
-            heard = position(X + 0.1 * k * v, v)._replace(time_boot=10**7 + k * 100_000)
+            received = position(X + 0.1 * k * v, v)._replace(time_boot=10**7 + k * 100_000)
             # Quick ones and slow ones; the quickest took the least time that there is.
-            neighbours.receive_position(NOW + 5 * 100_000 + DELAY, heard)
+            neighbours.receive_position(NOW + 5 * 100_000 + DELAY, received)
         results.append(neighbours)
     one, other = (neighbours.obstacles(NOW + 600_000).positions for neighbours in results)
     np.testing.assert_array_equal(one, other)

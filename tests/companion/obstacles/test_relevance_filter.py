@@ -81,9 +81,9 @@ class Listener:
     def receive(self, now, *messages):
         self.relevance.now = now + self._delay
         for message in messages:
-            for heard in self.codec.feed(self._speakers.encode(message)):
+            for received in self.codec.feed(self._speakers.encode(message)):
                 self.heard_at = now
-                self.world.receive(now + self._delay, "swarm", heard)
+                self.world.receive(now + self._delay, "swarm", received)
 
     def look(self, now, place=ZERO, velocity=ZERO):
         self.relevance.now = now
@@ -142,8 +142,8 @@ def test_who_is_ignored_can_act_on_no_plan_until_it_is_heard_again(config, direc
     assert until - END < 1_000_000
     last = until + 2 * config.rates.state_us
     own = fastest * 1e-6 * (last - END) * direction
-    heard, silent = listener.heard_at, 1e-6 * (last - listener.heard_at)
-    other = place + 1e-6 * (heard - END) * velocity - fastest * silent * direction
+    received, silent = listener.heard_at, 1e-6 * (last - listener.heard_at)
+    other = place + 1e-6 * (received - END) * velocity - fastest * silent * direction
     # As full hearing would have it at the last moment before it is heard.
     attentive = Listener(config)
     for told_at in range(last - 10 * PERIOD, last, PERIOD):
@@ -267,13 +267,13 @@ def test_nobody_comes_near_unheard(direction, speed):
     while float(np.linalg.norm(place)) > CERTAINLY and now < NOW + 45_000_000:
         before = listener.decoded()
         listener.receive(now, *told(OTHER, place, velocity, now))
-        heard = listener.decoded() > before
+        received = listener.decoded() > before
         silences.append(now - last)
-        last = now if heard else last
+        last = now if received else last
         listener.look(now + PERIOD // 2)
         ages = listener.world.neighbours.ages(now + PERIOD)
         assert ages[OTHER] < CONFIG.guard.neighbour_lost_us // 2
-        known = listener.world.neighbours.last_heard()[0]
+        known = listener.world.neighbours.last_received()[0]
         np.testing.assert_allclose(known[2] + 1e-6 * (now - known[1]) * known[3], place, atol=2.0)
         now += PERIOD
         place = place + 1e-6 * PERIOD * velocity

@@ -33,7 +33,7 @@ def message(address=7, course=0.0, speed=60.0, climb=0.0, age=0, altitude=500.0,
     )
 
 
-def heard(place, now=START, here=ZERO, traffic=None, **more):
+def received(place, now=START, here=ZERO, traffic=None, **more):
     found = Traffic(CONFIG) if traffic is None else traffic
     found.receive(now, message(**more), np.asarray(place, float), here)
     return found
@@ -55,7 +55,7 @@ def around(traffic, points=HERE, now=START, reach=FAR):
 )
 def test_no_point_of_its_way_is_nearer_than_what_is_told(place, course, speed, climb, own, later, share):
     """Seen from above, where its height may be wrong; and what is told is on its way."""
-    traffic = heard(place, course=course, speed=speed, climb=climb)
+    traffic = received(place, course=course, speed=speed, climb=climb)
     nearest = around(traffic, own[None], START + later).positions[0, 0]
     v = np.array([speed * math.sin(course), speed * math.cos(course), climb])
     begin = place + 1e-6 * later * v
@@ -70,27 +70,27 @@ def test_no_point_of_its_way_is_nearer_than_what_is_told(place, course, speed, c
 def test_a_world_that_is_turned_is_seen_turned(turn, place, course, own):
     c, s = math.cos(turn), math.sin(turn)
     matrix = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    here = around(heard(place, course=course), own[None]).positions[0, 0]
-    there = around(heard(matrix @ place, course=course - turn), (matrix @ own)[None]).positions[0, 0]
+    here = around(received(place, course=course), own[None]).positions[0, 0]
+    there = around(received(matrix @ place, course=course - turn), (matrix @ own)[None]).positions[0, 0]
     np.testing.assert_allclose(there, matrix @ here, atol=1e-6)
 
 
 @given(height=numbers(-1000.0, 1000.0))
 def test_its_height_counts_as_far_as_it_is_known(height):
-    known = around(heard((300.0, 0.0, height))).positions[0, 0]
+    known = around(received((300.0, 0.0, height))).positions[0, 0]
     assert abs(known[2] - 5.0) == pytest.approx(max(abs(height - 5.0) - CONFIG.height_error, 0.0))
-    assert around(heard((300.0, 0.0, height), altitude=None)).positions[0, 0, 2] == 5.0
+    assert around(received((300.0, 0.0, height), altitude=None)).positions[0, 0, 2] == 5.0
 
 
 def test_without_course_or_speed_it_stands():
     for more in ({"course": None}, {"speed": None}):
-        traffic = heard((300.0, 0.0, 5.0), **more)
+        traffic = received((300.0, 0.0, 5.0), **more)
         np.testing.assert_allclose(around(traffic, now=START + 5_000_000).positions[0, 0], (300.0, 0.0, 5.0))
 
 
 @given(age=st.integers(0, 12), later=st.integers(0, 12_000_000))
 def test_it_is_forgotten_after_its_age_which_counts_from_when_it_was_true(age, later):
-    traffic = heard((100.0, 0.0, 5.0), age=age * 1_000_000)
+    traffic = received((100.0, 0.0, 5.0), age=age * 1_000_000)
     known = age * 1_000_000 <= CONFIG.age_us and later + age * 1_000_000 <= CONFIG.age_us
     assert bool(around(traffic, now=START + later).ids) == known
 
@@ -109,21 +109,21 @@ def test_it_is_forgotten_after_its_age_which_counts_from_when_it_was_true(age, l
 )
 def test_what_cannot_be_or_does_not_matter_is_refused(more):
     place = more.pop("place", (100.0, 0.0, 5.0))
-    traffic = heard(place, **more)
+    traffic = received(place, **more)
     assert (len(traffic), traffic.refused) == (0, 1)
 
 
 def test_the_own_transponder_is_no_traffic():
     traffic = Traffic(TrafficConfig(ignore=(7,)))
-    heard((5.0, 0.0, 5.0), traffic=traffic)
+    received((5.0, 0.0, 5.0), traffic=traffic)
     assert len(traffic) == 0
 
 
 def test_one_that_is_elsewhere_at_once_is_not_the_one_that_was_heard():
-    traffic = heard((100.0, 0.0, 5.0), speed=0.0)
-    heard((2000.0, 0.0, 5.0), START + 1_000_000, traffic=traffic, speed=0.0)
+    traffic = received((100.0, 0.0, 5.0), speed=0.0)
+    received((2000.0, 0.0, 5.0), START + 1_000_000, traffic=traffic, speed=0.0)
     assert around(traffic).positions[0, 0, 0] == pytest.approx(100.0)
-    heard((2000.0, 0.0, 5.0), START + 20_000_000, traffic=traffic, speed=0.0)
+    received((2000.0, 0.0, 5.0), START + 20_000_000, traffic=traffic, speed=0.0)
     assert around(traffic, now=START + 20_000_000).positions[0, 0, 0] == pytest.approx(2000.0)
 
 
@@ -133,7 +133,7 @@ def test_of_many_the_nearest_count(seed):
     random = np.random.default_rng(seed)
     traffic, far = Traffic(CONFIG), random.permutation(np.arange(100.0, 2100.0, 20.0))
     for address, distance in enumerate(far):
-        heard((distance, 0.0, 5.0), traffic=traffic, address=address)
+        received((distance, 0.0, 5.0), traffic=traffic, address=address)
     assert len(traffic) == CONFIG.most
     nearest = {FIRST_ID + int(k) for k in np.argsort(far)[: CONFIG.most]}
     assert set(around(traffic).ids) == nearest
@@ -141,7 +141,7 @@ def test_of_many_the_nearest_count(seed):
 
 def test_who_is_right_before_it_goes_to_its_right():
     """Northward: to the east."""
-    nearest = around(heard((0.0, -300.0, 5.0), course=0.0)).positions[0]
+    nearest = around(received((0.0, -300.0, 5.0), course=0.0)).positions[0]
     assert (HERE - nearest)[0] @ (1.0, 0.0, 0.0) > 0.9
 
 
@@ -209,7 +209,7 @@ def test_without_a_receiver_it_stays():
     clear=numbers(0.5, 5),
 )
 def test_a_goal_is_moved_just_off_its_way_or_not_at_all(goal, own, place, course, clear):
-    traffic = heard(place, course=course)
+    traffic = received(place, course=course)
     moved, room = traffic.outside(START, goal, own, clear), CONFIG.radius + clear
 
     def off(point):

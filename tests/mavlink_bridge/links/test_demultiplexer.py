@@ -23,7 +23,7 @@ class Listening:
     def said(self, data: bytes) -> None:
         """Nothing is."""
 
-    def heard(self, _header: Header, _frame: bytes) -> None:
+    def received(self, _header: Header, _frame: bytes) -> None:
         self.heard_frames += 1
 
 
@@ -37,9 +37,9 @@ def test_all_that_waits_is_forgotten(read: bool) -> None:
         far.send(frame(k))
     if read:
         dealer.ends["one"].receive()
-    heard = ear.heard_frames
+    received = ear.heard_frames
     dealer.forget()
-    assert ear.heard_frames == heard
+    assert ear.heard_frames == received
     far.send(frame(7))
     assert {name: end.receive() for name, end in dealer.ends.items()} == {
         "one": [frame(7)],

@@ -289,20 +289,20 @@ def test_who_calls_and_never_reads_costs_nobody_else_anything_and_is_given_up() 
     while listener.peers < 2:
         wait(listener)
         listener.receive()
-    number = heard = 0
+    number = received = 0
     while listener.peers == 2:
         # Some seconds of a busy vehicle from one second to the next.
         clock.wait_until(clock.now() + 1_000_000)
         for _ in range(20):
             listener.send(frame(number, 120) * 8)
             number += 1
-            heard += len(frames(gather(reader, bool)))
+            received += len(frames(gather(reader, bool)))
         assert all(len(stream._waiting) <= BACKLOG for stream in listener._streams)
     assert clock.now() > HUNG
     assert listener.counters.dropped == 0
-    while heard < 8 * number:
-        heard += len(frames(gather(reader, bool)))
-    assert heard == 8 * number
+    while received < 8 * number:
+        received += len(frames(gather(reader, bool)))
+    assert received == 8 * number
     for one in (sleeper, reader, listener):
         one.close()
 

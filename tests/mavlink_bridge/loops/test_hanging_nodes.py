@@ -37,7 +37,7 @@ class Crew:
     def _balance(self, _now: int) -> None:
         sent, delivered, dropped, duplicated, _ = self.network.counters
         assert sent + duplicated == delivered + dropped + self.network.under_way
-        assert delivered == sum(len(node.heard) for node in self.nodes.values())
+        assert delivered == sum(len(node.received) for node in self.nodes.values())
 
 
 def test_who_hangs_is_not_called_and_goes_on_with_all_that_waited() -> None:
@@ -53,8 +53,8 @@ def test_who_hangs_is_not_called_and_goes_on_with_all_that_waited() -> None:
     assert crew.nodes["b"].steps == free.nodes["b"].steps
     assert crew.nodes["c"].steps == free.nodes["c"].steps
     # All that b and c said while a hung is heard at its first call after.
-    first = [data for now, data in a.heard if now == 200 * TICK]
-    late = [data for now, data in a_free.heard if 100 * TICK <= now <= 200 * TICK]
+    first = [data for now, data in a.received if now == 200 * TICK]
+    late = [data for now, data in a_free.received if 100 * TICK <= now <= 200 * TICK]
     assert [data[:8] for data in first] == [data[:8] for data in late]
     assert crew.network.counters.dropped == 0
 
@@ -80,10 +80,10 @@ def test_a_full_buffer_drops_the_newest(buffer: int, length: int) -> None:
     missed = [step for step in free.steps if step not in hung.steps]
     assert missed == [step for step in free.steps if 20 * TICK <= step < (20 + length) * TICK]
     back = missed[-1] + 3 * TICK if missed else 0
-    heard = [(now, data[:8]) for now, data in free.heard]
-    waited = [(back, data) for now, data in heard if now in missed or now == back]
-    expected = [entry for entry in heard if entry[0] not in [*missed, back]] + waited[:buffer]
-    assert [(now, data[:8]) for now, data in hung.heard] == sorted(expected)
+    received = [(now, data[:8]) for now, data in free.received]
+    waited = [(back, data) for now, data in received if now in missed or now == back]
+    expected = [entry for entry in received if entry[0] not in [*missed, back]] + waited[:buffer]
+    assert [(now, data[:8]) for now, data in hung.received] == sorted(expected)
     assert network.counters.dropped == max(len(waited) - buffer, 0) * bool(missed)
 
 
@@ -141,7 +141,7 @@ def flight(what: list[tuple[int, str, str]], reverse: bool) -> tuple[object, ...
         crew.run(tick * TICK)
         getattr(crew.loop, action)(name)
     crew.run(200 * TICK)
-    return [(node.steps, node.heard) for node in crew.nodes.values()], crew.network.counters
+    return [(node.steps, node.received) for node in crew.nodes.values()], crew.network.counters
 
 
 @given(events)
@@ -158,7 +158,7 @@ def test_to_freeze_twice_or_thaw_who_does_not_hang_is_harmless() -> None:
     crew.loop.thaw("b")
     for one in (crew, free):
         one.run(50 * TICK)
-    assert [node.heard for node in crew.nodes.values()] == [node.heard for node in free.nodes.values()]
+    assert [node.received for node in crew.nodes.values()] == [node.received for node in free.nodes.values()]
 
 
 @pytest.mark.parametrize("action", ["freeze", "thaw", "vanish"])

@@ -54,7 +54,7 @@ def test_no_node_sees_what_another_sends_on_the_same_tick() -> None:
     LockStep(scheduled, air(scheduled), TICK).run(10 * TICK)
     for node, *_ in scheduled:
         assert isinstance(node, Chatter)
-        assert [now - int.from_bytes(data[:8], "big") for now, data in node.heard] == [TICK] * 9
+        assert [now - int.from_bytes(data[:8], "big") for now, data in node.received] == [TICK] * 9
 
 
 def flight(order: list[int]) -> tuple[list[Event], tuple[int, ...]]:
@@ -83,7 +83,7 @@ def test_taps_see_all_that_enters_and_leaves() -> None:
         assert isinstance(node, Chatter)
         assert [now for now, name in watcher.steps if name == node.name] == node.steps
         mine = [event for event in seen if event[1] == node.name]
-        assert [(now, datagram.data) for now, _, way, datagram in mine if way == "in"] == node.heard
+        assert [(now, datagram.data) for now, _, way, datagram in mine if way == "in"] == node.received
         assert [now for now, _, way, _ in mine if way == "out"] == node.steps
     assert [event[0] for event in seen] == sorted(event[0] for event in seen)
 

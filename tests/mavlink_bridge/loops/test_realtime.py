@@ -56,12 +56,12 @@ class Worker:
         self._durations = list(durations)
         self.told: list[int] = []
         self.began: list[int] = []
-        self.heard: list[Datagram] = []
+        self.received: list[Datagram] = []
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         self.told.append(now)
         self.began.append(self._clock.now())
-        self.heard += inbox
+        self.received += inbox
         if self._durations:
             self._clock.spend(self._durations.pop(0))
         return [Datagram(link, b"re: " + data) for link, data in inbox]
@@ -197,7 +197,7 @@ def test_a_name_may_stand_for_several_links_or_for_none() -> None:
     far_c.send(b"3")
     loop = RealTime(Scheduled(worker, PERIOD, PHASE), {"swarm": [a, b], "ground": c, "target": []}, clock)
     loop.run(never, until(worker, 1))
-    assert worker.heard == [Datagram("swarm", b"1"), Datagram("swarm", b"2"), Datagram("ground", b"3")]
+    assert worker.received == [Datagram("swarm", b"1"), Datagram("swarm", b"2"), Datagram("ground", b"3")]
     assert far_a.receive() == far_b.receive() == [b"re: 1", b"re: 2"]
     assert far_c.receive() == [b"re: 3"]
     assert loop.statistics.unrouted == 0
@@ -226,7 +226,7 @@ def test_of_too_much_the_oldest_is_dropped_and_counted() -> None:
         far.send(bytes([number]))
     loop = RealTime(Scheduled(worker, PERIOD, PHASE), {"swarm": near}, clock, capacity=4)
     assert loop.run(never, until(worker, 2)).overruns == 6
-    assert [data for _, data in worker.heard] == [bytes([number]) for number in range(6, 10)]
+    assert [data for _, data in worker.received] == [bytes([number]) for number in range(6, 10)]
 
 
 def test_taps_see_all_with_the_time_that_the_node_was_told() -> None:
@@ -298,11 +298,11 @@ def test_two_loops_talk_over_sockets_and_leave_nothing() -> None:
     class Talker:
         def __init__(self, name: str) -> None:
             self.name = name
-            self.heard = 0
+            self.received = 0
             self.times: list[int] = []
 
         def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-            self.heard += len(inbox)
+            self.received += len(inbox)
             self.times.append(now)
             return [Datagram("link", frame(len(self.times)))]
 
@@ -313,12 +313,12 @@ def test_two_loops_talk_over_sockets_and_leave_nothing() -> None:
     ]
     other = threading.Thread(target=loops[1].run, args=(stop.is_set,))
     other.start()
-    loops[0].run(stop.is_set, lambda _now: all(talker.heard >= 20 for talker in talkers))
+    loops[0].run(stop.is_set, lambda _now: all(talker.received >= 20 for talker in talkers))
     stop.set()
     other.join()
     assert threading.active_count() == threads
     for talker, loop in zip(talkers, loops, strict=True):
-        assert talker.heard >= 20
+        assert talker.received >= 20
         assert all((now - start) % 1_000 == 0 for now in talker.times)
         assert loop.statistics.steps == len(talker.times)
         assert loop.statistics.overruns == 0

@@ -40,18 +40,18 @@ def story(
 ) -> tuple[Heard, NetworkCounters]:
     """Everyone talks in every step; ``meddle`` then does what it likes. The books balance all the time."""
     network = SimulatedNetwork([of], 5, TICK)
-    heard: Heard = {(a, b): [] for a in NAMES for b in NAMES if a != b}
+    received: Heard = {(a, b): [] for a in NAMES for b in NAMES if a != b}
     for step in range(steps):
         now = step * TICK
         for receiver in of.members:
             for _, data in network.receive(now, receiver):
-                heard[data[:1].decode(), receiver].append((now, data))
+                received[data[:1].decode(), receiver].append((now, data))
         for sender in of.members:
             network.send(now, sender, [Datagram("swarm", f"{sender}{step}".encode())])
         meddle(step, network)
         sent, delivered, dropped, duplicated, _ = network.counters
         assert sent + duplicated == delivered + dropped + network.under_way
-    return heard, network.counters
+    return received, network.counters
 
 
 # Directions
@@ -97,9 +97,9 @@ def test_an_override_is_what_the_channel_would_do_itself() -> None:
 
 
 def test_a_direction_may_be_dead_while_the_way_back_is_clean() -> None:
-    heard, counters = story(channel(Faults(), {("a", "b"): DEAF}))
-    assert heard["a", "b"] == []
-    assert {len(all_heard) for path, all_heard in heard.items() if path != ("a", "b")} == {99}
+    received, counters = story(channel(Faults(), {("a", "b"): DEAF}))
+    assert received["a", "b"] == []
+    assert {len(all_heard) for path, all_heard in received.items() if path != ("a", "b")} == {99}
     assert counters.dropped == 100
 
 
@@ -150,8 +150,8 @@ def test_cuts_add_up_and_each_is_healed_by_its_own_name() -> None:
         if step == 79:
             network.heal(None, "a")
 
-    heard, _ = story(channel(Faults()), 120, meddle)
-    sent = {path: {int(data[1:]) for _, data in all_heard} for path, all_heard in heard.items()}
+    received, _ = story(channel(Faults()), 120, meddle)
+    sent = {path: {int(data[1:]) for _, data in all_heard} for path, all_heard in received.items()}
     alone, pair = set(range(10, 80)), set(range(10, 60))
     for path, arrived in sent.items():
         lost = set(range(119)) - arrived

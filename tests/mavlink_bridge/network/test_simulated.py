@@ -127,7 +127,7 @@ def test_reordering_lets_the_next_one_pass_whatever_the_spacing() -> None:
 
 def test_a_partition_cuts_both_ways_while_it_lasts_and_only_across() -> None:
     network = SimulatedNetwork([Channel("air", CREW, Faults())], 1, TICK)
-    heard: dict[tuple[str, str], set[int]] = {}
+    received: dict[tuple[str, str], set[int]] = {}
     for step in range(300):
         if step == 100:
             network.cut("air", {"a"})
@@ -135,11 +135,11 @@ def test_a_partition_cuts_both_ways_while_it_lasts_and_only_across() -> None:
             network.heal("air", {"a"})
         for receiver in CREW:
             for _, data in network.receive(step * TICK, receiver):
-                heard.setdefault((data[:1].decode(), receiver), set()).add(int.from_bytes(data[1:], "big"))
+                received.setdefault((data[:1].decode(), receiver), set()).add(int.from_bytes(data[1:], "big"))
         for sender, link in CREW.items():
             network.send(step * TICK, sender, [Datagram(link, sender.encode() + step.to_bytes(4, "big"))])
     whole, outside = set(range(299)), set(range(100)) | set(range(200, 299))
-    for (sender, receiver), steps in heard.items():
+    for (sender, receiver), steps in received.items():
         assert steps == (outside if "a" in (sender, receiver) else whole)
     assert network.counters.dropped == 100 * 4
 
@@ -151,14 +151,14 @@ def story(names: list[str], seed: int, channels: list[str]) -> dict[str, list[tu
     network = SimulatedNetwork(
         [Channel(channel, dict.fromkeys(names, channel), HARSH) for channel in channels], seed, TICK
     )
-    heard: dict[str, list[tuple[int, str, bytes]]] = {name: [] for name in names}
+    received: dict[str, list[tuple[int, str, bytes]]] = {name: [] for name in names}
     for step in range(80):
         now = step * TICK
         for name in names:
-            heard[name] += [(now, *datagram) for datagram in network.receive(now, name)]
+            received[name] += [(now, *datagram) for datagram in network.receive(now, name)]
         for name in names:
             network.send(now, name, [Datagram(channel, f"{name}{step}".encode()) for channel in ("x", "y")])
-    return heard
+    return received
 
 
 @given(st.randoms(use_true_random=False))

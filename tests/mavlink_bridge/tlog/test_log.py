@@ -294,5 +294,5 @@ def test_no_log_of_ours_holds_a_signature_or_a_key() -> None:
         found = [record.frame for record in read_tlog(path)]
         assert len(path.read_bytes()) == sum(8 + len(data) for data in found) + 8 + len(unknown) - 13
     assert all(data[2] == 0 for data in found)
-    heard = [dialect.MAVLink(None).decode(bytearray(data)) for data in found]
-    assert [message.custom_mode for message in heard] == [0, 1, 7, 2]
+    received = [dialect.MAVLink(None).decode(bytearray(data)) for data in found]
+    assert [message.custom_mode for message in received] == [0, 1, 7, 2]

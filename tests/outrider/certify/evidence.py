@@ -41,21 +41,21 @@ def turned(plan: WirePlan, accelerations: Sequence[Integers]) -> WirePlan:
 
 
 def evidence(
-    told: Mapping[int, Sequence[WirePlan]],
+    sent: Mapping[int, Sequence[WirePlan]],
     terms: Terms = TERMS,
     words: Mapping[int, Sequence[Word]] | None = None,
 ) -> Evidence:
     """Every plan of every vehicle is told half an epoch before it begins, and heard by all."""
     said = words or {}
     logs = []
-    for owner in told:
+    for owner in sent:
         sightings = [
             Sighting(owner, sender, plan, plan.epoch - EPOCH // 2, COPIES)
-            for sender, plans in told.items()
+            for sender, plans in sent.items()
             for plan in plans
         ]
         logs.append(Log(owner, tuple(sightings), (), tuple(said.get(owner, ())), 0))
-    return Evidence(terms._replace(fleet=tuple(told)), tuple(logs))
+    return Evidence(terms._replace(fleet=tuple(sent)), tuple(logs))
 
 
 def least_of_samples(one: WirePlan, other: WirePlan, count: int = 41) -> float:

@@ -82,19 +82,19 @@ def test_each_plan_is_told_from_the_one_before(moves: list[list[Integers] | str 
 @given(accelerations, st.integers(0, 3), st.integers(0, 8 * 128 - 1), st.sampled_from([11, 12]))
 def test_one_bit_of_one_log_is_found(move: list[Integers], number: int, bit: int, owner: int) -> None:
     moved = turned(on(A), move)
-    told = {
+    sent = {
         11: [A, moved, on(moved), on(moved, 2)],
         12: [standing(FAR, A.epoch + k * EPOCH) for k in range(4)],
     }
-    assume(judge(evidence(told)).certified)
-    original = told[11][number]
+    assume(judge(evidence(sent)).certified)
+    original = sent[11][number]
     data = bytearray(pack(original))
     data[bit // 8] ^= 1 << bit % 8
     try:
         altered = unpack(bytes(data))
     except PlanWireError:
         return
-    verdict = judge(_replaced(evidence(told), owner, original, altered))
+    verdict = judge(_replaced(evidence(sent), owner, original, altered))
     assert not verdict.certified
     if altered.epoch == original.epoch:
         assert "1 bit differs" in " ".join(finding.figures for finding in verdict.findings)
@@ -219,10 +219,10 @@ def test_who_comes_too_near_is_found_exactly(
     a, b = standing(here), standing(there)
     keeps = min(REQUIRED, least_of_samples(a, b))
     moved = turned(on(a), one), turned(on(b), other)
-    told = {11: [a, moved[0]], 12: [b, moved[1]]}
+    sent = {11: [a, moved[0]], 12: [b, moved[1]]}
     if again:
-        told = {system: [*plans, on(plans[-1])] for system, plans in told.items()}
-    verdict = judge(evidence(told, TERMS._replace(a_max=(1 << 15,) * 3)))
+        sent = {system: [*plans, on(plans[-1])] for system, plans in sent.items()}
+    verdict = judge(evidence(sent, TERMS._replace(a_max=(1 << 15,) * 3)))
     found = NEARER in whats(verdict)
     sampled = least_of_samples(*moved)
     if sampled < keeps - 2e-6:
@@ -256,8 +256,8 @@ def test_a_pair_that_got_apart_has_to_stay_apart() -> None:
     away = turned(on(near), [(1000, 0, 0), (0, 0, 0), (0, 0, 0), (-1000, 0, 0)])
     rests = on(away, STEPS)
     back = turned(on(rests), [(-1000, 0, 0), (0, 0, 0), (1000, 0, 0)])
-    told = [near, *(on(away, k) for k in range(STEPS + 1)), back]
-    verdict = judge(evidence({11: [on(A, k) for k in range(len(told))], 12: told}))
+    sent = [near, *(on(away, k) for k in range(STEPS + 1)), back]
+    verdict = judge(evidence({11: [on(A, k) for k in range(len(sent))], 12: sent}))
     assert whats(verdict) == [NEARER]
     assert verdict.findings[0].time == back.epoch
 
@@ -265,8 +265,8 @@ def test_a_pair_that_got_apart_has_to_stay_apart() -> None:
 def test_after_an_anchor_the_promise_begins_with_the_next_plans_that_are_apart() -> None:
     jumped = standing((2.0, 0.0, 5.0), BEGAN + EPOCH)
     gone = turned(on(jumped, 2), [(-1000, 0, 0)] * 5 + [(1000, 0, 0)] * 5)
-    told = {11: [on(A, k) for k in range(5)], 12: [B, jumped, on(jumped), gone, on(gone)]}
-    verdict = judge(evidence(told))
+    sent = {11: [on(A, k) for k in range(5)], 12: [B, jumped, on(jumped), gone, on(gone)]}
+    verdict = judge(evidence(sent))
     assert kinds(verdict, 12) == [Kind.FIRST, Kind.ANCHOR, Kind.CARRIED_ON, Kind.MADE, Kind.CARRIED_ON]
     assert whats(verdict) == [NEARER]
     assert verdict.findings[0].time == BEGAN + 3 * EPOCH
@@ -292,16 +292,16 @@ def test_who_is_silent_goes_on_as_told() -> None:
 
 def test_whoever_said_farewell_is_no_longer_checked_until_it_is_back() -> None:
     over = standing((0.5, 0.0, 5.0))
-    told = {11: [on(A, k) for k in range(8)], 12: [B, on(B), on(B, 2)]}
+    sent = {11: [on(A, k) for k in range(8)], 12: [B, on(B), on(B, 2)]}
     said = Word(BEGAN + EPOCH // 2, True)
-    document = judge(evidence(told, words={12: [said]})).document()
+    document = judge(evidence(sent, words={12: [said]})).document()
     assert document["certified"]
     assert (document["pairs"], document["unchecked"]["farewell"], document["farewells"]) == (1, 7, 1)
     # It comes back nearer than that, which is where it begins anew.
     back = over._replace(epoch=BEGAN + 5 * EPOCH)
     again = Word(back.epoch - EPOCH, False)
-    told[12] = [B, on(B), back, on(back), on(back, 2)]
-    verdict = judge(evidence(told, words={12: [said, again]}))
+    sent[12] = [B, on(B), back, on(back), on(back, 2)]
+    verdict = judge(evidence(sent, words={12: [said, again]}))
     assert verdict.certified
     assert kinds(verdict, 12) == [Kind.FIRST, Kind.CARRIED_ON, Kind.FIRST, Kind.CARRIED_ON, Kind.CARRIED_ON]
     assert (verdict.pairs.checked, verdict.pairs.farewell) == (4, 4)
@@ -321,8 +321,8 @@ def test_neither_the_order_of_the_logs_nor_that_of_the_vehicles_matters(
     one: list[Integers], other: list[Integers]
 ) -> None:
     c = standing(FAR)
-    told = {11: [A, turned(on(A), one)], 12: [B, turned(on(B), other)], 13: [c, turned(on(c), other)]}
-    whole = evidence(told)
+    sent = {11: [A, turned(on(A), one)], 12: [B, turned(on(B), other)], 13: [c, turned(on(c), other)]}
+    whole = evidence(sent)
     documents = []
     for logs in permutations(whole.logs):
         fleet = tuple(log.owner for log in logs)

@@ -57,7 +57,7 @@ class Bench:
         self.vehicles = vehicles
         self.boots = boots or (0,) * len(vehicles)
         self.now = 0
-        self.heard: list[Message] = []
+        self.received: list[Message] = []
         self._speed, self._passes = speed, passes
         self._mail: list[bytes] = []
         self._sender = Codec()
@@ -112,7 +112,7 @@ class Bench:
                 if self._passes(frame)
             ]
             for data in consultation.step(now + passed, arrived):
-                self.heard += reader.feed(data)
+                self.received += reader.feed(data)
                 self._mail.append(data)
             passed += TICK
         return consultation.examination.verdict()

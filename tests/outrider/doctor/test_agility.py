@@ -84,7 +84,7 @@ def test_every_parameter_that_decides_it_is_asked_for(flavour: str) -> None:
     bench = Bench(autopilot(flavour))
     bench.run(3.0)
     bench.consult()
-    asked = {one.name for one in bench.heard if isinstance(one, ParamRequestRead)}
+    asked = {one.name for one in bench.received if isinstance(one, ParamRequestRead)}
     assert set(stock_parameters(NUMBERS[flavour])) <= asked
 
 

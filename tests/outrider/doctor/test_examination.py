@@ -71,7 +71,7 @@ def sound(verdict: Verdict) -> None:
         assert finding.do or finding.severity in (Severity.OK, Severity.NOTE)
 
 
-def heard(
+def received(
     records: Sequence[tuple[int, Message]], *, log: bool = True, system: int | None = None
 ) -> Examination:
     """An examination of messages and their times (µs)."""
@@ -125,7 +125,7 @@ def test_whatever_arrives_it_asks_nothing_but_what_is_harmless(arriving: list[by
 
 def test_a_flood_of_senders_is_bounded() -> None:
     records = [(k, Heartbeat(Source(1 + k % 250, k // 250 % 250), 2, 3, 0, 0, 3)) for k in range(1000)]
-    examination = heard(records)
+    examination = received(records)
     assert len(examination.hearing.speakers) == MOST
     assert found(examination.verdict(), f"more than {MOST} senders").severity is Severity.WARNING
 
@@ -176,7 +176,7 @@ def positions(north: float, vz_up: bool = False) -> list[tuple[int, Message]]:
 
 @pytest.mark.parametrize(("north", "right"), [(0.0, True), (1.0, True), (10.0, False), (-500.0, False)])
 def test_positions_have_to_agree(north: float, right: bool) -> None:
-    verdict = heard(positions(north)).verdict()
+    verdict = received(positions(north)).verdict()
     finding = found(verdict, "local and global position")
     assert finding.severity is (Severity.OK if right else Severity.BLOCKING)
     assert f"{abs(north):.1f} m" in finding.what
@@ -185,13 +185,14 @@ def test_positions_have_to_agree(north: float, right: bool) -> None:
 @pytest.mark.parametrize("up", [False, True])
 def test_the_sign_of_vz(up: bool) -> None:
     assert (
-        "GLOBAL_POSITION_INT says vz positive when it climbs" in warnings(heard(positions(0.0, up)).verdict())
+        "GLOBAL_POSITION_INT says vz positive when it climbs"
+        in warnings(received(positions(0.0, up)).verdict())
     ) is up
 
 
 def test_an_origin_that_moves() -> None:
     moved = GpsGlobalOrigin(ME, PLACE[0] + 1e-4, PLACE[1], PLACE[2], 0)
-    verdict = heard([*positions(0.0), (30_000_000, moved)]).verdict()
+    verdict = received([*positions(0.0), (30_000_000, moved)]).verdict()
     assert found(verdict, "the origin has moved, by 11.1 m").severity is Severity.WARNING
 
 
@@ -243,7 +244,7 @@ def test_a_parameter_is_what_its_firmware_means(kind: int, value: float, raw: by
 )  # fmt: skip
 def test_what_is_said_of_it(said: Message, words: str, severity: Severity) -> None:
     first = BEAT._replace(source=said.source)
-    verdict = heard([(0, first), (10, said), (1_000_000, said)]).verdict()
+    verdict = received([(0, first), (10, said), (1_000_000, said)]).verdict()
     assert found(verdict, words).severity is severity
 
 
@@ -252,7 +253,7 @@ def test_the_autopilots_own_words_say_why_it_does_not_arm() -> None:
         StatusText(ME, 3, f"PreArm: {why}") for why in ("Compass not healthy", "RC not found")
     ] * 3
     status = SysStatus(ME, 0x10000000, 0x10000000, 0, 12.0, 0.9)
-    verdict = heard([(0, BEAT), *enumerate(texts), (9, status)]).verdict()
+    verdict = received([(0, BEAT), *enumerate(texts), (9, status)]).verdict()
     assert (
         "PreArm: Compass not healthy; PreArm: RC not found." in found(verdict, "the pre-arm check fails").why
     )
@@ -261,7 +262,7 @@ def test_the_autopilots_own_words_say_why_it_does_not_arm() -> None:
 def test_words_that_would_steer_a_terminal_do_not(capsys: pytest.CaptureFixture[str]) -> None:
     text = StatusText(ME, 3, "PreArm: \x1b[2Jgone")
     status = SysStatus(ME, 0x10000000, 0x10000000, 0, 12.0, 0.9)
-    show("it", heard([(0, BEAT), (1, text), (2, status)]).verdict())
+    show("it", received([(0, BEAT), (1, text), (2, status)]).verdict())
     assert "\x1b" not in capsys.readouterr().out
 
 

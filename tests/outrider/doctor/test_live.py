@@ -78,7 +78,7 @@ def test_it_asks_politely_and_changes_nothing(flavour: str) -> None:
     before = vehicle.saved, vehicle.armed, vehicle.custom_mode
     bench.consult()
     assert (vehicle.saved, vehicle.armed, vehicle.custom_mode) == before
-    for message in bench.heard:
+    for message in bench.received:
         assert message.source in (STRANGER, Source(11, COMPONENT))
         match message:
             case Heartbeat():
@@ -89,7 +89,7 @@ def test_it_asks_politely_and_changes_nothing(flavour: str) -> None:
             case _:
                 assert isinstance(message, ParamRequestRead)
                 assert (message.target_system, message.target_component) == (11, 1)
-    questions = [message for message in bench.heard if not isinstance(message, Heartbeat)]
+    questions = [message for message in bench.received if not isinstance(message, Heartbeat)]
     assert len(questions) == len(set(questions))  # all were answered at once
 
 
@@ -102,8 +102,8 @@ def test_streams_are_as_they_were_afterwards() -> None:
     for name in ("LOCAL_POSITION_NED", "ATTITUDE", "SYS_STATUS", "EXTENDED_SYS_STATE"):
         finding = found(verdict, f"{name} comes only when asked")
         assert (finding.severity, "fly asks for" in finding.do) == (Severity.NOTE, True)
-    heard = [message for _ in range(200) for data in bench.tick() for message in Codec().feed(data)]
-    assert {type(message) for message in heard} == {Heartbeat}
+    received = [message for _ in range(200) for data in bench.tick() for message in Codec().feed(data)]
+    assert {type(message) for message in received} == {Heartbeat}
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -155,7 +155,7 @@ def test_a_message_that_does_not_come(number: int, name: str) -> None:
     bench.run(3.0)
     verdict = bench.consult()
     assert blocking(verdict) == [f"{name} does not come"]
-    asked = [one for one in bench.heard if isinstance(one, CommandLong) and one.params[0] == number]
+    asked = [one for one in bench.received if isinstance(one, CommandLong) and one.params[0] == number]
     assert len(asked) == 3  # and then it gives up
 
 
@@ -251,7 +251,7 @@ def test_a_system_that_is_not_there() -> None:
     verdict = bench.consult(7)
     assert blocking(verdict) == ["system 7 is not there; here are 11, 12"]
     assert "--system 11" in verdict.findings[0].do
-    assert all(isinstance(message, Heartbeat) for message in bench.heard)
+    assert all(isinstance(message, Heartbeat) for message in bench.received)
 
 
 def test_nobody() -> None:
@@ -261,8 +261,8 @@ def test_nobody() -> None:
 
 def test_only_a_ground_station() -> None:
     beats = Codec()
-    heard = Bench().consult(seconds=4.0, beside=lambda _now: [beats.encode(Heartbeat(GCS, 6, 8, 0, 0, 4))])
-    assert blocking(heard) == ["no autopilot's HEARTBEAT; only 255/190 can be heard"]
+    received = Bench().consult(seconds=4.0, beside=lambda _now: [beats.encode(Heartbeat(GCS, 6, 8, 0, 0, 4))])
+    assert blocking(received) == ["no autopilot's HEARTBEAT; only 255/190 can be heard"]
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -38,7 +38,7 @@ def empty(flavour: str, passes: Callable[[Frame], bool] = lambda _frame: True) -
 
 
 def asked(bench: Bench) -> int:
-    return sum(isinstance(one, CommandLong) and one.command == RUN_CHECKS for one in bench.heard)
+    return sum(isinstance(one, CommandLong) and one.command == RUN_CHECKS for one in bench.received)
 
 
 def event(name: str, *, modes: int = ALL_MODES, level: int = 3, extra: bytes = CRC_EXTRA) -> bytes:

@@ -36,7 +36,7 @@ class Heard(NamedTuple):
     fields: dict[str, Any]
 
 
-def heard(log: Path) -> list[Heard]:
+def received(log: Path) -> list[Heard]:
     """All of a log, decoded by pymavlink alone; texts up to the first NUL."""
     parser = ardupilotmega.MAVLink(None)
     found = []

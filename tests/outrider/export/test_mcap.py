@@ -21,7 +21,7 @@ from mcap.records import Channel, Message, Schema
 
 from outrider.export.attitude import along_down, quaternions
 from outrider.export.px4_topics import quaternion
-from tests.outrider.export.runs import SYSTEMS, everything, heard
+from tests.outrider.export.runs import SYSTEMS, everything, received
 
 One = tuple[Schema, Channel, Message]
 SCENES = {"vehicles", "paths", "target", "obstacles", "moving", "trails"}
@@ -208,7 +208,7 @@ def test_every_message_of_the_logs_is_there(found: Content, run: Path) -> None:
     for system in SYSTEMS:
         prefix = f"/mavlink/vehicle-{system}/"
         waiting = {topic: iter(rows) for topic, rows in found.values.items() if topic.startswith(prefix)}
-        expected = heard(run / f"vehicle-{system}.tlog")
+        expected = received(run / f"vehicle-{system}.tlog")
         assert sum(len(found.values[topic]) for topic in waiting) == len(expected)
         for message in expected:
             time, value = next(waiting[f"{prefix}{message.system}/{message.component}/{message.name}"])
@@ -246,7 +246,7 @@ def test_any_message_of_the_dialect_can_be_told(tmp_path: Path) -> None:
     for schema, _, message in told.messages:
         Draft202012Validator(json.loads(schema.data)).validate(json.loads(message.data))
     waiting = {topic: iter(rows) for topic, rows in told.values.items()}
-    for message in heard(log):
+    for message in received(log):
         _, value = next(waiting[f"/mavlink/1/1/{message.name}"])
         del value["_link"]
         for name, expected in as_json(message.fields):

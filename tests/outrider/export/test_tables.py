@@ -20,7 +20,7 @@ from outrider.export import mavlink_tables
 from outrider.export.command import export
 from outrider.export.mavlink_tables import HEAD, columns
 from outrider.logs.dialect import identifiers, kind
-from tests.outrider.export.runs import SYSTEMS, Heard, all_same, everything, heard
+from tests.outrider.export.runs import SYSTEMS, Heard, all_same, everything, received
 
 AXES = ("east", "north", "up")
 
@@ -133,7 +133,7 @@ def test_every_message_of_the_logs_is_there(run: Path, found: dict[str, pa.Table
     expected = [
         (one.time, system, one.link, one.system, one.component, one.name, repr(expected_row(one)))
         for system in SYSTEMS
-        for one in heard(run / f"vehicle-{system}.tlog")
+        for one in received(run / f"vehicle-{system}.tlog")
     ]
     assert Counter(rows_of(found)) == Counter(expected)
     assert "lat [degE7]" in found["mavlink/11/GLOBAL_POSITION_INT"].column_names
@@ -146,7 +146,7 @@ def test_any_message_of_the_dialect_becomes_a_row(tmp_path: Path) -> None:
         export(log, form, tmp_path / form, as_json=True)
     found = tables(tmp_path / "parquet")
     waiting = {name: iter(table.to_pylist()) for name, table in found.items()}
-    for message in heard(log):
+    for message in received(log):
         row = next(waiting[f"mavlink/1/{message.name}"])
         assert row.pop("time_us") == message.time
         assert [row.pop(name) for name in HEAD[1:]] == [0, message.link, 1, 1]

@@ -18,7 +18,7 @@ from mavlink_bridge.wire.framing import frame_v2
 from outrider.export.command import export
 from outrider.export.ulog_export import mavlink_topic
 from outrider.logs.dialect import identifiers, kind
-from tests.outrider.export.runs import SYSTEMS, Heard, everything, heard, same
+from tests.outrider.export.runs import SYSTEMS, Heard, everything, received, same
 
 START = 1_700_000_000_000_000
 
@@ -76,7 +76,7 @@ def test_each_vehicle_has_a_file_that_goes_forward(folder: Path) -> None:
 def test_every_message_of_the_log_is_there(run: Path, folder: Path) -> None:
     for system in SYSTEMS:
         log = read(folder / f"vehicle-{system}.ulg")
-        compare(log, heard(run / f"vehicle-{system}.tlog"), zero(log))
+        compare(log, received(run / f"vehicle-{system}.tlog"), zero(log))
 
 
 def test_any_message_of_the_dialect_can_be_told(tmp_path: Path) -> None:
@@ -88,7 +88,7 @@ def test_any_message_of_the_dialect_can_be_told(tmp_path: Path) -> None:
         file.write((START + 40_000_000_000).to_bytes(8, "big") + bytes(heartbeat.pack(mav)))
     export(log, "ulog", tmp_path / "out", as_json=True)
     found = read(tmp_path / "out" / "vehicle-1.ulg")
-    compare(found, heard(log), zero(found))
+    compare(found, received(log), zero(found))
 
 
 def compare(log: ULog, expected: list[Heard], start: int) -> None:
@@ -129,7 +129,7 @@ def test_no_two_fields_have_one_name() -> None:
 def test_positions_are_what_the_autopilot_said(run: Path, folder: Path) -> None:
     for system in SYSTEMS:
         log = read(folder / f"vehicle-{system}.ulg")
-        own = [one for one in heard(run / f"vehicle-{system}.tlog") if one.link == 0]
+        own = [one for one in received(run / f"vehicle-{system}.tlog") if one.link == 0]
         said = [one for one in own if (one.name, one.component) == ("LOCAL_POSITION_NED", 1)]
         data = log.get_dataset("vehicle_local_position").data
         assert (data["timestamp"] + zero(log)).tolist() == [one.time for one in said]
@@ -151,7 +151,7 @@ def test_positions_are_what_the_autopilot_said(run: Path, folder: Path) -> None:
 def test_angles_come_back_out_of_the_quaternions(run: Path, folder: Path) -> None:
     log = read(folder / "vehicle-12.ulg")
     PX4ULog(log).add_roll_pitch_yaw()
-    said = [one.fields for one in heard(run / "vehicle-12.tlog") if one.name == "ATTITUDE"]
+    said = [one.fields for one in received(run / "vehicle-12.tlog") if one.name == "ATTITUDE"]
     data = log.get_dataset("vehicle_attitude").data
     for name in ("roll", "pitch", "yaw"):
         off = np.exp(1j * data[name]) / np.exp(1j * np.array([fields[name] for fields in said]))

@@ -156,14 +156,14 @@ def flight(
         group = f"mcast:239.255.{random.randrange(1, 250)}.{random.randrange(1, 250)}:{base},{HOST}"
         autopilot = f"tcp:{HOST}:{base}" if flavour == "ardupilot" else f"udpin:{HOST}:{base}"
         other = f"tcp:{HOST}:{base + 2}" if flavour == "ardupilot" else f"udpin:{HOST}:{base + 10}"
-        heard, said = open_link(other, WallClock()), open_link(group, WallClock())
-        files.callback(heard.close)
+        received, said = open_link(other, WallClock()), open_link(group, WallClock())
+        files.callback(received.close)
         files.callback(said.close)
         document = yaml.safe_load(find("companions", flavour).read_text(encoding="utf-8"))
         (tmp_path / "own.yaml").write_text(yaml.safe_dump(document | {"system": 1, "clock": clock}))
         config = f"--config={tmp_path / 'own.yaml'}"
         flying = Flying(tmp_path, f"--autopilot={autopilot}", f"--swarm={group}", config, *options)
-        ear = Ear(heard)
+        ear = Ear(received)
         flying.pump += [Target(said, speed).pump, ear.mode]
         try:
             yield flying, ear

@@ -79,10 +79,10 @@ def test_a_dry_run_speaks_in_nobodys_name(orders: list[int]) -> None:
     codec, said = Codec(), []
     for k in range(200):
         stamp = 5_000_000 + 10_000 * k
-        heard = [Heartbeat(VEHICLE, 2, 3, 0, 0, 3)] if k % 100 == 0 else []
-        heard.append(GpsGlobalOrigin(VEHICLE, *ORIGIN, stamp))
-        heard.append(LocalPosition(VEHICLE, stamp, (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)))
-        inbox = [Datagram("autopilot", codec.encode(message)) for message in heard]
+        received = [Heartbeat(VEHICLE, 2, 3, 0, 0, 3)] if k % 100 == 0 else []
+        received.append(GpsGlobalOrigin(VEHICLE, *ORIGIN, stamp))
+        received.append(LocalPosition(VEHICLE, stamp, (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)))
+        inbox = [Datagram("autopilot", codec.encode(message)) for message in received]
         if k == 150:
             asked = [CommandLong(Source(255, 190), 1, COMPONENT, order, 0, (5.0,) * 7) for order in orders]
             inbox += [Datagram("ground", codec.encode(order)) for order in asked]

@@ -94,7 +94,7 @@ def test_what_is_said_again_is_remembered_as_long_as_what_is_new() -> None:
         if k == latest + REMEMBERED // 2:
             # It comes back: for two seconds, as often as one likes.
             for _ in range(30):
-                air.duplicates.heard(Header(*OWN, 33), again)
+                air.duplicates.received(Header(*OWN, 33), again)
                 air.clock.wait_until(air.clock.now() + 100_000)
             assert not air.duplicates.seen
 
@@ -147,7 +147,7 @@ def test_a_go_that_waits_ends_where_a_twin_is_found(beside: bool) -> None:
         now = wall.now()
         if beside and tick % 20 == 0:
             said = GlobalPosition(own, tick, 47.4, 8.5, 500.0, 12.0, (0.0, 0.0, 0.0), None)
-            duplicates.heard(header, codec.encode(said))
+            duplicates.received(header, codec.encode(said))
         # Not ready for want of a position until the twin is known, and ready then.
         autopilot.mute = tick < 400
         inbox = [Datagram("autopilot", autopilot.step(now, back)), *([go] if tick == 100 else [])]

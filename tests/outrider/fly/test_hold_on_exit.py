@@ -48,8 +48,8 @@ def test_it_is_said_even_in_a_hurry() -> None:
     clock = SimulatedClock(5_000_000)
     word = LastWord(1, BEAT)
     farewell(word, here, clock, lambda: True)
-    heard = [message for data in there.receive() for message in Codec().feed(data)]
-    assert len([m for m in heard if isinstance(m, CommandLong) and m.command == 176]) >= 2
+    received = [message for data in there.receive() for message in Codec().feed(data)]
+    assert len([m for m in received if isinstance(m, CommandLong) and m.command == 176]) >= 2
     assert clock.now() - 5_000_000 < 1_000_000
 
 

@@ -25,11 +25,11 @@ from outrider.fly.link_budget import (
     carried,
     doubts,
     doubts_of_autopilot,
+    reported,
     room,
     said,
     said_by_target,
     steered,
-    told,
 )
 from outrider.scenarios.fly_config import RADIOS, FleetOrigin, FlyConfig
 from sitl.config.autopilot import AutopilotConfig
@@ -125,7 +125,7 @@ def doubt(baud: int, config: FlyConfig = FAST, *, signed: bool = False, dry_run:
 def test_a_slow_line_to_the_autopilot_is_doubted(signed: bool, dry_run: bool) -> None:
     assert doubt(115200, signed=signed, dry_run=dry_run) == ""
     narrow = doubt(57600, signed=signed, dry_run=dry_run)
-    assert f"{told(signed):.0f}, of 5760 bytes/s" in narrow
+    assert f"{reported(signed):.0f}, of 5760 bytes/s" in narrow
     assert narrow.endswith("needed: 115200 baud")
     # Nothing steers in a dry run.
     assert (f"set-points take {steered(FAST.settings, signed):.0f}" in narrow) is not dry_run
@@ -171,7 +171,7 @@ def test_what_an_autopilot_says_is_what_is_stated(flavour: Flavour, estimator: i
                 sizes[int.from_bytes(data[7:10], "little")] += size
                 data = data[size:]
     counted = sum(sizes[number] for number in (0, *wanted))
-    stated = SECONDS * told(key is not None)
+    stated = SECONDS * reported(key is not None)
     # Zeros at a message's end are left out, and the time may begin and end with one of each kind.
     assert 0.97 * stated < counted <= stated + 300
 

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from companion import node
 from companion.flight.setpoint import setpoint
+from companion.planning import setpoints
 from mavlink_bridge.messages import LocalPosition, SetpointLocal
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
@@ -184,8 +184,8 @@ def test_what_is_not_sound_is_found_out(
         count += 1
         return mutant(setpoint(*arguments), count)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(node, "setpoint", mutated)
-    monkeypatch.setattr(node, "is_finite", lambda _message: True)
+    monkeypatch.setattr(setpoints, "setpoint", mutated)
+    monkeypatch.setattr(setpoints, "is_finite", lambda _message: True)
     ended = dry_run_of_log(run, piece, "ardupilot", 9)
     wrong = [line for line in ended.err.splitlines() if line.startswith("wrong: ")]
     assert ended.status == (1 if words else 0)

@@ -58,10 +58,10 @@ def test_the_others_are_told_at_once_by_who_follows_one_that_knew(
     codec, said = Codec(), 0
     for k in range(200):
         stamp = 5_000_000 + 10_000 * k
-        heard = [Heartbeat(VEHICLE, 2, 3, 0, 0, 3)] if k % 100 == 0 else []
-        heard.append(GpsGlobalOrigin(VEHICLE, *ORIGIN, stamp))
-        heard.append(LocalPosition(VEHICLE, stamp, (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)))
-        inbox = [Datagram("autopilot", codec.encode(message)) for message in heard]
+        received = [Heartbeat(VEHICLE, 2, 3, 0, 0, 3)] if k % 100 == 0 else []
+        received.append(GpsGlobalOrigin(VEHICLE, *ORIGIN, stamp))
+        received.append(LocalPosition(VEHICLE, stamp, (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)))
+        inbox = [Datagram("autopilot", codec.encode(message)) for message in received]
         said += sum(datagram.link == "swarm" for datagram in supervised.step(wall.now(), inbox))
         wall.wait_until(wall.now() + 10_000)
     assert (said >= 10) if found is False else (said == 0)

@@ -24,7 +24,7 @@ def test_the_first_news_may_take_its_time_and_the_next_may_not() -> None:
     watchdog = Watchdog(100.0)
     assert looked(watchdog, 100.0, FIRST) is None
     assert looked(Watchdog(100.0), 100.0, 60.0) == pytest.approx(FIRST, abs=2 * LOOK)
-    watchdog.heard(110.0)
+    watchdog.received(110.0)
     assert looked(watchdog, 110.0, 60.0) == pytest.approx(HUNG, abs=2 * LOOK)
 
 
@@ -32,7 +32,7 @@ def test_who_was_held_up_himself_judges_nobody() -> None:
     watchdog = Watchdog(0.0)
     now = 0.0
     for _ in range(20):
-        watchdog.heard(now)
+        watchdog.received(now)
         now += 30.0
         assert not watchdog.stopped(now)
         # What waited is heard then.

@@ -116,10 +116,10 @@ def test_rows_of_the_board_do_not_touch() -> None:
 class Listener:
     def __init__(self, name: str) -> None:
         self.name = name
-        self.heard: list[Datagram] = []
+        self.received: list[Datagram] = []
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        self.heard += inbox
+        self.received += inbox
         return []
 
 
@@ -136,7 +136,7 @@ def test_what_no_node_of_the_run_sent_is_dropped_and_counts_nowhere(strange: lis
         behind = rough(FLEET, node, senders)
         for tick in range(40):
             behind.step(tick * 2_500, strange)
-        assert node.heard == []
+        assert node.received == []
         assert (
             behind.network.counters.sent == behind.network.counters.unrouted == behind.network.under_way == 0
         )
@@ -149,7 +149,7 @@ def test_the_own_echo_is_a_stranger_and_a_companion_is_none() -> None:
     behind.step(0, [Datagram("swarm", frame) for frame in frames])
     assert behind.network.counters.sent == 1
     behind.step(10**6, [])
-    assert node.heard == [Datagram("swarm", frames[1])]
+    assert node.received == [Datagram("swarm", frames[1])]
 
 
 def test_two_runs_have_groups_of_their_own_even_on_the_same_ports(monkeypatch: pytest.MonkeyPatch) -> None:

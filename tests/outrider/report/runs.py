@@ -158,8 +158,8 @@ def _write_logs(
                     own = [Heartbeat(autopilot, 13, 3, ARMED if tenth else 0, mode, 4)]
                     records += [(now, system, 0, link.encode(beat)) for beat in own]
                 east, north, up = velocity.tolist()
-                told = LocalPosition(autopilot, now - BOOT, (0.0, 0.0, 0.0), (north, east, -up))
-                records.append((now, system, 0, link.encode(told)))
+                sent = LocalPosition(autopilot, now - BOOT, (0.0, 0.0, 0.0), (north, east, -up))
+                records.append((now, system, 0, link.encode(sent)))
                 for m, message in enumerate(said):
                     data = swarm.encode(message)
                     records.append((now, system, 1, data))

@@ -22,10 +22,10 @@ NONE = np.empty(0, dtype=np.int64)
 
 
 def log_of(*said: Said) -> Log:
-    told = Stream(NONE, NONE, NONE)
+    sent = Stream(NONE, NONE, NONE)
     uttered = tuple(Utterance(1000 * n, one) for n, one in enumerate(said))
     report = TlogReport(len(said), 0, 0, 0, 0, False)
-    return Log(11, 0, 1000, told, {}, NONE, np.empty((0, 3)), uttered, report)
+    return Log(11, 0, 1000, sent, {}, NONE, np.empty((0, 3)), uttered, report)
 
 
 def beat(custom: int, base: int = 0, autopilot: int = 3) -> Heartbeat:

@@ -87,9 +87,9 @@ def test_a_stamp_that_is_damaged_makes_no_flight_of_years(tmp_path: Path) -> Non
     run = read(leave(tmp_path, lost=some).directory)
     log, *others = run.logs
     for damaged in (1 << 61, -(1 << 61)):
-        time = log.told.time.copy()
+        time = log.sent.time.copy()
         time[5] = damaged
-        found = in_order(run, [log._replace(told=log.told._replace(time=time)), *others])
+        found = in_order(run, [log._replace(sent=log.sent._replace(time=time)), *others])
         assert len(found.by_second) < 60
 
 

@@ -51,14 +51,14 @@ def sphere(way: np.ndarray, speed: float = 1.5, **more: Any) -> MovingObstacle:
 def said(node: MovingObstacle, seconds: float, begin: float) -> list[tuple[int, Message]]:
     """What it says, and when; it sets out at ``begin`` (s)."""
     codec = Codec()
-    heard = []
+    received = []
     for now in range(START, START + round(1e6 * seconds), TICK):
         if now == START + round(1e6 * begin):
             node.begin(now)
         for datagram in node.step(now, [Datagram("swarm", b"whatever")]):
             assert datagram.link == "swarm"
-            heard += [(now, message) for message in codec.feed(datagram.data)]
-    return heard
+            received += [(now, message) for message in codec.feed(datagram.data)]
+    return received
 
 
 # The node
@@ -68,11 +68,11 @@ def said(node: MovingObstacle, seconds: float, begin: float) -> list[tuple[int, 
 @given(WAYS, st.floats(0.2, 3.0), st.sampled_from([1.0, 5.0, 10.0]), st.booleans())
 def test_it_says_where_it_is_at_its_stamp(way: np.ndarray, speed: float, rate: float, plans: bool) -> None:
     node = sphere(way, speed, rate_hz=rate, shares_plan=plans)
-    heard = said(node, 4.0, begin=1.0)
-    positions = [(now, m) for now, m in heard if isinstance(m, GlobalPosition)]
+    received = said(node, 4.0, begin=1.0)
+    positions = [(now, m) for now, m in received if isinstance(m, GlobalPosition)]
     assert [now - START for now, _ in positions] == [round(k * 1e6 / rate) for k in range(round(4 * rate))]
-    assert {m.source for _, m in heard} == {Source(190, 1)}
-    assert sum(isinstance(m, Tunnel) for _, m in heard) == plans * len(positions)
+    assert {m.source for _, m in received} == {Source(190, 1)}
+    assert sum(isinstance(m, Tunnel) for _, m in received) == plans * len(positions)
     for now, message in positions:
         assert message.time_boot == now - START
         there = FLEET.to_enu(message.latitude, message.longitude, message.altitude)
@@ -115,8 +115,8 @@ def test_its_plan_is_where_it_will_be(way: np.ndarray, speed: float, since: int)
 
 def test_it_stands_until_the_goal_event_and_then_sets_out() -> None:
     node = sphere(bent_ring(5, 1), 2.0, setting_out=0.5)
-    heard = said(node, 8.0, begin=2.0)
-    positions = [(now, message) for now, message in heard if isinstance(message, GlobalPosition)]
+    received = said(node, 8.0, begin=2.0)
+    positions = [(now, message) for now, message in received if isinstance(message, GlobalPosition)]
     speeds = {now - START: np.linalg.norm(message.velocity_ned) for now, message in positions}
     assert {speeds[k * 100_000] for k in range(21)} == {0.0}
     assert speeds[4_000_000] == pytest.approx(1.0, abs=0.02)

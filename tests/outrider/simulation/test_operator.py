@@ -24,12 +24,12 @@ class Bench:
     def __init__(self) -> None:
         self.operator = Operator(FLEET)
         self.now = 0
-        self.heard: list[tuple[int, CommandInt | CommandLong]] = []
+        self.received: list[tuple[int, CommandInt | CommandLong]] = []
         self._codec = Codec()
 
     def run(self, seconds: float, *answers: Message) -> list[CommandInt | CommandLong]:
         """Time passes, ``answers`` come at its start; what was sent meanwhile."""
-        before = len(self.heard)
+        before = len(self.received)
         data = b"".join(Codec().encode(answer) for answer in answers)
         for k in range(round(seconds * 1e6 / TICK)):
             inbox = [Datagram(LINK, data)] if data and k == 0 else []
@@ -37,9 +37,9 @@ class Bench:
                 assert datagram.link == LINK
                 for message in self._codec.feed(datagram.data):
                     assert isinstance(message, CommandInt | CommandLong)
-                    self.heard.append((self.now, message))
+                    self.received.append((self.now, message))
             self.now += TICK
-        return [message for _, message in self.heard[before:]]
+        return [message for _, message in self.received[before:]]
 
 
 def ack(system: int, command: int, result: int = 0) -> CommandAck:
@@ -50,7 +50,7 @@ def test_an_order_is_repeated_each_half_second_until_it_is_acknowledged() -> Non
     bench = Bench()
     bench.operator.take_off(11, 5.0)
     assert len(bench.run(2.2)) == 5
-    assert np.diff([time for time, _ in bench.heard]).tolist() == [500_000] * 4
+    assert np.diff([time for time, _ in bench.received]).tolist() == [500_000] * 4
     assert bench.operator.unanswered == [11]
     assert bench.run(3.0, ack(11, NAV_TAKEOFF)) == []
     assert bench.operator.unanswered == []

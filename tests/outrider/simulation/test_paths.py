@@ -70,20 +70,20 @@ def test_it_says_where_it_is_and_how_fast() -> None:
         kind="path", through=((10.0, 0.0, 0.0), (0.0, 10.0, 0.0), (-10.0, 0.0, 0.0)), speed=2.0
     )
     walking, codec = Walking(config, FLEET), Codec()
-    heard = []
+    received = []
     for now in range(0, 10_000_000, 10_000):
         if now == 2_000_000:
             walking.begin(now)
         for datagram in walking.step(now, []):
-            heard += [(now, message) for message in codec.feed(datagram.data)]
-    assert len(heard) == 50
-    for now, message in heard:
+            received += [(now, message) for message in codec.feed(datagram.data)]
+    assert len(received) == 50
+    for now, message in received:
         assert isinstance(message, GlobalPosition)
         there = FLEET.to_enu(message.latitude, message.longitude, message.altitude)
         truth = walking.motion(now)
         np.testing.assert_allclose(there, truth.position, atol=0.02)
         np.testing.assert_allclose(ned_to_enu(message.velocity_ned), truth.velocity, atol=0.01)
-    speeds = [np.linalg.norm(walking.motion(now).velocity) for now, _ in heard]
+    speeds = [np.linalg.norm(walking.motion(now).velocity) for now, _ in received]
     assert max(speeds[:10]) == 0.0
     assert speeds[-1] == pytest.approx(2.0)
     # From rest it sets out at 1 m/s².

@@ -255,10 +255,10 @@ def test_who_listens_sees_no_plan_of_who_is_disarmed(armed: bool) -> None:
 
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
-def test_whatever_is_heard_harms_nobody(heard: list[bytes]) -> None:
+def test_whatever_is_heard_harms_nobody(received: list[bytes]) -> None:
     ear = Ear()
     listener = Listener([ear], [True], 10, "")
-    ear.arrived = list(heard)
+    ear.arrived = list(received)
     assert listener.poll(0.0) == ()
 
 

@@ -52,10 +52,10 @@ def test_telemetry_tells_the_estimate():
     rig.steer(1.0, HERE)
     told = 0
     for k in range(400):
-        heard = len(rig.heard)
+        received = len(rig.received)
         rig.step(*((HERE,) if k % 4 == 0 else ()))
         believed = rig.autopilot.estimate
-        for _, message in rig.heard[heard:]:
+        for _, message in rig.received[received:]:
             if isinstance(message, LocalPosition):
                 told += 1
                 np.testing.assert_allclose(message.position_ned, believed.position, atol=1e-5)
@@ -76,7 +76,7 @@ def test_positions_fail_to_come_now_and_then_and_attitudes_do_not():
     rig = in_air(sensors="gnss")
     rig.run(60.0)
     for kind, longest in ((LocalPosition, (0.1, 0.45)), (Attitude, (0.019, 0.021))):
-        times = np.array([now for now, message in rig.heard if isinstance(message, kind)]) * 1e-6
+        times = np.array([now for now, message in rig.received if isinstance(message, kind)]) * 1e-6
         assert longest[0] < np.diff(times).max() < longest[1]
 
 

@@ -93,7 +93,7 @@ def test_beyond_its_fence_it_is_not_armed_and_says_so():
     assert "Arming refused: outside of the fence" in rig.texts
     assert rig.order(ARM, 1, 21196) == [ACCEPTED]
     # It says it again by itself.
-    rig.heard.clear()
+    rig.received.clear()
     rig.order(ARM, 0)
     rig.run(61.0)
     assert rig.texts.count("PreArm: outside of the fence") == 2
@@ -192,7 +192,7 @@ def test_with_an_empty_battery_the_motors_stop(flavour):
     assert not rig.autopilot.armed
     assert "Battery empty: motors stopped" in rig.texts
     assert -rig.position[2] < 0.2
-    rig.heard.clear()
+    rig.received.clear()
     rig.order(ARM, 1)
     assert not rig.autopilot.armed
 

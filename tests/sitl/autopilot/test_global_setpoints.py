@@ -84,7 +84,7 @@ def test_unknown_frames_stop_an_arducopter_and_nothing_else():
     ardupilot, px4 = Rig("ardupilot").hover(5.0), Rig("px4").hover(5.0)
     for rig in (ardupilot, px4):
         rig.steer(2.0, setpoint(VELOCITY_YAW, velocity=(1.0, 0.0, 0.0)))
-        rig.heard.clear()
+        rig.received.clear()
         rig.run(0.5, on_globe(50.0, 0.0, 5.0, frame=11), setpoint(VELOCITY_YAW, velocity=(1.0, 0.0, 0.0)))
     assert "Set-point stops: frame 11" in ardupilot.texts
     assert "Set-point refused: frame 11" in px4.texts
@@ -101,7 +101,7 @@ def test_places_that_do_not_exist_are_refused(flavour, x):
     rig.steer(1.0, setpoint(ALL, (0.0, 0.0, -5.0)))
     bad = on_globe(0.0, 0.0, 5.0)._replace(x=x)
     nan = on_globe(0.0, 0.0, NAN)
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(0.3, bad, nan)
     assert sorted(rig.texts) == [
         "Set-point refused: no such place on the globe",
@@ -149,7 +149,7 @@ def test_an_arducopter_climbs_by_thrust_and_stops_when_it_is_told_no_more():
 def test_a_bad_attitude_is_refused_with_its_reason(flavour, bad, why):
     rig = Rig(flavour).hover(5.0)
     rig.steer(1.0, setpoint(ALL, (0.0, 0.0, -5.0)))
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(0.3, bad)
     assert rig.texts == [f"Attitude refused: {why}"]
     assert rig.speed < 0.02

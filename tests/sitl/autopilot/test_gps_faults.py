@@ -35,7 +35,7 @@ def hovering(flavour="ardupilot", weather=None, **settings):
 def test_it_coasts_as_long_as_its_filter_trusts_itself_and_lands_blind(flavour):
     rig = hovering(flavour)
     rig.autopilot.lose_gps()
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(PATIENCE[flavour] - 0.1, HERE)
     assert rig.autopilot.mode is Mode.GUIDED
     told = [len(rig.all(kind)) for kind in (LocalPosition, GlobalPosition)]
@@ -53,7 +53,7 @@ def test_it_coasts_as_long_as_its_filter_trusts_itself_and_lands_blind(flavour):
     assert rig.autopilot.mode is Mode.LAND
     assert TEXTS[flavour] in rig.texts
     assert [len(rig.all(kind)) for kind in (LocalPosition, GlobalPosition)] == told
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(1.5)
     assert len(rig.all(Attitude)) >= 70
     assert {m.flags & 0x1FF for m in rig.all(EkfStatus)} <= {0xA5}

@@ -145,7 +145,7 @@ def test_commands_are_acknowledged_and_refusals_explained(case):
     rig.run(1.1)
     for command in case.before:
         assert rig.order(*command) == [ACCEPTED]
-    rig.heard.clear()
+    rig.received.clear()
     assert rig.order(*case.command) == [case.result]
     refusals = [text for text in rig.texts if text != "Armed"]
     assert refusals == ([] if case.text is None else [case.text])

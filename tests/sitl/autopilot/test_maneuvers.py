@@ -29,11 +29,11 @@ def place(north, east):
 def reposition(rig, north, east, up, *, speed=-1.0, flags=0, yaw=NAN, frame=ABOVE_HOME):
     """The results of a DO_REPOSITION as COMMAND_INT."""
     latitude, longitude = place(north, east)
-    seen = len(rig.heard)
+    seen = len(rig.received)
     params = (speed, float(flags), 0.0, yaw)
     where = round(latitude * 1e7), round(longitude * 1e7), up
     rig.step(CommandInt(PILOT, 11, 1, frame, REPOSITION, params, *where))
-    return [m.result for _, m in rig.heard[seen:] if isinstance(m, CommandAck)]
+    return [m.result for _, m in rig.received[seen:] if isinstance(m, CommandAck)]
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -277,7 +277,7 @@ def test_checks_say_what_speaks_against_arming(flavour):
     prefix = "PreArm: " if flavour == "ardupilot" else "Preflight Fail: "
     assert rig.texts == [f"{prefix}no position yet"]
     rig.run(1.1)
-    rig.heard.clear()
+    rig.received.clear()
     assert rig.order(CHECK) == [ACCEPTED]
     assert rig.texts == []
 
@@ -370,8 +370,8 @@ def test_a_stop_outside_guided_stops_nothing():
 def test_what_cannot_be_told_is_left_out_and_the_rest_is_told():
     rig = Rig("ardupilot").hover(5.0)
     rig.autopilot._navigation.home.altitude = -3.0e6
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(2.0)
     assert rig.all(GlobalPosition) == []
     assert len(rig.all(Attitude)) > 50
-    assert rig.autopilot.untold > 0
+    assert rig.autopilot.not_encoded > 0

@@ -293,7 +293,7 @@ def test_a_system_id_counts_from_the_next_boot():
     client = Client(Rig("ardupilot"))
     client.send(setting("SYSID_THISMAV", 42, 4, "ardupilot"))
     client.wait(2.0)
-    assert {m.get_srcSystem() for m in client.heard} == {11}
+    assert {m.get_srcSystem() for m in client.received} == {11}
     reborn = Autopilot(client.rig.config, FIREFLY, SITE, seed=1, saved=client.rig.autopilot.saved)
     assert reborn.name == "sitl-42"
 

@@ -105,19 +105,19 @@ def test_data_streams_set_the_rate_of_a_group_in_ardupilot_alone():
     for client, counts in ((ap, (4, 20)), (px, (50, 50))):
         for rate, start, total in ((4, 1, counts[0]), (20, 1, counts[1])):
             client.send(ask(EXTRA1, rate, start))
-            client.heard.clear()
+            client.received.clear()
             client.wait(1.0)
             assert len(client.of("ATTITUDE")) == total
     ap.send(ask(ALL_STREAM, 4, 0))
-    ap.heard.clear()
+    ap.received.clear()
     ap.wait(1.0)
-    assert {m.get_type() for m in ap.heard} <= {
+    assert {m.get_type() for m in ap.received} <= {
         "HEARTBEAT",
         "POSITION_TARGET_LOCAL_NED",
         "EXTENDED_SYS_STATE",
     }
     ap.send(ask(ALL_STREAM, 1000))
-    ap.heard.clear()
+    ap.received.clear()
     ap.wait(0.2)
     assert ap.of("VFR_HUD")
 
@@ -149,10 +149,10 @@ NORMAL = {
 def test_normal_streams_are_what_ground_stations_live_on(flavour):
     client = Client(Rig(flavour, streams="normal", battery=BatteryConfig()))
     client.wait(5.0)
-    heard = {m.get_type() for m in client.heard}
-    assert heard >= NORMAL
-    assert ("EKF_STATUS_REPORT" in heard) == (flavour == "ardupilot")
-    assert ("ESTIMATOR_STATUS" in heard) == ("ALTITUDE" in heard) == (flavour == "px4")
+    received = {m.get_type() for m in client.received}
+    assert received >= NORMAL
+    assert ("EKF_STATUS_REPORT" in received) == (flavour == "ardupilot")
+    assert ("ESTIMATOR_STATUS" in received) == ("ALTITUDE" in received) == (flavour == "px4")
 
 
 def test_no_fence_is_breached():
@@ -165,7 +165,7 @@ def test_no_fence_is_breached():
 def test_quiet_ones_say_no_more_than_before(flavour):
     client = Client(Rig(flavour))
     client.wait(5.0)
-    assert not {m.get_type() for m in client.heard} & (
+    assert not {m.get_type() for m in client.received} & (
         NORMAL
         - {
             "HEARTBEAT",
@@ -307,7 +307,7 @@ def test_gps_and_filter_come_up_in_stages():
 def test_a_position_is_told_alike_by_all_messages(flavour):
     client = Client(Rig(flavour, streams="normal").hover(5.0))
     client.wait(1.0)
-    client.heard.clear()
+    client.received.clear()
     for message_id in (24, 33, 74, 31, 30):
         client.command(REQUEST, message_id)
     gps, place, hud = (client.of(n)[-1] for n in ("GPS_RAW_INT", "GLOBAL_POSITION_INT", "VFR_HUD"))

@@ -45,7 +45,7 @@ def assert_unmoved_and_answered(rig, message):
     """Streams the message for 0.6 s, after a second in which every complaint becomes due again."""
     good = setpoint(ALL, (0.0, 0.0, -5.0))
     rig.run(1.0, good)
-    rig.heard.clear()
+    rig.received.clear()
     tracks = []
     for k in range(120):
         rig.step(*((message, good) if k % 4 == 0 else ()))
@@ -119,7 +119,7 @@ def test_a_bad_set_point_leaves_the_flight_as_it_was(flavour):
 
 def test_complaints_come_once_per_reason_and_second():
     rig = Rig("ardupilot").hover(3.0)
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(3.0, setpoint(frame=0), setpoint(POSITION_YAW, (math.nan, 0.0, 0.0)))
     assert sorted(rig.texts) == 3 * ["Set-point refused: position not a number"] + 3 * [
         "Set-point stops: frame 0"
@@ -140,7 +140,7 @@ def test_set_points_outside_guided_do_nothing():
     for flavour in FLAVOURS:
         rig = Rig(flavour).hover(4.0)
         rig.order(176, *((1, 5) if flavour == "ardupilot" else (1, 4, 3)))
-        rig.heard.clear()
+        rig.received.clear()
         rig.run(1.0, setpoint(position=(9.0, 9.0, -9.0)))
         np.testing.assert_allclose(rig.position, [0, 0, -4], atol=0.03)
         assert rig.texts == (["Set-point ignored: not in GUIDED"] if flavour == "ardupilot" else [])
@@ -270,7 +270,7 @@ def test_landing_ends_the_say_of_set_points(flavour):
 @pytest.mark.parametrize(("flavour", "yaws"), [("ardupilot", 0), ("px4", 1)])
 def test_what_is_followed_is_echoed(flavour, yaws):
     rig = Rig(flavour).hover(5.0)
-    rig.heard.clear()
+    rig.received.clear()
     rig.steer(2.0, setpoint(ALL, (0.0, 0.0, -5.0), yaw=0.5))
     echoes = rig.all(PositionTarget)
     assert len(echoes) == 20
@@ -330,13 +330,13 @@ def test_px4_comes_back_to_offboard_after_a_landing_and_fails_its_checks_there_w
     assert rig.autopilot.mode is Mode.GUIDED
 
     def passes():
-        rig.heard.clear()
+        rig.received.clear()
         rig.run(1.1, *every)
         return bool(rig.all(SysStatus)[-1].health & 0x10000000)
 
     every: tuple[SetpointLocal, ...] = ()
     assert not passes()
-    rig.heard.clear()
+    rig.received.clear()
     assert rig.order(CHECK) == [0]
     assert rig.texts == ["Preflight Fail: no offboard signal"]
     every = (stay,)
@@ -350,7 +350,7 @@ def test_px4_comes_back_to_offboard_after_a_landing_and_fails_its_checks_there_w
 def test_a_px4_in_flight_has_nothing_against_its_mode():
     rig = Rig("px4").hover(3.0)
     assert rig.order(SET_MODE, 1, 4, 5) == [0]
-    rig.heard.clear()
+    rig.received.clear()
     assert rig.order(CHECK) == [0]
     assert rig.texts == []
 
@@ -368,6 +368,6 @@ def test_an_arducopter_passes_its_checks_in_whatever_mode():
 def test_an_arducopter_that_talks_to_people_tells_of_another_mode_at_once(streams, beats):
     rig = Rig("ardupilot", streams=streams)
     rig.run(1.5)
-    rig.heard.clear()
+    rig.received.clear()
     assert rig.guided() == [0]
     assert [m.custom_mode for m in rig.all(Heartbeat)] == [4] * beats

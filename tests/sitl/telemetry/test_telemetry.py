@@ -69,10 +69,10 @@ def test_it_is_a_node():
 def test_every_message_comes_at_its_rate_to_the_microsecond(tick):
     rig = Rig(tick=tick)
     rig.run(2.0)
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(10.0)
     for kind, hz in RATES:
-        times = [now for now, m in rig.heard if isinstance(m, kind)]
+        times = [now for now, m in rig.received if isinstance(m, kind)]
         assert len(times) == round(10 * hz)
         assert set(np.diff(times)) <= {round(1e6 / hz)}
     assert len(rig.all(EkfStatus)) == 10
@@ -89,7 +89,7 @@ def test_rates_are_set_reset_and_switched_off():
     rig.run(2.0)
     for interval, count in ((100_000, 10), (5_000, 200), (-1, 0), (0, 50)):
         assert rig.order(INTERVAL, 32, interval) == [0]
-        rig.heard.clear()
+        rig.received.clear()
         rig.run(1.0)
         assert len(rig.all(LocalPosition)) == count
 
@@ -97,7 +97,7 @@ def test_rates_are_set_reset_and_switched_off():
 def test_a_slow_clock_gets_each_message_at_most_once_a_step():
     rig = Rig(tick=100_000)
     rig.run(5.0)
-    rig.heard.clear()
+    rig.received.clear()
     rig.run(10.0)
     assert len(rig.all(LocalPosition)) == 100
     assert len(rig.all(GlobalPosition)) == 100
@@ -134,7 +134,7 @@ def test_position_comes_with_readiness_and_the_origin_with_it():
 def test_what_is_for_others_is_left_alone(to):
     rig = Rig()
     rig.run(1.1)
-    rig.heard.clear()
+    rig.received.clear()
     assert rig.order(ARM, 1, to=to) == []
     rig.step(setpoint(frame=99, to=to))
     assert rig.texts == []

@@ -66,8 +66,8 @@ def show(name: str, verdict: Verdict) -> None:
     console.print(Text(f"{name} · {word}"), soft_wrap=True)
     console.print(table)
     lines = [verdict.line(finding) for finding in verdict.findings]
-    told = [f"anchor: {system}, {verdict.seconds(epoch):g} s" for system, epoch in anchors]
-    for group in (lines, told):
+    sent = [f"anchor: {system}, {verdict.seconds(epoch):g} s" for system, epoch in anchors]
+    for group in (lines, sent):
         for line in group[:MOST_SHOWN]:
             console.print(Text(line), soft_wrap=True)
         if len(group) > MOST_SHOWN:

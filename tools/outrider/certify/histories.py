@@ -79,8 +79,8 @@ def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, li
             of_it = [sighting for sighting in found if sighting.plan == plan]
             flaw = _flaw(plan, terms, [sighting.time for sighting in of_it])
             if flaw is None:
-                last_told = max((s.time for s in of_it if s.owner == system), default=0)
-                sound.append((sum(s.copies for s in of_it), last_told, plan))
+                last_sent = max((s.time for s in of_it if s.owner == system), default=0)
+                sound.append((sum(s.copies for s in of_it), last_sent, plan))
             else:
                 findings.append(Finding(flaw[0], (system,), of_it[0].time, flaw[1]))
         if sound:
@@ -95,18 +95,18 @@ def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, li
 def _disagreements(system: int, found: Sequence[Sighting], *, logged: bool) -> list[Finding]:
     """Return differences among the plans sent, and between those sent and received; all are of one epoch."""
     epoch = found[0].plan.epoch
-    told = list(dict.fromkeys(sighting.plan for sighting in found if sighting.owner == system))
-    heard = [sighting for sighting in found if sighting.owner != system and sighting.plan not in told]
+    sent = list(dict.fromkeys(sighting.plan for sighting in found if sighting.owner == system))
+    received = [sighting for sighting in found if sighting.owner != system and sighting.plan not in sent]
     findings = []
-    if len(told) > 1:
-        figures = f"{len(told)} plans; {_differ(told[-1], told[:-1])}"
+    if len(sent) > 1:
+        figures = f"{len(sent)} plans; {_differ(sent[-1], sent[:-1])}"
         findings.append(Finding("two plans told of one epoch", (system,), epoch, figures))
-    if heard and logged and not told:
-        hearers = tuple(sorted({sighting.owner for sighting in heard}))
+    if received and logged and not sent:
+        hearers = tuple(sorted({sighting.owner for sighting in received}))
         what = "a plan heard that its sender did not tell"
-        return [Finding(what, (system, *hearers), heard[0].time, f"its epoch is {epoch} µs")]
-    reference = told or [heard[0].plan] if heard else []
-    for sighting in heard:
+        return [Finding(what, (system, *hearers), received[0].time, f"its epoch is {epoch} µs")]
+    reference = sent or [received[0].plan] if received else []
+    for sighting in received:
         if sighting.plan not in reference:
             figures = _differ(sighting.plan, reference)
             findings.append(Finding("a plan altered", (system, sighting.owner), epoch, figures))
@@ -140,10 +140,10 @@ def _flaw(plan: WirePlan, terms: Terms, seen: Sequence[int]) -> tuple[str, str] 
 
 def _leaves(own: Log, plans: Sequence[WirePlan]) -> Iterable[Leave]:
     """Yield each farewell, with the first of ``plans`` that was sent after the farewell was withdrawn."""
-    told = {sighting.plan: sighting.time for sighting in own.sightings if sighting.sender == own.owner}
+    sent = {sighting.plan: sighting.time for sighting in own.sightings if sighting.sender == own.owner}
     for word, following in zip_longest(own.words, own.words[1:]):
         if word.farewell:
-            again = [] if following is None else [p.epoch for p in plans if told.get(p, 0) >= following.time]
+            again = [] if following is None else [p.epoch for p in plans if sent.get(p, 0) >= following.time]
             yield Leave(word.time, min(again, default=None))
 
 

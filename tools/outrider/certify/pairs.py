@@ -95,7 +95,7 @@ class _Pair:
 def check(histories: Sequence[History], terms: Terms) -> Pairs:
     """Check all pairs of ``histories`` at all epochs."""
     plans = [{step.plan.epoch: step for step in history.steps} for history in histories]
-    epochs = tuple(sorted({epoch for told in plans for epoch in told}))
+    epochs = tuple(sorted({epoch for sent in plans for epoch in sent}))
     current: dict[int, WirePlan] = {}
     pairs: dict[tuple[int, int], _Pair] = {}
     findings: list[Finding] = []
@@ -103,8 +103,8 @@ def check(histories: Sequence[History], terms: Terms) -> Pairs:
     nearest: Nearest | None = None
     for epoch in epochs:
         anchored = set()
-        for k, told in enumerate(plans):
-            step = told.get(epoch)
+        for k, sent in enumerate(plans):
+            step = sent.get(epoch)
             if step is not None:
                 current[k] = step.plan
                 if step.kind is Kind.ANCHOR:

@@ -48,11 +48,11 @@ def read(directory: Path, watch: Watch) -> Evidence:
     logs, faults, done = [], [], 0
     for system, log in found.items():
 
-        def told(at: int, name: str = log.name, before: int = done) -> None:
+        def sent(at: int, name: str = log.name, before: int = done) -> None:
             watch(name, (before + at) / size)
 
         try:
-            logs.append(_read(system, log, told))
+            logs.append(_read(system, log, sent))
         except LogError as error:
             faults.append(str(error))
         done += log.stat().st_size

@@ -52,10 +52,10 @@ def agility(case: Case) -> Iterator[Finding]:
     beat = case.vehicle.vehicle.heartbeat
     if case.profile is None or beat is None or beat.type not in ROTORCRAFT:
         return
-    told = {
+    reported = {
         name: value for name in stock_parameters(case.autopilot) if (value := _number(case, name)) is not None
     }
-    if not told:
+    if not reported:
         names = ", ".join(stock_parameters(case.autopilot))
         yield Finding(
             f"what it can follow is not {'in the log' if case.log else 'told'}",
@@ -66,8 +66,8 @@ def agility(case: Case) -> Iterator[Finding]:
             else "Read them in a ground station.",
         )
         return
-    yield summary(limits_of(case.autopilot, told), shipped(case.autopilot), _FILES[case.autopilot])
-    for name, value in told.items():
+    yield summary(limits_of(case.autopilot, reported), shipped(case.autopilot), _FILES[case.autopilot])
+    for name, value in reported.items():
         yield from lowered(case.autopilot, name, value)
 
 

@@ -75,8 +75,8 @@ def _failing(case: Case) -> Finding:
 
 def battery(case: Case) -> Iterator[Finding]:
     """Yield a finding from SYS_STATUS and BATTERY_STATUS, by the autopilot's own thresholds."""
-    status, told = case.vehicle.latest(SysStatus), case.vehicle.latest(BatteryStatus)
-    remaining = told.remaining if told is not None else None
+    status, reported = case.vehicle.latest(SysStatus), case.vehicle.latest(BatteryStatus)
+    remaining = reported.remaining if reported is not None else None
     voltage = status.battery_voltage if status is not None else None
     if remaining is None and status is not None:
         remaining = status.battery_remaining

@@ -28,7 +28,7 @@ class Hearing:
         self.speakers: dict[Source, Speaker] = {}
         self.begin: int | None = None
         self.end = 0
-        self.frames = self.octets = self.bad = self.skipped_bytes = self.unheard = self.refused = 0
+        self.frames = self.octets = self.bad = self.skipped_bytes = self.unreceived = self.refused = 0
         self.refusal = ""
 
     def receive(self, now: int, frame: Frame) -> None:
@@ -40,7 +40,7 @@ class Hearing:
         speaker = self.speakers.get(source)
         if speaker is None:
             if len(self.speakers) >= MOST:
-                self.unheard += 1
+                self.unreceived += 1
                 return
             speaker = self.speakers[source] = Speaker(source)
         row = BY_ID.get(frame.message_id)

@@ -54,8 +54,8 @@ def firmware(case: Case) -> Iterator[Finding]:
 
 def _version(case: Case, kind: str) -> Iterator[Finding]:
     name = case.profile.name if case.profile is not None else ""
-    told = case.vehicle.latest(AutopilotVersion)
-    if told is None or not told.flight_version:
+    reported = case.vehicle.latest(AutopilotVersion)
+    if reported is None or not reported.flight_version:
         yield Finding(
             f"{name}, {kind}; its version is not told (AUTOPILOT_VERSION)",
             Severity.NOTE if case.log else Severity.WARNING,
@@ -65,7 +65,7 @@ def _version(case: Case, kind: str) -> Iterator[Finding]:
             else "See that REQUEST_MESSAGE reaches it; an old firmware: update it.",
         )
         return
-    major, minor, patch, _ = told.flight_version.to_bytes(4, "big")
+    major, minor, patch, _ = reported.flight_version.to_bytes(4, "big")
     what = f"{name} {major}.{minor}.{patch}, {kind}, system {case.vehicle.source.system}"
     tried = _TRIED[case.autopilot]
     if (major, minor) == tried:
@@ -85,7 +85,7 @@ def _version(case: Case, kind: str) -> Iterator[Finding]:
             f"Newer than what has been measured ({tried[0]}.{tried[1]}): parameters may have other names.",
             "Read its release notes on guided or offboard flight.",
         )
-    if told.capabilities and not told.capabilities & _TAKES_SETPOINTS:
+    if reported.capabilities and not reported.capabilities & _TAKES_SETPOINTS:
         yield Finding(
             "it says that it takes no SET_POSITION_TARGET_LOCAL_NED",
             Severity.BLOCKING,

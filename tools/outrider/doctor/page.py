@@ -24,8 +24,8 @@ def show(name: str, verdict: Verdict) -> None:
     For findings of severity OK the reason is omitted.
     """
     console = Console(highlight=False)
-    told = [(severity, len(verdict.of(severity))) for severity in reversed(Severity)]
-    counts = ", ".join(f"{count} {severity.value}" for severity, count in told if count)
+    reported = [(severity, len(verdict.of(severity))) for severity in reversed(Severity)]
+    counts = ", ".join(f"{count} {severity.value}" for severity, count in reported if count)
     ready = "ready for an escort" if verdict.ready else "NOT ready for an escort"
     # Not wrapped: the length of the name must not move line breaks within text that scripts search for.
     console.print(Text(f"{name}: {ready} ({counts})", style="bold"), soft_wrap=True)

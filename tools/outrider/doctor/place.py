@@ -72,8 +72,8 @@ def origin(case: Case) -> Iterator[Finding]:
 
 def home(case: Case) -> Iterator[Finding]:
     """Yield findings on HOME_POSITION: return flies to home, set-points are relative to the origin."""
-    told, origins = case.vehicle.latest(HomePosition), case.vehicle.origins
-    if told is None:
+    reported, origins = case.vehicle.latest(HomePosition), case.vehicle.origins
+    if reported is None:
         yield Finding(
             "home is not told (HOME_POSITION)",
             Severity.NOTE,
@@ -84,7 +84,8 @@ def home(case: Case) -> Iterator[Finding]:
     if not origins:
         return
     east, north, up = (
-        float(part) for part in _frame(origins[-1]).to_enu(told.latitude, told.longitude, told.altitude)
+        float(part)
+        for part in _frame(origins[-1]).to_enu(reported.latitude, reported.longitude, reported.altitude)
     )
     away = float(np.hypot(east, north))
     what = f"home is {away:.1f} m from the origin, {abs(up):.1f} m {'above' if up >= 0.0 else 'below'} it"

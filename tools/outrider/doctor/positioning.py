@@ -19,9 +19,9 @@ _POOR_HDOP, _POOR_ACCURACY = 2.0, 2.5
 
 def estimator(case: Case) -> Iterator[Finding]:
     """Yield findings from ArduPilot's EKF_STATUS_REPORT or PX4's ESTIMATOR_STATUS."""
-    told: EkfStatus | EstimatorStatus | None
-    told = case.vehicle.latest(EstimatorStatus) if case.px4 else case.vehicle.latest(EkfStatus)
-    if told is None:
+    reported: EkfStatus | EstimatorStatus | None
+    reported = case.vehicle.latest(EstimatorStatus) if case.px4 else case.vehicle.latest(EkfStatus)
+    if reported is None:
         name = "ESTIMATOR_STATUS" if case.px4 else "EKF_STATUS_REPORT"
         yield Finding(
             f"the estimator's state is not told ({name})",
@@ -30,16 +30,16 @@ def estimator(case: Case) -> Iterator[Finding]:
             "Nobody asked for it in this log." if case.log else "It was asked for and did not come.",
         )
         return
-    if told.flags & ABSOLUTE_POSITION and not told.flags & _UNINITIALISED:
+    if reported.flags & ABSOLUTE_POSITION and not reported.flags & _UNINITIALISED:
         yield Finding(
             "the estimator has an absolute position",
             Severity.OK,
             f"Set-points in local NED mean a place on the globe.{case.vehicle.located.history}",
         )
         return
-    if not case.px4 and told.flags & _CONSTANT_POSITION:
+    if not case.px4 and reported.flags & _CONSTANT_POSITION:
         why = "It assumes that it does not move at all (constant position)."
-    elif told.flags & _RELATIVE_POSITION:
+    elif reported.flags & _RELATIVE_POSITION:
         why = "It knows only how it moved (optical flow, dead reckoning), not where on the globe it is."
     else:
         why = "It has no position."
@@ -56,17 +56,17 @@ def estimator(case: Case) -> Iterator[Finding]:
 
 def gps(case: Case) -> Iterator[Finding]:
     """Yield findings from GPS_RAW_INT."""
-    told = case.vehicle.latest(GpsRaw)
-    if told is None:
+    fix = case.vehicle.latest(GpsRaw)
+    if fix is None:
         yield Finding(
-            "GPS is not told (GPS_RAW_INT)",
+            "GPS is not reported (GPS_RAW_INT)",
             Severity.NOTE,
-            "How good positions are is not known.",
+            "The accuracy of the positions is unknown.",
             "" if case.log else "It was asked for and did not come.",
         )
         return
-    satellites = "" if told.satellites is None else f", {told.satellites} satellites"
-    if told.fix_type < FIX_3D:
+    satellites = "" if fix.satellites is None else f", {fix.satellites} satellites"
+    if fix.fix_type < FIX_3D:
         yield Finding(
             f"GPS: no fix in three dimensions{satellites}",
             Severity.BLOCKING,
@@ -75,17 +75,17 @@ def gps(case: Case) -> Iterator[Finding]:
         )
         return
     words = {3: "3D fix", 4: "DGPS", 5: "RTK float", 6: "RTK fixed"}
-    what = f"GPS: {words.get(told.fix_type, f'fix {told.fix_type}')}{satellites}"
-    poor = (told.hdop is not None and told.hdop > _POOR_HDOP) or told.horizontal_accuracy > _POOR_ACCURACY
+    what = f"GPS: {words.get(fix.fix_type, f'fix {fix.fix_type}')}{satellites}"
+    poor = (fix.hdop is not None and fix.hdop > _POOR_HDOP) or fix.horizontal_accuracy > _POOR_ACCURACY
     if poor:
         yield Finding(
             f"{what}, poor",
             Severity.WARNING,
-            f"HDOP {told.hdop or 0:.1f}, accuracy {told.horizontal_accuracy:.1f} m: neighbours may be "
+            f"HDOP {fix.hdop or 0:.1f}, accuracy {fix.horizontal_accuracy:.1f} m: neighbours may be "
             "nearer than they say.",
             "Wait for more satellites, or keep wider distances (position_sigma).",
         )
-    elif told.fix_type >= 5:
+    elif fix.fix_type >= 5:
         yield Finding(what, Severity.OK, f"Good to centimetres or decimetres.{case.vehicle.fixed.history}")
     else:
         yield Finding(

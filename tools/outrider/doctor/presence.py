@@ -82,7 +82,7 @@ def company(case: Case) -> Iterator[Finding]:
     for speaker in case.hearing.speakers.values():
         if speaker is not case.vehicle and speaker.source != case.me:
             yield from _about(case, speaker)
-    if case.hearing.unheard:
+    if case.hearing.unreceived:
         yield Finding(
             f"more than {MOST} senders",
             Severity.WARNING,

@@ -84,7 +84,7 @@ class Px4Topics:
         make = _SAID.get(kind.name)
         return [] if make is None else make(self, kind.read(payload))
 
-    def told(self, kind: Kind, payload: bytes) -> list[View]:
+    def reported(self, kind: Kind, payload: bytes) -> list[View]:
         """Convert a message of another sender.
 
         Only a set-point in local NED that is sent to this autopilot gives a topic.

@@ -54,23 +54,23 @@ def bodies(stage: Stage) -> Iterator[Entry]:
     now = int(motion.time[0])
     span = _span(scenario)
 
-    def told(topic: str, *entities: Json) -> Entry:
+    def reported(topic: str, *entities: Json) -> Entry:
         return entry(now, f"/scene/{topic}", foxglove_schemas.SCENE_UPDATE, foxglove.update(*entities))
 
     paint = colors(scenario)
     vehicles = [_vehicle(now, system, span, scenario.d_min, paint[system]) for system in scenario.systems]
-    yield told("vehicles", *vehicles)
-    yield told("paths", *_paths(stage, paint))
+    yield reported("vehicles", *vehicles)
+    yield reported("paths", *_paths(stage, paint))
     if np.isfinite(motion.target).any():
-        yield told("target", _target(now, scenario))
+        yield reported("target", _target(now, scenario))
     if scenario.obstacles:
         solid = [
             foxglove.entity(now, FLEET, f"obstacle-{k}", _obstacle(one, scenario.d_min_obstacle))
             for k, one in enumerate(scenario.obstacles)
         ]
-        yield told("obstacles", *solid)
+        yield reported("obstacles", *solid)
     if scenario.moving:
-        yield told("moving", *_moving(now, scenario))
+        yield reported("moving", *_moving(now, scenario))
 
 
 def frames(stage: Stage) -> Iterator[Entry]:

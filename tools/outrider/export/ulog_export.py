@@ -132,7 +132,7 @@ class _Book:
         head = bytes((spoken.link, spoken.system, spoken.component))
         self.file.data(time, mavlink_topic(kind), (link, spoken.system, spoken.component), head + payload)
         own = (spoken.system, spoken.component) == (self._system, AUTOPILOT)
-        for view in (self._px4.said if own else self._px4.told)(kind, payload):
+        for view in (self._px4.said if own else self._px4.reported)(kind, payload):
             self.file.data(time, view.topic, link, view.values)
         if kind.name == "STATUSTEXT":
             said = kind.read(payload)

@@ -197,7 +197,7 @@ class Flight:
 
     def _hear(self, desk: Channel) -> None:
         for news in desk.news():
-            self._watchdog.heard(time.monotonic())
+            self._watchdog.received(time.monotonic())
             kind = news.pop("kind")
             if kind == "state":
                 self.state = State(**news)

@@ -79,11 +79,11 @@ class Identification:
         return beat
 
     def _mismatch(self) -> str:
-        heard = ", ".join(
+        received = ", ".join(
             f"{system} ({_name(profile_of(beat), beat)})" for system, beat in sorted(self._others.items())
         )
         return (
-            f"system {self._system} is not on {self._endpoint}; heard there: {heard}; allowed: one of "
+            f"system {self._system} is not on {self._endpoint}; heard there: {received}; allowed: one of "
             "these as system in the file, or with --system"
         )
 

@@ -111,7 +111,7 @@ def steered(config: CompanionConfig, signed: bool) -> float:
     return setpoints + _size(_BEAT, signed)
 
 
-def told(signed: bool) -> float:
+def reported(signed: bool) -> float:
     """Return the bytes per second that an autopilot sends: requested streams and its heartbeat."""
     streams = sum(_size(_TOLD[number], signed) * _SECOND / each for number, each in STREAMS.items())
     health = sum(_size(message, signed) for message in _HEALTH) * _SECOND / HEALTH
@@ -125,7 +125,7 @@ def doubts_of_autopilot(endpoint: Endpoint, config: CompanionConfig, signed: boo
     """
     if not isinstance(endpoint, Serial) or _USB in endpoint.device:
         return ""
-    to, back = 0.0 if dry_run else steered(config, signed), told(signed)
+    to, back = 0.0 if dry_run else steered(config, signed), reported(signed)
     need = 2.0 * back if dry_run else to + back
     if need <= room(endpoint.baud):
         return ""

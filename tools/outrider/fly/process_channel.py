@@ -88,15 +88,15 @@ class OrderLink:
         self._end, self._clock = end, clock
         self._codec = Codec(lambda identifier, _system, _component: identifier == _ACK)
         self._received = 0
-        self._heard: float | None = None
+        self._contact: float | None = None
         self.stop = False
 
     @property
     def alone(self) -> bool:
         """Whether the parent has been silent for too long, counted from the first call."""
-        if self._heard is None:
-            self._heard = self._clock()
-        return self._clock() - self._heard > ALONE
+        if self._contact is None:
+            self._contact = self._clock()
+        return self._clock() - self._contact > ALONE
 
     @property
     def counters(self) -> LinkCounters:
@@ -111,7 +111,7 @@ class OrderLink:
         """Return the orders received since the last call."""
         found = []
         while (data := _taken(self._end)) is not None:
-            self._heard = self._clock()
+            self._contact = self._clock()
             if data == _STOP:
                 self.stop = True
             elif data != _BEAT:

@@ -73,7 +73,7 @@ def rows(state: State, waiting: str) -> dict[str, str]:
     """Return the rows of the display, as text by name."""
     found = {"phase": f"{state.phase}, waits for {waiting}" if waiting else state.phase}
     motors = "armed" if state.armed else "disarmed"
-    found["mode"] = f"{state.mode or 'not heard'}, {motors}{', ours' if state.guided else ''}"
+    found["mode"] = f"{state.mode or 'not received'}, {motors}{', ours' if state.guided else ''}"
     if state.position is not None and state.velocity is not None:
         east, north, up = state.position
         found["position"] = (

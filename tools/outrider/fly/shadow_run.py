@@ -44,7 +44,7 @@ def dry_run_of_log(asked: Request, log: Path) -> int:
         target = config.target if config.target in seen.placed else None
         with share_progress() as watch:
 
-            def told(now: int, _read: int) -> None:
+            def reported(now: int, _read: int) -> None:
                 watch(log.name, (now - seen.begin) / max(seen.end - seen.begin, 1))
 
             found = shadow_flight(
@@ -52,7 +52,7 @@ def dry_run_of_log(asked: Request, log: Path) -> int:
                 Cast(config.system, None, target),
                 seen,
                 read_tlog(log),
-                told,
+                reported,
                 config.origin.frame,
                 follow=config.clock != "wall",
             )

@@ -92,7 +92,7 @@ class StatusReports:
         self._phase: Phase | None = None
         self._states = 0
         self._plan_ms = (0.0, 0.0)
-        self._told = self._refused = self._steps = self._remarked = 0
+        self._reported = self._refused = self._steps = self._remarked = 0
         self._judged = self._duplicates = False
         self._landing: Landing | None = None
         self._concerns: dict[str, Concern] = {}
@@ -174,11 +174,11 @@ class StatusReports:
                 if sentence and sentence != self._sentences.get(what):
                     self._event(at, what, sentence)
             self._sentences = sentences
-        if vehicle.told != self._told:
-            new = min(vehicle.told - self._told, len(vehicle.texts))
+        if vehicle.reported != self._reported:
+            new = min(vehicle.reported - self._reported, len(vehicle.texts))
             for text in list(vehicle.texts)[len(vehicle.texts) - new :]:
                 self._event(at, "autopilot", text.text)
-            self._told = vehicle.told
+            self._reported = vehicle.reported
         if pilot.limits.said != self._remarked:
             new = min(pilot.limits.said - self._remarked, len(pilot.limits.remarks))
             for remark in list(pilot.limits.remarks)[len(pilot.limits.remarks) - new :]:

@@ -21,7 +21,7 @@ class Watchdog:
         self._since = self._looked = now
         self._limit = FIRST
 
-    def heard(self, now: float) -> None:
+    def received(self, now: float) -> None:
         """Restart the time-out: a message arrived."""
         self._since, self._limit = now, HUNG
 

@@ -48,13 +48,13 @@ def gallery(
         return INTERRUPTED
     by_cell = dict(zip(shown, (cell.key for cell in found), strict=True))
     panels = {name: _panels(name, shown, by_cell, entries) for name in dict.fromkeys(s for s, _ in shown)}
-    told = {
+    reported = {
         showing.scenario: scenario_of(task(cell, SEED)).description
         for showing, cell in zip(shown, found, strict=True)
     }
     for name, of in panels.items():
         figures.draw(name, of, there / f"{name}.png")
-    whole_file.write(there / PAGE, page(panels, told, SEED))
+    whole_file.write(there / PAGE, page(panels, reported, SEED))
     sys.stderr.write(f"page and pictures: {there}\n")
     return 1 if any(run.what for of in panels.values() for _, run, _ in of) else 0
 

@@ -48,7 +48,7 @@ def mode_name(flavour: str, custom_mode: int) -> str:
     return name or f"{main}.{sub}"
 
 
-def told_mode(beat: Heartbeat) -> str:
+def reported_mode(beat: Heartbeat) -> str:
     """Return the name of the mode in an autopilot's HEARTBEAT (0) and whether it is disarmed, for display."""
     flavour = "ardupilot" if beat.autopilot == ARDUPILOT.autopilot else "px4"
     return mode_name(flavour, beat.custom_mode) + ("" if is_armed(beat) else ", disarmed")

@@ -85,9 +85,9 @@ def _often(vehicles: Sequence[Vehicle], names: Sequence[str]) -> Table:
     table.add_column("")
     for vehicle in vehicles:
         table.add_column(str(vehicle.system), justify="right")
-    told_by = [rates(vehicle) for vehicle in vehicles]
+    columns = [rates(vehicle) for vehicle in vehicles]
     for name in names:
-        table.add_row(name, *(f"{told[name]:.3g}" if name in told else "" for told in told_by))
+        table.add_row(name, *(f"{hz[name]:.3g}" if name in hz else "" for hz in columns))
     return table
 
 

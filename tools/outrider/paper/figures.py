@@ -76,13 +76,13 @@ def _times(rows: Sequence[Row], results: Sequence[Result]) -> Figure:
     figure = Figure(figsize=(11, 4.5), layout="constrained")
     axes = figure.subplots()
     places = np.arange(len(rows))
-    told = [_number(row.told) for row in rows]
+    reported = [_number(row.reported) for row in rows]
     ours = [result.median_s for result in results]
-    top = 1.1 * max([value for value in (*told, *ours) if value is not None], default=1.0)
-    axes.bar(places - 0.2, [value or 0.0 for value in told], 0.38, color="0.75", label="paper")
+    top = 1.1 * max([value for value in (*reported, *ours) if value is not None], default=1.0)
+    axes.bar(places - 0.2, [value or 0.0 for value in reported], 0.38, color="0.75", label="paper")
     axes.bar(places + 0.2, [value or 0.0 for value in ours], 0.38, color="C0", label="here, median")
     for place, row, result in zip(places, rows, results, strict=True):
-        if row.told == "stuck":
+        if row.reported == "stuck":
             axes.bar(place - 0.2, top, 0.38, color="none", edgecolor="0.75", hatch="///")
         if result.median_s is None:
             axes.bar(place + 0.2, top, 0.38, color="none", edgecolor="C0", hatch="///")

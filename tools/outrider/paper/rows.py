@@ -17,7 +17,7 @@ class Row(NamedTuple):
 
     scenario: str
     method: str
-    told: str
+    reported: str
 
 
 ROWS = (

@@ -56,7 +56,7 @@ def _lines(rows: Sequence[Row], results: Sequence[Result]) -> Iterator[tuple[Row
             (
                 row.scenario,
                 row.method,
-                row.told,
+                row.reported,
                 _seconds(result.median_s),
                 _seconds(result.worst_s),
                 f"{result.converged} of {result.seeds}",

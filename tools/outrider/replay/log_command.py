@@ -47,10 +47,10 @@ def replay_log(log: Path, cast: Cast, like: str, out: Path | None, as_json: bool
         directory = _directory(out, f"{_stem(log)}-own-{cast.own}")
         with share_progress() as watch:
 
-            def told(now: int, _read: int) -> None:
+            def reported(now: int, _read: int) -> None:
                 watch(log.name, (now - seen.begin) / max(seen.end - seen.begin, 1))
 
-            found = shadow_flight(config, cast, seen, pacing(read_tlog(log)), told)
+            found = shadow_flight(config, cast, seen, pacing(read_tlog(log)), reported)
     except LogError as error:
         raise InputError(str(error)) from None
     _tell(f"{log.name} · vehicle {cast.own}", found, directory, as_json)
@@ -70,8 +70,8 @@ def chasing(log: Path, target: int, like: str, out: Path | None, as_json: bool) 
             fly(flight, 1, directory, watch)
     except LogError as error:
         raise InputError(str(error)) from None
-    told = setpoints(directory / names.log(FIRST_SYSTEM))
-    _tell(f"{log.name} · target {target}", ShadowRun(would=told), directory, as_json)
+    reported = setpoints(directory / names.log(FIRST_SYSTEM))
+    _tell(f"{log.name} · target {target}", ShadowRun(would=reported), directory, as_json)
     return 0
 
 

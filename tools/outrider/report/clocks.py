@@ -34,13 +34,13 @@ def offset(log: Log, motions: Motions) -> float:
     k = motions.system.index(log.owner)
     true = np.nan_to_num(motions.velocity[:, k])
     step = max(1, len(log.moments) // _MOST)
-    told, when = log.speeds[::step], (log.moments[::step] - log.begin) * 1e-6
-    if float(np.abs(told).max()) < _STILL:
+    sent, when = log.speeds[::step], (log.moments[::step] - log.begin) * 1e-6
+    if float(np.abs(sent).max()) < _STILL:
         return guess
     for width, grid in ((REACH, _COARSE), (_COARSE, _FINE)):
         candidates = guess + grid * np.arange(-round(width / grid), round(width / grid) + 1.0)
         guess = float(
-            candidates[np.argmin([_misfit(when + c, told, motions.time, true) for c in candidates])]
+            candidates[np.argmin([_misfit(when + c, sent, motions.time, true) for c in candidates])]
         )
     return guess
 
@@ -55,13 +55,13 @@ def errors(logs: Sequence[Log], offsets: dict[int, float]) -> dict[int, float]:
     return {owner: own - middle for owner, own in begun.items()}
 
 
-def _misfit(when: Array, told: Array, time: Array, true: Array) -> float:
+def _misfit(when: Array, sent: Array, time: Array, true: Array) -> float:
     """Return the mean square difference (m²/s²) of reported and true velocity.
 
     Outside the flight the true velocity is zero.
     """
     between = np.array([np.interp(when, time, true[:, axis], 0.0, 0.0) for axis in range(3)]).T
-    return float(np.mean((told - between) ** 2))
+    return float(np.mean((sent - between) ** 2))
 
 
 def seconds(log: Log, times: Times | Sequence[int], ahead: float) -> Array:

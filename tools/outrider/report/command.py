@@ -67,7 +67,7 @@ def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
         if motions is not None:
             ahead[log.owner] = clocks.offset(log, motions)
         counting.take(log, ahead.get(log.owner))
-        return log._replace(heard={})
+        return log._replace(received={})
 
     run = read(directory, watch, sift)
     motions, lost = run.motions, counting.close()

@@ -43,7 +43,7 @@ def events(run: Run, near: Sequence[Encounter], offsets: dict[int, float], end: 
         found += [event for event in _scenario(run.scenario) if event.time <= end]
     for log in run.logs:
         if log.owner in offsets:
-            found += _told(log, offsets[log.owner])
+            found += _sent(log, offsets[log.owner])
     return together(sorted(found, key=lambda event: (event.time, event.kind, event.who)))
 
 
@@ -119,7 +119,7 @@ def _words(fault: Sudden) -> str:
     raise TypeError(fault)
 
 
-def _told(log: Log, ahead: float) -> Iterator[Event]:
+def _sent(log: Log, ahead: float) -> Iterator[Event]:
     for saying in sayings(log):
         (time,) = seconds(log, [saying.time], ahead).tolist()
         yield Event(time, saying.kind, (log.owner,), saying.text, bad=saying.bad)

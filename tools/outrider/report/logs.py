@@ -73,8 +73,8 @@ class _Pass:
         self._owner = owner
         self._begin = self._end = 0
         self._first = True
-        self._told = _Growing()
-        self._heard: dict[Sender, _Growing] = {}
+        self._sent = _Growing()
+        self._received: dict[Sender, _Growing] = {}
         self._codec = Codec(lambda identifier, system, _component: identifier in _DECODED and system == owner)
         self._moments = array("q")
         self._speeds = array("d")
@@ -90,9 +90,9 @@ class _Pass:
         if record.link == SWARM:
             sequence, sender = sequence_and_sender(record.frame)
             if sender.system == self._owner:
-                self._told.add(time, sequence, record.frame)
+                self._sent.add(time, sequence, record.frame)
             else:
-                self._heard.setdefault(sender, _Growing()).add(time, sequence, record.frame)
+                self._received.setdefault(sender, _Growing()).add(time, sequence, record.frame)
             return
         for message in self._codec.feed(record.frame):
             self._hear(time, message)
@@ -115,10 +115,10 @@ class _Pass:
 
     def log(self, report: TlogReport) -> Log:
         """Return the log, with the reader's report on the file."""
-        heard = {sender: growing.stream() for sender, growing in sorted(self._heard.items())}
+        received = {sender: growing.stream() for sender, growing in sorted(self._received.items())}
         speeds = ned_to_enu(np.array(self._speeds, dtype=np.float64).reshape(-1, 3))
         moments = _whole(self._moments)
         said = tuple(self._utterances)
         return Log(
-            self._owner, self._begin, self._end, self._told.stream(), heard, moments, speeds, said, report
+            self._owner, self._begin, self._end, self._sent.stream(), received, moments, speeds, said, report
         )

@@ -81,9 +81,9 @@ class Ledger:
     def take(self, log: Log, ahead: float | None = None) -> None:
         """Add the log of another owner; ``ahead`` is its clock's offset (s, ``clocks.offset``), if known."""
         ahead = 0.0 if ahead is None else ahead
-        new = _Party(log._replace(heard={}), ahead, log.begin - 1e6 * min(0.0, ahead))
+        new = _Party(log._replace(received={}), ahead, log.begin - 1e6 * min(0.0, ahead))
         waiting: dict[int, list[Stream]] = {}
-        for sender, stream in log.heard.items():
+        for sender, stream in log.received.items():
             waiting.setdefault(sender.system, []).append(stream)
         self._waiting[log.owner] = waiting
         for owner, other in self._logs.items():
@@ -124,10 +124,10 @@ class _Seconds:
         self._sent: Counter[int] = Counter()
         self._lost: Counter[int] = Counter()
 
-    def add(self, told: Array, lost: NDArray[np.bool_]) -> None:
-        """Add messages sent at ``told`` (n,), s on the flight's clock; ``lost`` (n,) marks the lost ones."""
-        sane = np.abs(told) < _LONGEST
-        for counter, times in ((self._sent, told[sane]), (self._lost, told[sane & lost])):
+    def add(self, ours: Array, lost: NDArray[np.bool_]) -> None:
+        """Add messages sent at ``ours`` (n,), s on the flight's clock; ``lost`` (n,) marks the lost ones."""
+        sane = np.abs(ours) < _LONGEST
+        for counter, times in ((self._sent, ours[sane]), (self._lost, ours[sane & lost])):
             seconds, counts = np.unique(np.floor(times).astype(np.int64), return_counts=True)
             for second, count in zip(seconds.tolist(), counts.tolist(), strict=True):
                 counter[second] += count
@@ -152,25 +152,25 @@ def _exact(
     The second and the third value are the times (n,) of sending, µs since the start of the sender's log, and
     whether (n,) each message was lost.
     """
-    told, heard = sender.told, _joined(streams)
-    marks, first, copies = np.unique(heard.mark, return_index=True, return_counts=True)
-    arrived = np.isin(told.mark, marks)
-    there = told.time.astype(np.float64)
+    ours, stream = sender.sent, _joined(streams)
+    marks, first, copies = np.unique(stream.mark, return_index=True, return_counts=True)
+    arrived = np.isin(ours.mark, marks)
+    there = ours.time.astype(np.float64)
     counted = np.ones(len(there), dtype=bool)
     if arrived.any():
         # The clocks differ; messages in both logs give the difference. Messages outside the receiver's log
         # are not counted.
-        place = np.searchsorted(marks, told.mark[arrived])
-        there += np.median(heard.time[first[place]] - told.time[arrived])
+        place = np.searchsorted(marks, ours.mark[arrived])
+        there += np.median(stream.time[first[place]] - ours.time[arrived])
         counted = (there >= receiver.begin) & (there <= receiver.end)
     # Equal bytes sent twice (a heartbeat some cycles of numbers later) must arrive twice.
-    kinds, times_told = np.unique(told.mark[counted], return_counts=True)
+    kinds, times_sent = np.unique(ours.mark[counted], return_counts=True)
     received = dict(zip(marks.tolist(), copies.tolist(), strict=True))
     came = np.array([received.get(kind, 0) for kind in kinds.tolist()], dtype=np.int64)
-    lost = int(np.maximum(times_told - came, 0).sum())
-    silence, usual = _silences(heard.time[first], there[counted], goal)
+    lost = int(np.maximum(times_sent - came, 0).sum())
+    silence, usual = _silences(stream.time[first], there[counted], goal)
     found = Way(sender.owner, receiver.owner, int(counted.sum()), lost, True, silence, usual)
-    since = (told.time - sender.begin)[counted].astype(np.float64)
+    since = (ours.time - sender.begin)[counted].astype(np.float64)
     return found, since, ~arrived[counted]
 
 
@@ -216,17 +216,17 @@ def _joined(streams: list[Stream]) -> Stream:
 
 
 def _silences(
-    arrivals: Array | Times, told: Array | Times, since: float
+    arrivals: Array | Times, ours: Array | Times, since: float
 ) -> tuple[float | None, float | None]:
     """Return the longest time (s) without an arrival, and the 95th percentile of the times between arrivals.
 
-    Both count from ``since`` to the last message in ``told``. Times are µs on one clock. Values are None if
+    Both count from ``since`` to the last message in ``ours``. Times are µs on one clock. Values are None if
     too few messages arrived.
     """
-    told = told[told >= since]
-    if not len(told):
+    ours = ours[ours >= since]
+    if not len(ours):
         return None, None
-    heard = np.sort(arrivals[arrivals >= since])
-    waits = np.diff(np.concatenate([told[:1], heard, told[-1:]]).astype(np.float64)) * 1e-6
+    later = np.sort(arrivals[arrivals >= since])
+    waits = np.diff(np.concatenate([ours[:1], later, ours[-1:]]).astype(np.float64)) * 1e-6
     usual = float(np.percentile(waits[1:-1], 95.0)) if len(waits) > 2 else None
     return max(0.0, float(waits.max())), usual

@@ -93,15 +93,15 @@ class Log(NamedTuple):
     """Data of one vehicle's tlog.
 
     ``begin``, ``end``: first and last record, µs on the vehicle's own clock. ``told``: messages that the
-    vehicle sent on the swarm link; ``heard``: messages that it received there, empty if they have already
+    vehicle sent on the swarm link; ``received``: messages that it received there, empty if they have already
     been compared. ``speeds`` (n, 3): velocity reported by the autopilot at ``moments`` (n,) µs, ENU, m/s.
     """
 
     owner: int
     begin: int
     end: int
-    told: Stream
-    heard: dict[Sender, Stream]
+    sent: Stream
+    received: dict[Sender, Stream]
     moments: Times
     speeds: Array
     utterances: tuple[Utterance, ...]

@@ -103,20 +103,20 @@ def _matrix(ways: Mapping[tuple[int, int], Way], title: str, cell: Callable[[Way
 
 def _share_cell(way: Way) -> str:
     about = "" if way.exact else "≈"
-    told = f"{way.sender} to {way.receiver}: {about}{way.lost} of {way.sent} messages did not arrive"
-    return _cell(f"{about}{100.0 * way.share:.1f}", _level(way.share, _LEVELS), told)
+    sent = f"{way.sender} to {way.receiver}: {about}{way.lost} of {way.sent} messages did not arrive"
+    return _cell(f"{about}{100.0 * way.share:.1f}", _level(way.share, _LEVELS), sent)
 
 
 def _silence_cell(way: Way) -> str:
     if way.silence is None:
         return _cell("–", 0, f"{way.sender} to {way.receiver}: nothing was heard")
     usual = "" if way.usual is None else f"; 95 % of the messages came within {way.usual:.2f} s of the last"
-    told = f"{way.sender} to {way.receiver}: {way.silence:.2f} s without a message{usual}"
-    return _cell(f"{way.silence:.2f}", _level(way.silence, _SILENT), told)
+    sent = f"{way.sender} to {way.receiver}: {way.silence:.2f} s without a message{usual}"
+    return _cell(f"{way.silence:.2f}", _level(way.silence, _SILENT), sent)
 
 
-def _cell(text: str, level: int, told: str) -> str:
-    return f'<td class=l{level} title="{escape(told)}">{escape(text)}</td>'
+def _cell(text: str, level: int, sent: str) -> str:
+    return f'<td class=l{level} title="{escape(sent)}">{escape(text)}</td>'
 
 
 def _level(value: float, bounds: Iterable[float]) -> int:

@@ -19,7 +19,7 @@ class Clients:
 
     def __init__(self, links: Mapping[str, Sequence[Link]], clock: Clock) -> None:
         self._links, self._clock = links, clock
-        self._heard: dict[Link, tuple[int, int]] = {}
+        self._received: dict[Link, tuple[int, int]] = {}
 
     def __call__(self, name: str) -> int:
         """Return the number of clients of vehicle ``name``."""
@@ -33,8 +33,8 @@ class Clients:
     def _answered(self, link: UdpCaller) -> int:
         """Return 1 if the only peer of ``link`` has sent something within the last 10 s, otherwise 0."""
         received, now = link.counters.received, self._clock.now()
-        before, when = self._heard.get(link, (0, -REMEMBERED))
+        before, when = self._received.get(link, (0, -REMEMBERED))
         if received != before:
             when = now
-        self._heard[link] = received, when
+        self._received[link] = received, when
         return int(now - when < REMEMBERED)

@@ -48,7 +48,7 @@ class DuplicateIds:
             if len(self._said) > REMEMBERED:
                 self._said.popitem(last=False)
 
-    def heard(self, header: Header, frame: bytes) -> None:
+    def received(self, header: Header, frame: bytes) -> None:
         """Check a frame that arrives."""
         if (header.system, header.component) != self._own or hash(frame) in self._said:
             return

@@ -20,21 +20,21 @@ class Setpoints:
     ``golden`` holds its golden files.
     """
 
-    def __init__(self, name: str, told: Sequence[tuple[int, SetpointLocal]], golden: Golden) -> None:
-        self.name, self.told, self._golden = name, tuple(told), golden
+    def __init__(self, name: str, sent: Sequence[tuple[int, SetpointLocal]], golden: Golden) -> None:
+        self.name, self.messages, self._golden = name, tuple(sent), golden
 
     def __len__(self) -> int:
-        return len(self.told)
+        return len(self.messages)
 
     @property
     def course(self) -> Course:
         """Set-points as arrays: NED, SI units."""
-        return course(self.told)
+        return course(self.messages)
 
     @property
     def facts(self) -> Facts:
         """Largest step, speed and acceleration, masks, frames, gaps."""
-        return facts(self.told)
+        return facts(self.messages)
 
     def assert_continuous(
         self, *, step: float = 0.3, speed: float | None = None, acceleration: float | None = None
@@ -49,7 +49,7 @@ class Setpoints:
         if not found.setpoints:
             raise AssertionError(f"{self.name}: no set-points")
         if not found.finite:
-            time, _ = next((t, m) for t, m in self.told if not facts([(t, m)]).finite)
+            time, _ = next((t, m) for t, m in self.messages if not facts([(t, m)]).finite)
             raise AssertionError(
                 f"{self.name}: a set-point is not finite, {self._since(time):.2f} s after the first"
             )
@@ -102,9 +102,9 @@ class Setpoints:
         if bound is not None and len(known) and known.max() > bound:
             at = int(known.argmax())
             raise AssertionError(
-                f"{self.name}: {known[at]:.3f} {what}, {self._since(self.told[at][0]):.2f} s after the first "
-                f"set-point; {bound:g} are allowed"
+                f"{self.name}: {known[at]:.3f} {what}, {self._since(self.messages[at][0]):.2f} s after the "
+                f"first set-point; {bound:g} are allowed"
             )
 
     def _since(self, time: int) -> float:
-        return (time - self.told[0][0]) * 1e-6
+        return (time - self.messages[0][0]) * 1e-6

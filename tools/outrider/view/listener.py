@@ -16,7 +16,7 @@ from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
-from outrider.logs.flight_modes import is_armed, told_mode
+from outrider.logs.flight_modes import is_armed, reported_mode
 from outrider.scene.scene import LEAST_REACH, Scene
 from outrider.scene.snapshot import NO_PLAN, Array, Single, Snapshot, State, euler_attitude, padded
 from outrider.scene.view_commands import ViewCommands
@@ -42,7 +42,7 @@ class _Fix(NamedTuple):
     yaw: float | None
 
 
-class _Heard:
+class _Received:
     """Last data received from one system. Times are wall times in s."""
 
     def __init__(self, fix: _Fix) -> None:
@@ -63,7 +63,7 @@ class _Heard:
     @property
     def mode(self) -> str:
         """Mode reported by the autopilot; empty before the first report."""
-        return "" if self.beat is None else told_mode(self.beat)
+        return "" if self.beat is None else reported_mode(self.beat)
 
 
 class Listener:
@@ -84,7 +84,7 @@ class Listener:
         self._target = target
         self.hint = hint
         self._frame: FleetFrame | None = None
-        self._heard: dict[int, _Heard] = {}
+        self._received: dict[int, _Received] = {}
         self._offsets: deque[Array] = deque(maxlen=_SAMPLES)
         self._step: float | None = None
         self._certified = False
@@ -97,7 +97,7 @@ class Listener:
             for data in link.receive():
                 for message in codec.feed(data, whole=datagrams):
                     self._hear(wall, message)
-        systems = tuple(sorted(system for system in self._heard if system != self._target))
+        systems = tuple(sorted(system for system in self._received if system != self._target))
         if not systems or wall < self._next:
             return ()
         self._next = wall + PICTURE
@@ -119,22 +119,22 @@ class Listener:
         if isinstance(message, GlobalPosition):
             self._place(wall, system, component, message)
             return
-        heard = self._heard.get(system)
-        if heard is None:
+        received = self._received.get(system)
+        if received is None:
             return
         if isinstance(message, Attitude):
-            heard.leant = wall
-            heard.attitude = euler_attitude(message.roll, message.pitch, message.yaw)
+            received.leant = wall
+            received.attitude = euler_attitude(message.roll, message.pitch, message.yaw)
         elif isinstance(message, Heartbeat):
             if component == _AUTOPILOT:
-                heard.beat = message
+                received.beat = message
         elif isinstance(message, NamedValue):
             if message.name == "plan_ms":
-                heard.plan_ms = message.value
+                received.plan_ms = message.value
             elif message.name == "held":
-                heard.held = int(message.value)
+                received.held = int(message.value)
         elif isinstance(message, Tunnel):
-            self._tunnel(wall, heard, message)
+            self._tunnel(wall, received, message)
 
     def _place(self, wall: float, system: int, component: int, said: GlobalPosition) -> None:
         if self._frame is None:
@@ -142,13 +142,13 @@ class Listener:
         velocity = ned_to_enu(said.velocity_ned)
         place = self._frame.to_enu(said.latitude, said.longitude, said.altitude)
         fix = _Fix(wall, place, velocity, None if said.yaw is None else yaw_to_enu(said.yaw))
-        heard = self._heard.get(system)
-        if heard is not None:
-            heard.fix = fix
-        elif len(self._heard) < MOST:
-            self._heard[system] = _Heard(fix)
+        received = self._received.get(system)
+        if received is not None:
+            received.fix = fix
+        elif len(self._received) < MOST:
+            self._received[system] = _Received(fix)
 
-    def _tunnel(self, wall: float, heard: _Heard, said: Tunnel) -> None:
+    def _tunnel(self, wall: float, received: _Received, said: Tunnel) -> None:
         """Store a plan, shifted into the fleet frame.
 
         The origin of the plan's frame is unknown: the median offset between vehicles and the first points of
@@ -163,12 +163,12 @@ class Listener:
             return
         knots = horizon_of(plan).knots[:, :6].copy()
         self._step = 1e-6 * plan.dt
-        self._offsets.append(heard.fix.place - knots[0, :3])
+        self._offsets.append(received.fix.place - knots[0, :3])
         knots[:, :3] += np.median(np.array(self._offsets), axis=0)
-        heard.planned, heard.plan = wall, padded(knots)
+        received.planned, received.plan = wall, padded(knots)
 
     def _scene(self, systems: tuple[int, ...]) -> Scene:
-        places = np.array([self._heard[system].fix.place for system in systems])
+        places = np.array([self._received[system].fix.place for system in systems])
         low, high = places.min(axis=0), places.max(axis=0)
         x, y, z = (0.5 * (low + high)).tolist()
         return Scene(
@@ -182,8 +182,8 @@ class Listener:
         )
 
     def _moment(self, wall: float) -> Snapshot:
-        shown = [self._heard[system] for system in self._shown[0]]
-        target = self._heard.get(self._target)
+        shown = [self._received[system] for system in self._shown[0]]
+        target = self._received.get(self._target)
         return Snapshot(
             wall - self._begun,
             "live",
@@ -205,8 +205,8 @@ def _carried(fix: _Fix, wall: float) -> Array:
     return place
 
 
-def _turned(heard: _Heard, wall: float) -> Array:
-    if heard.attitude is not None and wall - heard.leant < FRESH:
-        return heard.attitude
-    half = 0.5 * (heard.fix.yaw or 0.0)
+def _turned(received: _Received, wall: float) -> Array:
+    if received.attitude is not None and wall - received.leant < FRESH:
+        return received.attitude
+    half = 0.5 * (received.fix.yaw or 0.0)
     return np.array([np.cos(half), 0.0, 0.0, np.sin(half)])

@@ -64,14 +64,14 @@ class Live:
         found: list[Scene | Snapshot] = []
         for data in self._line.receive():
             # Received from the process that started this one, over a socket that no other process has.
-            told = pickle.loads(data)
-            if isinstance(told, Begin):
-                self._begin = told.commands
-                found.append(told.scene)
-            elif isinstance(told, Snapshot):
-                found.append(told)
-            elif isinstance(told, Landed):
-                self._player = self._load(Path(told.directory))
+            sent = pickle.loads(data)
+            if isinstance(sent, Begin):
+                self._begin = sent.commands
+                found.append(sent.scene)
+            elif isinstance(sent, Snapshot):
+                found.append(sent)
+            elif isinstance(sent, Landed):
+                self._player = self._load(Path(sent.directory))
                 return self._player.poll(wall)
         return found
 

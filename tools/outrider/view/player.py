@@ -49,7 +49,7 @@ class Player:
         # Before that the vehicles only take off.
         self._at = min(max(self.span[0], -1.0), self.span[1])
         self._wall: float | None = None
-        self._told: float | None = None
+        self._sent: float | None = None
         self._sought = True
 
     def poll(self, wall: float) -> Sequence[Scene | Snapshot]:
@@ -66,9 +66,9 @@ class Player:
             self._sought = False
             times = np.arange(max(self._at - PAST, self.span[0]), self._at, PAST_EVERY)
             found += [self.moment(time) for time in times.tolist()]
-            self._told = None
-        if self._told != self._at:
-            self._told = self._at
+            self._sent = None
+        if self._sent != self._at:
+            self._sent = self._at
             found.append(self.moment(self._at))
         return found
 
@@ -102,9 +102,9 @@ class Player:
 
     def _attitude(self, row: int, k: int, now: int) -> np.ndarray:
         """Return the attitude reported by the autopilot, or an upright attitude with the true yaw."""
-        told = self._records[k].attitude(now)
-        if told is not None:
-            return told
+        sent = self._records[k].attitude(now)
+        if sent is not None:
+            return sent
         half = 0.5 * float(self._motion.yaw[row, k])
         return np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
 

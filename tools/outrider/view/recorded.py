@@ -17,7 +17,7 @@ from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
-from outrider.logs.flight_modes import is_armed, told_mode
+from outrider.logs.flight_modes import is_armed, reported_mode
 from outrider.runs import names
 from outrider.scene.snapshot import NO_PLAN, Array, Single, euler_attitude, padded
 
@@ -43,7 +43,7 @@ class Record(NamedTuple):
     attitudes: list[Array]
     beaten: list[int]
     beats: list[Heartbeat]
-    heard: dict[int, list[int]]
+    received: dict[int, list[int]]
 
     def plan(self, now: int) -> Single:
         """Return the plan flown at ``now`` (µs).
@@ -58,7 +58,7 @@ class Record(NamedTuple):
     def mode(self, now: int) -> str:
         """Return the mode that the autopilot reported at ``now`` (µs); empty if that is not known."""
         beat = self._beat(now)
-        return "" if beat is None else told_mode(beat)
+        return "" if beat is None else reported_mode(beat)
 
     def attitude(self, now: int) -> Array | None:
         """Return the attitude reported at ``now`` (µs) or shortly before; None if there is none."""
@@ -71,7 +71,7 @@ class Record(NamedTuple):
 
     def age(self, now: int) -> float:
         """Return the largest time (s) since the last position of another vehicle; NaN before the first."""
-        last = [times[index - 1] for times in self.heard.values() if (index := bisect_right(times, now))]
+        last = [times[index - 1] for times in self.received.values() if (index := bisect_right(times, now))]
         return 1e-6 * (now - min(last)) if last else float("nan")
 
 
@@ -97,7 +97,7 @@ def record(path: Path, owner: int, at: Callable[[int], None] = lambda _bytes: No
     return found._replace(
         epochs=[found.epochs[i] for i in order],
         plans=[found.plans[i] for i in order],
-        heard={system: sorted(times) for system, times in found.heard.items()},
+        received={system: sorted(times) for system, times in found.received.items()},
     )
 
 
@@ -114,7 +114,7 @@ def _take(found: Record, owner: int, time: int, link: int, message: Message) -> 
             found.beats.append(message)
     elif isinstance(message, GlobalPosition):
         if system != owner and link == _SWARM:
-            found.heard.setdefault(system, []).append(time)
+            found.received.setdefault(system, []).append(time)
     elif isinstance(message, Tunnel) and system == owner and message.payload_type == PAYLOAD_TYPE:
         try:
             plan = unpack(message.payload)

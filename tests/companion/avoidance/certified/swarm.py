@@ -178,8 +178,8 @@ class Swarm:
 
     def _carry(self, since: int, sender: Vehicle, message: Tunnel) -> None:
         rough, rng = self._rough, self._rng
-        unheard = rough.mute + (rough.alone if message.payload_type == ROSTER else ())
-        mute = any(begin <= since < end and sender.system == whom for begin, end, whom in unheard)
+        unreceived = rough.mute + (rough.alone if message.payload_type == ROSTER else ())
+        mute = any(begin <= since < end and sender.system == whom for begin, end, whom in unreceived)
         for receiver in self.vehicles:
             if receiver is sender or receiver.system in rough.deaf:
                 continue

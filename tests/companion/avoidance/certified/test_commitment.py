@@ -59,7 +59,7 @@ def replan(kept: Commitment, goal: Array, others: Others = NOBODY) -> bool:
 def test_what_is_told_for_an_epoch_is_flown_in_it(ways: list[str], seed: int) -> None:
     """Whatever is done in each, and where whole epochs pass by."""
     kept, rng, now = commitment(), np.random.default_rng(seed), EPOCH
-    told = {}
+    announced = {}
     for way in ways:
         now += LENGTH * (4 if way == "sleep" else 1) - int(rng.integers(0, 1000))
         if kept.turn(now):
@@ -70,15 +70,15 @@ def test_what_is_told_for_an_epoch_is_flown_in_it(ways: list[str], seed: int) ->
         current = kept.current
         assert current is not None
         assert current.epoch == kept.epoch(now)
-        assert told.setdefault(current.epoch, current) == current
-        plan = kept.told()
+        assert announced.setdefault(current.epoch, current) == current
+        plan = kept.announced()
         assert plan is not None
         assert rests(plan)
-        assert told.setdefault(plan.epoch, plan) == plan
-    for before, after in pairwise(sorted(told)):
+        assert announced.setdefault(plan.epoch, plan) == plan
+    for before, after in pairwise(sorted(announced)):
         knots = (after - before) // DT
-        assert carried_on(told[before], knots).position == told[after].position
-        assert carried_on(told[before], knots).velocity == told[after].velocity
+        assert carried_on(announced[before], knots).position == announced[after].position
+        assert carried_on(announced[before], knots).velocity == announced[after].velocity
 
 
 def test_the_horizon_is_this_plan_and_then_the_next() -> None:
@@ -202,12 +202,12 @@ class TestStanding:
         flight.stand(EPOCH, HERE)
         flight.due(EPOCH)
         flight.messages(EPOCH)
-        told = flight.commitment.told()
-        assert told is not None
+        announced = flight.commitment.announced()
+        assert announced is not None
         for now in (EPOCH + LENGTH - 4, EPOCH + LENGTH):
             flight.stand(now, away)
-            assert (flight.commitment.following or flight.commitment.current) == told
-        now = told.epoch + LENGTH
+            assert (flight.commitment.following or flight.commitment.current) == announced
+        now = announced.epoch + LENGTH
         flight.stand(now, away)
         origin = FLEET.fingerprint
         assert flight.commitment.current == resting(now, DT, STEPS, away, origin)

@@ -57,10 +57,10 @@ def test_carried_on_is_the_same_motion_and_then_rest(plan: WirePlan, by: int) ->
 
 @given(resting_plans, knots)
 def test_a_receiver_carries_on_the_same_bits(plan: WirePlan, by: int) -> None:
-    heard = unpack(pack(plan))
-    assert heard == plan
-    assert pack(carried_on(heard, by)) == pack(carried_on(plan, by))
-    assert controls(carried_on(heard, by)).tobytes() == controls(carried_on(plan, by)).tobytes()
+    received = unpack(pack(plan))
+    assert received == plan
+    assert pack(carried_on(received, by)) == pack(carried_on(plan, by))
+    assert controls(carried_on(received, by)).tobytes() == controls(carried_on(plan, by)).tobytes()
 
 
 @given(resting_plans, knots)

@@ -41,7 +41,7 @@ def at(place: Array) -> Callable[[int], Array]:
     return lambda since: place
 
 
-def way(heard: Callable[[int], Array | None], *, whom: int = LEFT, end: Array = END) -> Array:
+def way(received: Callable[[int], Array | None], *, whom: int = LEFT, end: Array = END) -> Array:
     """Where the other flies (k, 3), every 20 ms, from 6 m before to 6 m behind the origin: one said farewell
     at ``end``, and ``whom`` is heard at ``heard`` by µs since, from 0.1 s before its last plan begins on."""
     flight, world = CertifiedFlight(CONFIG, Source(OWN, 195), FLEET), World(CONFIG, OWN, 0, FLEET)
@@ -50,7 +50,7 @@ def way(heard: Callable[[int], Array | None], *, whom: int = LEFT, end: Array = 
     flight.stand(EPOCH, np.array([-6.0, 0.0, 5.0]))
     places = []
     for since in range(-100_000, 6_000_000, 20_000):
-        now, place = EPOCH + since, heard(since)
+        now, place = EPOCH + since, received(since)
         if place is not None:
             boot = since + 1_000_000
             world.receive(

@@ -32,7 +32,7 @@ def config(kind: str | None = None, **certified: float) -> CompanionConfig:
     )
 
 
-def told(world: World, place: Array, velocity: Array, link: str = "swarm") -> None:
+def announced(world: World, place: Array, velocity: Array, link: str = "swarm") -> None:
     """The other says where it is, and how fast."""
     latitude, longitude, altitude = FLEET.to_geodetic(place)
     ned = (float(velocity[1]), float(velocity[0]), float(-velocity[2]))
@@ -43,7 +43,7 @@ def told(world: World, place: Array, velocity: Array, link: str = "swarm") -> No
 def hovering(of: CompanionConfig, place: Array, velocity: Array) -> Array:
     """Where the next plan of one that hovers, and wants to, ends, with the other at ``place``."""
     flight, world = CertifiedFlight(of, Source(OWN, 195), FLEET), World(of, OWN, 10, FLEET)
-    told(world, place, velocity)
+    announced(world, place, velocity)
     flight.stand(NOW, HERE)
     flight.commitment.following = None
     assert flight.plan(NOW, standing(HERE), world, world.at(NOW))
@@ -83,7 +83,7 @@ def test_a_thing_is_where_it_says_and_a_vehicle_only_nearly() -> None:
     least = []
     for of in (config("sphere"), config()):
         world = World(of, OWN, 10, FLEET)
-        told(world, HERE, np.zeros(3))
+        announced(world, HERE, np.zeros(3))
         strangers = NonCooperative(of, STEPS)
         least.append(strangers.seen(NOW + 200_000, frozenset(), world)[0].least)
     own = config().certified
@@ -96,20 +96,20 @@ def test_a_thing_is_where_it_says_and_a_vehicle_only_nearly() -> None:
 def test_a_target_that_falls_silent_is_kept_clear_of_where_it_was_last() -> None:
     of = config().model_copy(update={"target_d_min": 1.0, "target_d_safe": 4.0})
     world, place = World(of, OWN, OTHER, FLEET), HERE + np.array([3.0, 0.0, 0.0])
-    told(world, place, np.zeros(3), "target")
+    announced(world, place, np.zeros(3), "target")
     strangers, silence = NonCooperative(of, STEPS), 10 * of.guard.target_stale_us
-    (heard,), (silent,) = (
+    (received,), (silent,) = (
         strangers.target(now, now + 200_000, world.at(now)) for now in (NOW, NOW + silence)
     )
     assert world.at(NOW + silence).target is None
-    for before, after in zip(heard, silent, strict=True):
+    for before, after in zip(received, silent, strict=True):
         np.testing.assert_allclose(after, before, atol=1e-6)
     np.testing.assert_allclose(silent[0], np.broadcast_to(place, (STEPS, 3, 3)), atol=0.02)
 
 
 def test_a_member_is_no_stranger() -> None:
     world = World(config(), OWN, 10, FLEET)
-    told(world, HERE, np.zeros(3))
+    announced(world, HERE, np.zeros(3))
     strangers = NonCooperative(config(), STEPS)
     assert strangers.seen(NOW, frozenset({OTHER}), world) == []
     own = controls(resting(NOW, 200_000, STEPS, HERE, FLEET.fingerprint))

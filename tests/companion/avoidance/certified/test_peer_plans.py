@@ -227,18 +227,18 @@ class TestFarewell:
 
     @pytest.mark.parametrize("told", range(-1, 9))
     def test_after_the_own_one_only_those_count_with_us_who_cannot_believe_it_any_more(
-        self, told: int
+        self, announced: int
     ) -> None:
         """A roster is told from two epochs before its own on; a farewell is believed for four."""
         book = peers(frozenset({OTHER}))
         receive(book, OTHER, plan(-1), OWN)
         book.leave(EPOCH)
-        now = EPOCH + told * LENGTH
-        receive(book, OTHER, plan(told), OWN, now=now)
+        now = EPOCH + announced * LENGTH
+        receive(book, OTHER, plan(announced), OWN, now=now)
         believed = peers()
         receive(believed, OTHER, plan(), now=EPOCH)
         believed.receive_roster(now - 2 * LENGTH, OTHER, Roster(EPOCH, frozenset(), farewell=True))
-        assert bool(book.missing(now)) == (told <= 6)
+        assert bool(book.missing(now)) == (announced <= 6)
         assert bool(book.missing(now)) >= bool(believed.left)
 
     def test_who_said_it_counts_with_us_only_when_it_says_so_again(self) -> None:
