@@ -70,8 +70,8 @@ class GuardConfig(Settings):
         0.0,
         ge=0.0,
         le=20.0,
-        description="m: on the way back the vehicles fly so far above each other, in the order of their ids;"
-        " each climbs first",
+        description="m: on the way back the vehicles fly so far above each other, in the order of their ids,"
+        " all of them above the distance that the target keeps; each climbs first",
     )
     near: Positive | None = Field(
         None,

@@ -76,7 +76,7 @@ class Goals:
         self._held: Array | None = None
         self._began: Array | None = None
         self._nearest, self._nearer_at = inf, 0
-        self._lane = 0.0
+        self._lane, self._clearance = 0.0, self._above_target(system)
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self.goal: Array | None = None
@@ -115,7 +115,8 @@ class Goals:
         ``below``: how many of the others have a smaller id. Raises SurfaceError where the surface has no
         nearest point.
         """
-        self._lane = self._config.guard.return_step * below
+        step = self._config.guard.return_step
+        self._lane = step * below + self._clearance if step else 0.0
         aim = self._destination(now, view, measured, obstacles, mates)
         speed = self._config.guard.cautious_speed
         return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
@@ -184,6 +185,17 @@ class Goals:
         if self._held is None:
             self._held = measured.position.copy()
         return self._held
+
+    def _above_target(self, system: int) -> float:
+        """Return the climb (m) from the surface after which the target no longer repels the vehicle.
+
+        A vehicle that the target pushes up on its way back would come into the lane above.
+        """
+        config = self._config
+        if config.task != "escort" or config.target_d_safe is None:
+            return 0.0
+        lowest = float(config.surface_of(system).outline()[:, 2].min())
+        return max(config.target_d_safe + config.field.margin(1) - lowest, 0.0)
 
     def _way_back(self, now: int, measured: Motion) -> Array:
         """Return the place (3,), m, to return to: above the start.

@@ -8,6 +8,9 @@ import pytest
 from companion.errors import SolverError
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandLong
+from outrider.resources import find
+from outrider.scenarios.fly_config import FlyConfig
+from outrider.yaml_files.yaml_file import load
 from tests.companion.bench import LAND, NAN, SYSTEM, TAKEOFF, TARGET, Bench, field_of, only, seen_at
 
 RETURN, HOLD = 20, 17
@@ -187,5 +190,27 @@ def test_a_vehicle_with_a_lane_climbs_to_it_before_it_sets_off() -> None:
         bench.step(*([received] if bench.now % 100_000 == 0 else []))
         assert bench.phase is Phase.RETURN
     assert bench.autopilot.position[2] > 5.0 + 3.0 - 1.1
+    bench.until(Phase.DONE, 60.0)
+    assert off(bench, (0.0, 0.0)) < 1.0
+
+
+@pytest.mark.parametrize("east", [8.0, 10.0, 12.0])
+def test_the_target_pushes_no_vehicle_into_the_lane_above(east: float) -> None:
+    """The way back of the lowest vehicle leads over the target, with the shipped settings."""
+    shipped = load(find("companions", "ardupilot"), FlyConfig).companion.model_dump()
+    bench = Bench(**shipped)
+    bench.target = seen_at(TARGET, (20.0, 0.0, 1.5))
+    bench.take_off().fly(15.0)
+    assert off(bench, (15.0, 0.0)) < 0.5
+    bench.target = seen_at(TARGET, (east, 0.5, 1.5))
+    bench.fly(0.8)
+    bench.order(RETURN)
+    above = 0.0
+    while bench.phase is Phase.RETURN:
+        bench.step()
+        plan = field_of(bench.companion).plan
+        assert plan is not None
+        above = max(above, float(bench.autopilot.position[2] - plan.aim.destination[2]))
+    assert above < 0.5
     bench.until(Phase.DONE, 60.0)
     assert off(bench, (0.0, 0.0)) < 1.0
