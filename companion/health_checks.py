@@ -1,4 +1,4 @@
-"""Health checks of one companion: concerns are determined, reported to the ground, and reacted to."""
+"""Health checks of one companion: concerns, their reports to the ground, and reactions to them."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _PLAIN = str.maketrans({"²": "2", "³": "3", "°": "deg"})
 
 
 class HealthChecks:
-    """Health checks of the vehicle of ``pilot``, ten times a second.
+    """Health checks of the vehicle of ``pilot``, about every 100 ms.
 
-    Concerns and what was found out about the autopilot's limits are reported with ``reporter``.
+    ``reporter`` reports concerns and changes of the autopilot's limits.
     """
 
     def __init__(
@@ -38,18 +38,18 @@ class HealthChecks:
         self._round_trips, self._reporter = round_trips, reporter
         self.monitor = HealthMonitor(config)
         self._reactions = Reactions()
-        self._next = self._latest = self._remarked = 0
+        self._next = self._largest_delay = self._reported = 0
 
     def start(self, now: int) -> None:
         """Start the checks at ``now`` (µs)."""
         self._next = now
 
     def step(self, now: int, view: View, late: int) -> None:
-        """Check if it is time to.
+        """Run the checks if they are due.
 
-        ``late``: time (µs) by which this step is later than the set-point that was due.
+        ``late``: time (µs) since the set-point was due; negative before.
         """
-        self._latest = max(self._latest, late)
+        self._largest_delay = max(self._largest_delay, late)
         if now < self._next:
             return
         self._next = now + _PERIOD
@@ -58,7 +58,7 @@ class HealthChecks:
             if concern.name != "target":  # ``report_silence`` reports the target
                 self._reporter.report(concern.severity, concern.text, begins=change.begins)
             self._reactions.note(change)
-        self._latest = 0
+        self._largest_delay = 0
         self._reactions.follow(self._pilot)
         self._report_limits()
 
@@ -73,7 +73,7 @@ class HealthChecks:
             avoidance.state,
             world.neighbours.ages(now),
             avoidance.failing,
-            self._latest if pilot.streaming else 0,
+            self._largest_delay if pilot.streaming else 0,
             world.clock_steps,
             world.moves,
             world.displaced,
@@ -84,9 +84,9 @@ class HealthChecks:
         )
 
     def _report_limits(self) -> None:
-        """Report to the ground what was found out about the autopilot's limits."""
+        """Report changes of the autopilot's limits to the ground."""
         limits = self._pilot.limits
-        new = min(limits.said - self._remarked, len(limits.remarks))
+        new = min(limits.said - self._reported, len(limits.remarks))
         for text in list(limits.remarks)[len(limits.remarks) - new :]:
             self._reporter.say(Severity.WARNING, text.translate(_PLAIN))
-        self._remarked = limits.said
+        self._reported = limits.said

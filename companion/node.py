@@ -1,6 +1,6 @@
 """Node of the companion computer: receive → world → flight → health → plan → set-point → bytes.
 
-It uses no socket and no clock.
+The node uses no socket and no clock.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Companion:
     """Companion of one vehicle, a ``Node``.
 
     Links: ``autopilot``, ``swarm``, ``target``, ``ground``. ``stopwatch`` (ns) only measures how long
-    planning takes; nothing depends on it. ``signing`` is the companion's own instance for all links; the
+    planning takes, for metrics and summaries. ``signing`` is the companion's own instance for all links; the
     index of a link in ``LINKS`` is its link id. Without ``signing`` the companion accepts signed and unsigned
     messages alike.
     """
@@ -95,7 +95,7 @@ class Companion:
 
     @property
     def flown(self) -> Horizon | None:
-        """Horizon that is flown; None while the companion steers nothing."""
+        """Horizon that is flown; None while set-points do not control the vehicle."""
         return self.avoidance.horizon
 
     @property
@@ -130,7 +130,7 @@ class Companion:
         return sum(codec.counters.bad for codec in self._codecs.values())
 
     def use(self, methods: tuple[MethodName, ...]) -> None:
-        """Use ``methods`` from the next plan on."""
+        """Use ``methods`` from the next plan on, and for the selection of relevant neighbours."""
         self.avoidance.use(methods)
         self.world.neighbours.relevance.use(methods)
 
@@ -170,14 +170,14 @@ class Companion:
         )
 
     def _start(self, now: int) -> None:
-        """Start all periods at ``now`` (µs), the time of the first step."""
+        """Start the periods of avoidance, set-points and health checks at ``now`` (µs), the first step."""
         self._started = True
         self.avoidance.next_due = now
         self._setpoints.start(now)
         self._checks.start(now)
 
     def _has_to_act(self, now: int) -> bool:
-        """Return whether anything is due; in the escort only messages are received between two deadlines."""
+        """Return whether anything is due; in the escort a step before the next deadline only receives."""
         return (
             self.pilot.phase is not Phase.ESCORT
             or not self.avoidance.idle(now)
@@ -209,7 +209,7 @@ class Companion:
             self.world.answered(now, answer)
 
     def _reports(self, now: int) -> dict[str, list[Message]]:
-        """Return the messages for the ground by link: events and metrics."""
+        """Return status texts and metrics, by the link that carries them."""
         settings = self.config.ground_messages
         if not (settings.texts or settings.values):
             return {}

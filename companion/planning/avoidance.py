@@ -19,8 +19,10 @@ from mavlink_bridge.messages import Message
 class Tally(NamedTuple):
     """Counters of one companion so far.
 
-    ``plan_ns``: one stopwatch reading (ns) per plan, at most 4.29 s. ``plan_at``: time (µs on the companion's
-    clock) at which that plan was due.
+    ``plans`` that were made, and how many of them with ``relaxed`` bounds; ``solver_failures``; ``held``: how
+    often an old plan was kept; ``anchored_anew``: how often planning restarted at the measured position.
+    ``plan_ns``: one stopwatch reading (ns) per attempt to plan, at most 4.29 s. ``plan_at``: time (µs on the
+    companion's clock) of the step that made the attempt.
     """
 
     plans: int
@@ -37,6 +39,7 @@ class Situation(NamedTuple):
 
     ``measured``: the own motion, its velocity clipped to the limits; ``stale``: whether it is too old to plan
     from; ``aim``: function that returns the aim of a plan made now, None if the surface has no nearest point.
+    It is to be called once in a step at most, because it may end a phase of the flight.
     """
 
     view: View
@@ -53,7 +56,7 @@ class Avoidance(Protocol):
 
     @property
     def seconds(self) -> float:
-        """Time (s) from now to the end of the plan that is made next, at most."""
+        """Upper bound (s) of the time from now to the end of the next plan."""
         ...
 
     @property
@@ -68,7 +71,7 @@ class Avoidance(Protocol):
 
     @property
     def failing(self) -> int | None:
-        """Time (µs) since which the solver finds no plan; None while it does."""
+        """Time (µs) of the first of the present failures of the solver; None if it succeeded last."""
         ...
 
     @property
@@ -108,7 +111,7 @@ class Avoidance(Protocol):
         ...
 
     def pause(self, gap: int) -> None:
-        """Take account of ``gap`` (µs), the time since the last step."""
+        """React to a pause of ``gap`` (µs) since the last step: a long one may end the flown horizon."""
         ...
 
     def discard(self) -> None:
@@ -116,13 +119,13 @@ class Avoidance(Protocol):
         ...
 
     def rest(self) -> None:
-        """Discard what is flown and observed, because set-points do not steer the vehicle."""
+        """Discard the horizon and the state of tracking while set-points do not control the vehicle."""
         ...
 
     def fly(self, now: int, situation: Situation) -> Array | None:
-        """Bring the horizon up to date at ``now`` (µs).
+        """Update the horizon at ``now`` (µs).
 
-        Returns the own positions (N + 1, 3), m, of the next steps if the yaw is to be planned along them,
+        Returns the own positions (N + 1, 3), m, of the next steps if a new yaw plan is due along them,
         otherwise None.
         """
         ...

@@ -23,8 +23,8 @@ from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
 class CertifiedAvoidance:
     """``Avoidance`` by the committed plans of one vehicle.
 
-    A committed plan is flown as it is: set-points are not compensated, limits are not lowered, and no method
-    of the field takes part.
+    A committed plan is flown as it is: set-points are not compensated, the limits of plans are not lowered,
+    and no method of the field takes part.
     """
 
     failing: int | None = None
@@ -42,7 +42,7 @@ class CertifiedAvoidance:
         self._config, self._world, self._pilot, self._times = config, world, pilot, times
         self._flight = CertifiedFlight(config, own, fleet)
         self.seconds = self._flight.seconds
-        self.tracking = Tracking(TrackingConfig())
+        self.tracking = Tracking(TrackingConfig(compensate=False, usual=None, alarm=None))
         self.horizon: Horizon | None = None
         self.log = PlanLog()
         self.next_due = 0
@@ -71,7 +71,7 @@ class CertifiedAvoidance:
         """Do nothing: the limits of committed plans are those of the configuration."""
 
     def begin(self, now: int, measured: Motion) -> None:
-        """Stand at the ``measured`` position until the vehicle steers."""
+        """Hold the ``measured`` position until the autopilot follows set-points."""
         self._flight.stand(now, measured.position)
 
     def pause(self, gap: int) -> None:
@@ -105,7 +105,7 @@ class CertifiedAvoidance:
         return horizon.positions(now + step, count, step)
 
     def idle(self, now: int) -> bool:
-        """Return whether nothing is to be planned, announced or turned at ``now`` (µs)."""
+        """Return whether no plan, no announcement and no yaw plan is due at ``now`` (µs)."""
         return now < self.next_due and self._flight.idle(now)
 
     def receive(self, now: int, link: str, message: Message) -> bool:
@@ -124,7 +124,7 @@ class CertifiedAvoidance:
         return None
 
     def _replan(self, now: int, situation: Situation) -> None:
-        """Make the next epoch's plan, or carry the present one on."""
+        """Make the next epoch's plan, or extend the committed plan by one epoch."""
         flight, started = self._flight, self._times.stopwatch()
         aim = None if situation.stale else situation.aim()
         if aim is None:

@@ -27,7 +27,10 @@ from mavlink_bridge.messages import Message
 
 
 class FieldAvoidance:
-    """``Avoidance`` by the ``planner`` of one vehicle, with the ``guard`` that holds the flown horizon."""
+    """``Avoidance`` by the field.
+
+    ``planner`` makes plans; ``guard`` stores the flown horizon and replaces it by a brake.
+    """
 
     def __init__(self, config: CompanionConfig, world: World, pilot: Pilot, times: PlanTimes) -> None:
         self._config, self._world, self._pilot, self._times = config, world, pilot, times
@@ -88,7 +91,7 @@ class FieldAvoidance:
         self.tracking.keep(lowered.acceleration)
 
     def begin(self, now: int, measured: Motion) -> None:
-        """Start to steer from the ``measured`` motion with a brake, until the first plan."""
+        """Start with a brake from the ``measured`` motion; it is flown until the first plan."""
         self.guard.start(now, measured)
 
     def pause(self, gap: int) -> None:
@@ -119,7 +122,7 @@ class FieldAvoidance:
             self.tracking.forget()
             return None
         if not self._pilot.steers(now):
-            # Set-points are sent before the autopilot follows them: a plan would run away from the vehicle.
+            # Until the autopilot follows set-points, a plan would advance while the vehicle does not.
             self.guard.start(now, situation.measured)
             self.tracking.reset()
             return None
@@ -135,7 +138,7 @@ class FieldAvoidance:
         return now < self.next_due
 
     def receive(self, now: int, link: str, message: Message) -> bool:
-        """Leave all messages to the world picture."""
+        """Return False: the world picture processes all messages."""
         return False
 
     def messages(self, now: int, *, farewell: bool) -> list[Message]:
@@ -145,8 +148,8 @@ class FieldAvoidance:
     def shared(self, now: int, view: View) -> Horizon | None:
         """Return the horizon to share with the neighbours; None if nothing is flown.
 
-        A vehicle that shares a surface with others takes part from its climb on, with its present velocity:
-        if the others chose their places without it, they would have to turn round.
+        A vehicle that shares a surface with others takes part from its climb on, with its present velocity.
+        Otherwise the others would choose their places without it, and change them later.
         """
         if self.guard.horizon is not None:
             return self.guard.horizon
@@ -177,7 +180,7 @@ class FieldAvoidance:
                 else horizon.positions(now, config.steps + 1, config.dt_us)
             )
             if self._fading is not None and horizon is not None:
-                # The others avoid the vehicle, not its plan.
+                # The others avoid the measured position: the prediction is shifted by the tracking error.
                 prediction = prediction + self._fading * self.tracking.error
             obstacles = self._world.obstacles(now, situation.view, prediction)
             if aim.spacing < inf:

@@ -1,4 +1,4 @@
-"""Times that plans took, by a stopwatch on which nothing else depends."""
+"""Times that plans took, for metrics and summaries; planning does not depend on them."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class PlanTimes:
     def __init__(self, stopwatch: Callable[[], int], took: Callable[[int], None]) -> None:
         self.stopwatch, self._took = stopwatch, took
         self.plan_ns = array("I")
-        """Reading (ns) of each plan since the last ``shed``, at most 4.29 s."""
+        """Reading (ns) of each attempt to plan since the last ``shed``, at most 4.29 s."""
         self.plan_at = array("q")
-        """Time (µs) at which that plan was due."""
+        """Time (µs) of the step that made the attempt."""
 
     def add(self, now: int, started: int) -> None:
         """Record the plan that was due at ``now`` (µs) and started at stopwatch reading ``started`` (ns)."""

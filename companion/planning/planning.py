@@ -1,4 +1,4 @@
-"""Planning of what the vehicle flies: position by avoidance, yaw towards the target."""
+"""Planning of the position by avoidance, and of the yaw towards the target."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Planning:
     def step(self, now: int, view: View, *, cautious: bool) -> None:
         """Plan when due; start from the measured state each time control of the vehicle begins.
 
-        ``cautious`` limits the way within a horizon to what ``guard.cautious_speed`` covers.
+        ``cautious`` limits the distance to the destination to ``guard.cautious_speed`` times the horizon.
         """
         avoidance = self._avoidance
         if view.local is not self._frame:
@@ -71,8 +71,7 @@ class Planning:
             avoidance.rest()
             return
         stale = view.own.age > self._config.guard.own_stale_us
-        # Whatever speed the own autopilot reports, or a sender that uses its id, no axis is asked for more
-        # than its limit.
+        # A faulty autopilot, or a sender that uses its id, must not cause set-points above v_max.
         measured = Motion(view.own.position, clipped(view.own.velocity, self.fastest), _ZERO)
         if avoidance.horizon is None:
             if stale or view.yaw is None:
@@ -94,7 +93,7 @@ class Planning:
     def _face(self, now: int, view: View, places: Array) -> None:
         """Plan the yaw along the own ``places`` (N + 1, 3), m, of the next steps.
 
-        Without a target the vehicle keeps its yaw.
+        Without a target no new yaw is planned: the last yaw plan continues to its end.
         """
         if view.target is None:
             return
@@ -105,8 +104,8 @@ class Planning:
         """Return the aim of the next plan; None if the surface has no nearest point."""
         obstacles = _NO_OBSTACLES
         if self._pilot.phase is Phase.SETTLE:
-            # Use the others' present positions: a vehicle that has just begun to steer has no plan yet that
-            # was made among them.
+            # Use the others' present positions: a vehicle that has just begun to steer has not yet planned
+            # with regard to them.
             here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
             obstacles = self._world.obstacles(now, view, here)
         try:

@@ -12,7 +12,7 @@ from mavlink_bridge.messages import Message, Source
 
 
 class Setpoints:
-    """Set-points of the vehicle of ``own``, at the rate of ``rates.setpoint_us``."""
+    """Set-points for the autopilot of ``own``, one every ``rates.setpoint_us``."""
 
     def __init__(
         self, config: CompanionConfig, own: Source, pilot: Pilot, avoidance: Avoidance, planning: Planning
@@ -26,11 +26,14 @@ class Setpoints:
         """Number of set-points that were not finite and therefore not sent."""
 
     def start(self, now: int) -> None:
-        """Start the stream at ``now`` (µs), from which set-points count their time."""
+        """Start the stream; ``now`` (µs) becomes the zero of the set-points' time since boot."""
         self._boot = self.next_due = now
 
     def due(self, now: int, view: View) -> list[Message]:
-        """Return the set-point if one is due at ``now`` (µs) and the vehicle is steered."""
+        """Return the set-point if one is due at ``now`` (µs), otherwise an empty list.
+
+        There is none without a horizon, a known autopilot and a local frame, or while nothing is steered.
+        """
         if now < self.next_due:
             return []
         period = self._config.rates.setpoint_us
@@ -53,7 +56,7 @@ class Setpoints:
             tracking.lead(self._pilot.loop),
         )
         if not is_finite(message):
-            # Such a set-point must not be sent: the plan starts anew at the measured position.
+            # It is not sent. Its horizon is discarded, and planning restarts at the measured position.
             self.not_finite += 1
             self._avoidance.discard()
             return []

@@ -6,10 +6,10 @@ from companion.telemetry.status_text import StatusReporter
 from companion.world import World
 
 
-def report_silence(now: int, world: World, voice: StatusReporter) -> None:
+def report_silence(now: int, world: World, reporter: StatusReporter) -> None:
     """Report target and distance sensors of ``world`` that are silent at ``now`` (µs), and their return."""
     if world.config.task == "escort" and world.target.age(now) is not None:
-        voice.watch(world.target.at(now) is None, "Target lost", "Target is back")
+        reporter.watch(world.target.at(now) is None, "Target lost", "Target is back")
     if world.sensed.proximity is not None:
         silent = world.sensed.proximity.silent(now)
-        voice.watch(silent, "Obstacle sensor silent", "Obstacle sensor is back")
+        reporter.watch(silent, "Obstacle sensor silent", "Obstacle sensor is back")

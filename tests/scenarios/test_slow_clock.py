@@ -48,7 +48,7 @@ def test_lost_time_is_made_good_all_the_way(flavour, pace, share):
     vehicle.order(RETURN)
     vehicle.until(Phase.DONE)
     assert np.linalg.norm(vehicle.place[:2] - start) < 0.6
-    assert vehicle.companion.held < 60
+    assert vehicle.companion.avoidance.held < 60
 
 
 def test_a_clock_that_loses_much_is_told_of_and_a_good_one_is_not_asked():

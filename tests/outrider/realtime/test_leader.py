@@ -50,11 +50,11 @@ class Processes:
 
 class Led:
     def __init__(self) -> None:
-        self.crew, self.board = Processes(), SharedPage(2)
-        self.crew.board = self.board
+        self.processes, self.board = Processes(), SharedPage(2)
+        self.processes.board = self.board
         self.conductor = Conductor(OF, FLEET.starts, FLEET.operator(), START)
-        crew: Any = self.crew
-        self.leader = _Leader(FLEET, self.conductor, crew, self.board, lambda _stage, _seconds: None)
+        processes: Any = self.processes
+        self.leader = _Leader(FLEET, self.conductor, processes, self.board, lambda _stage, _seconds: None)
         self.now = START
 
     def look(self, seconds: float, *, interrupted: bool = False) -> bool:
@@ -70,7 +70,7 @@ def test_who_dies_before_anybody_was_seen_ends_the_run(name: str) -> None:
     led = Led()
     led.board.show_vehicle(0, np.zeros(3), np.zeros(3), False)
     assert not led.look(1.0)
-    led.crew.dead = {name: -9}
+    led.processes.dead = {name: -9}
     assert led.look(0.1)
     assert led.conductor.failure == f"the process of {name} ended with status -9"
 
@@ -93,7 +93,7 @@ def test_a_thaw_is_on_the_board_before_the_process_goes_on() -> None:
     led = Led()
     led.leader.freeze(12)
     led.leader.thaw(12)
-    assert led.crew.told == [("freeze", "companion-12", 0), ("thaw", "companion-12", 1)]
+    assert led.processes.told == [("freeze", "companion-12", 0), ("thaw", "companion-12", 1)]
     assert led.board.thaws.tolist() == [0, 1]
 
 

@@ -131,7 +131,7 @@ def test_a_log_that_begins_later_finds_its_time(tmp_path: Path) -> None:
         ({"yaw": np.zeros((651, 2))}, "yaw is of shape (651, 2); needed: (651, 3)"),
         ({"target": np.zeros((650, 3))}, "target is of shape"),
         ({"tilt": None}, "holds no tilt"),
-        ({"position": np.full((651, 3, 3), "x")}, "position holds no numbers"),
+        ({"position": np.full((651, 3, 3), "x")}, "position holds neither"),
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(

@@ -34,7 +34,7 @@ def test_a_former_name_loads_as_the_present_one(former: str, capsys: pytest.Capt
     (line,) = capsys.readouterr().err.splitlines()
     old, new = former.rpartition("{")[2], FORMER[former].rpartition("{")[2]
     assert line.startswith("outrider: old.yaml:1:")
-    assert "is called" in line
+    assert "was renamed to" in line
     assert old != new or "'voice'" in line or "'stall'" in line
 
 
@@ -42,11 +42,11 @@ def test_it_does_so_inside_other_settings(capsys: pytest.CaptureFixture[str]) ->
     text = find("scenarios", "walk").read_text()
     former = text.replace("\ncompanion:\n", "\ncompanion:\n  voice: {texts: true}\n")
     assert read(former.encode(), "walk.yaml", Scenario).companion.ground_messages.texts
-    assert "'voice' is called 'ground_messages' now" in capsys.readouterr().err
+    assert "'voice' was renamed to 'ground_messages'" in capsys.readouterr().err
 
 
 def test_both_names_are_refused() -> None:
-    with pytest.raises(InputError, match=r"x\.yaml:1:1: 'voice' is the former name of 'ground_messages'"):
+    with pytest.raises(InputError, match=r"x\.yaml:1:1: 'voice' and 'ground_messages' are the same key"):
         read(b"voice: {}\nground_messages: {}\n", "x.yaml", CompanionConfig)
 
 

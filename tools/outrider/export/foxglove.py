@@ -1,6 +1,6 @@
-"""Values of Foxglove's well-known messages (``foxglove_schemas``).
+"""Builders of messages in Foxglove's schemas (``foxglove_schemas``).
 
-Lengths are in m. A quaternion rotates from a body's frame (x forward, y left, z up) to its parent's.
+Lengths are in m. A quaternion rotates from the child frame to the parent frame; vehicle frames are FLU.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def point(at: Point) -> Json:
 
 
 def turn(quaternion: Sequence[float]) -> Json:
-    """Return a quaternion from (w, x, y, z)."""
+    """Return the quaternion message of (w, x, y, z), rounded to six decimals."""
     w, x, y, z = (round(float(part), 6) for part in quaternion)
     return {"x": x, "y": y, "z": z, "w": w}
 
@@ -65,7 +65,8 @@ def entity(
 ) -> Json:
     """Return a scene entity, which is shown until another with the same ``name`` replaces it.
 
-    All arrays of shapes are present, as Foxglove's readers expect.
+    Unused arrays of shapes are present and empty, because Foxglove's readers require them. ``locked``: the
+    entity moves with its frame.
     """
     empty: dict[str, list[Json]] = {shape: [] for shape in _SHAPES}
     return {
@@ -86,7 +87,10 @@ def update(*entities: Json) -> Json:
 
 
 def arrow(length: float, width: float, color: Color) -> Json:
-    """Return an arrow from the frame's origin along x; the head is a third of its length."""
+    """Return an arrow from the frame's origin along x.
+
+    The head is a third of its ``length``; ``width`` is the diameter of the shaft.
+    """
     return {
         "pose": pose((0.0, 0.0, 0.0)),
         "shaft_length": length * 2 / 3,
@@ -103,7 +107,7 @@ def sphere(at: Point, diameter: float, color: Color) -> Json:
 
 
 def cylinder(at: Point, diameter: float, height: float, color: Color) -> Json:
-    """Return an upright cylinder with its centre at ``at``."""
+    """Return a cylinder along z with its centre at ``at``."""
     return {
         "pose": pose(at),
         "size": point((diameter, diameter, height)),
@@ -128,7 +132,7 @@ def line(points: Sequence[Point], pixels: float, color: Color) -> Json:
 
 
 def label(at: Point, text: str, size: float, color: Color) -> Json:
-    """Return a text that always faces the viewer; ``size`` in m."""
+    """Return a text that always faces the viewer; ``size`` is the height of the font, m."""
     return {
         "pose": pose(at),
         "billboard": True,

@@ -30,6 +30,7 @@ from outrider.runs.directories import new_directory
 from outrider.terminal.lines import say
 
 FAULT: Final = 3
+"""Exit status of a flight that ended with a fault."""
 CONFIGURATION, SUMMARY = "configuration.yaml", "summary.json"
 _STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
@@ -37,10 +38,11 @@ _SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 
 
 def run(asked: Request) -> int:
-    """Fly until landing, Ctrl-C, SIGTERM or the end of the time limit, and return the exit status.
+    """Fly until the vehicle has landed, a signal ends the program or the time limit ends.
 
-    A log in the request runs a shadow run instead. Raises InputError if a link or file cannot be opened, and
-    if the autopilot is not that of the own vehicle.
+    Returns the exit status. The signals are SIGINT, SIGTERM, SIGHUP and SIGQUIT. If the request names a log,
+    a shadow run of that log is made instead. Raises InputError if a link or file cannot be opened, or if the
+    autopilot is not that of the own vehicle.
     """
     if asked.log is not None:
         from outrider.fly.shadow_run import dry_run_of_log
@@ -53,7 +55,7 @@ def run(asked: Request) -> int:
 def _live(asked: Request) -> int:
     config, began = asked.config, time.monotonic()
     wiring = wire(asked.endpoints, config.system, config.target, config.settings, WallClock())
-    with closing(wiring), noted(_STOPS) as stops, _never_stopped():
+    with closing(wiring), noted(_STOPS) as stops, _suspending_signals_ignored():
         directory = new_directory(asked.out, f"fly-{config.system}")
         document = config.model_dump(mode="json")
         try:
@@ -107,7 +109,7 @@ def _flown(asked: Request, directory: Path, event_log: EventLog, stops: list[Cam
 
 
 @contextmanager
-def _never_stopped() -> Iterator[None]:
+def _suspending_signals_ignored() -> Iterator[None]:
     """Ignore the suspending signals: a suspended process would leave the vehicle on its last set-point."""
     before = {which: signal.signal(which, signal.SIG_IGN) for which in _SUSPENDING}
     try:

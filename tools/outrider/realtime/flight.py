@@ -96,21 +96,21 @@ class RealTimeFlight:
             scratch = Path(folder)
             start = self._clock.now() + (_START_WITH_PRIORITY if self._priority else _START)
             workers = spawn(self.fleet, wiring, self._clock, board, start, self._directory, scratch)
-            crew = Processes(workers, wiring, board, scratch)
-            crew.start(priority=self._priority)
+            children = Processes(workers, wiring, board, scratch)
+            children.start_all(priority=self._priority)
             try:
                 wiring.close_others(wiring.operator)
                 operator = self.fleet.operator()
                 behind = rough(self.fleet, operator, {"ground": None})
                 conductor = Conductor(self.scenario, self.fleet.starts, operator, start)
-                leader = _Leader(self.fleet, conductor, crew, board, self._progress, self._view)
+                leader = _Leader(self.fleet, conductor, children, board, self._progress, self._view)
                 every = Scheduled(
                     behind, self.scenario.timing.companion_us, operators_turn(self.fleet, start)
                 )
                 loop = RealTime(every, wiring.operator, self._clock)
                 loop.run(lambda: self._interrupts > 1, lambda now: leader.look(now, self._interrupts > 0))
             finally:
-                remains = crew.join()
+                remains = children.results()
             counters = behind.network.counters
             self.outcome = self._gather(
                 scratch, conductor, leader.moves, remains, Messages(counters.sent, counters.dropped, 0)
@@ -183,12 +183,12 @@ class _Leader:
         self,
         fleet: Fleet,
         conductor: Conductor,
-        crew: Processes,
+        children: Processes,
         board: SharedPage,
         progress: Progress,
         view: RealTimeView | None = None,
     ) -> None:
-        self._fleet, self._conductor, self._crew, self._board = fleet, conductor, crew, board
+        self._fleet, self._conductor, self._processes, self._board = fleet, conductor, children, board
         self._progress = progress
         self._view = view
         self.moves: list[tuple[int, Array]] = []
@@ -260,7 +260,7 @@ class _Leader:
         conductor, board = self._conductor, self._board
         if interrupted and conductor.stage in (Stage.PREPARE, Stage.CLOCK):
             conductor.abort(now, "interrupted: all vehicles were told to land")
-        for name, status in self._crew.ended().items():
+        for name, status in self._processes.ended().items():
             kind, _, system = name.rpartition("-")
             if kind == "companion":
                 k = self._fleet.systems.index(int(system))
@@ -273,12 +273,12 @@ class _Leader:
     # Faults of companions' computers; each companion's process applies partitions itself.
 
     def freeze(self, system: int) -> None:
-        self._crew.freeze(names.companion(system))
+        self._processes.freeze(names.companion(system))
 
     def thaw(self, system: int) -> None:
         # Written while the process is stopped, so that its next step reads it.
         self._board.thaws[self._fleet.systems.index(system)] += 1
-        self._crew.thaw(names.companion(system))
+        self._processes.thaw(names.companion(system))
 
     def vanish(self, system: int) -> None:
         self._board.gone[self._fleet.systems.index(system)] = 1

@@ -6,15 +6,14 @@ one step of a vehicle and does not matter to an observer.
 
 from __future__ import annotations
 
-import mmap
-
 import numpy as np
 from numpy.typing import NDArray
 
+from outrider.processes.shared_memory import SharedMemory
 from outrider.realtime.view_page import Window
 
-_COLUMNS = 8
-_TEXT = 240
+_COLUMNS = 6
+_FLAGS = 3
 
 
 class SharedPage:
@@ -27,19 +26,12 @@ class SharedPage:
 
     def __init__(self, vehicles: int, window: Window | None = None) -> None:
         self.window = window
-        numbers = 8 * (3 + vehicles * (_COLUMNS + 4))
-        self._memory = mmap.mmap(-1, numbers + vehicles * _TEXT)
-        flags = np.frombuffer(self._memory, dtype=np.int64, count=3 + 4 * vehicles)
-        self._flags = flags
-        self.gone: NDArray[np.int64] = flags[3 : 3 + vehicles]
-        self._ready: NDArray[np.int64] = flags[3 + vehicles : 3 + 2 * vehicles]
-        self._armed: NDArray[np.int64] = flags[3 + 2 * vehicles : 3 + 3 * vehicles]
-        self.thaws: NDArray[np.int64] = flags[3 + 3 * vehicles :]
-        rows = np.frombuffer(self._memory, dtype=np.float64, offset=flags.nbytes, count=vehicles * _COLUMNS)
-        self._rows: NDArray[np.float64] = rows.reshape(vehicles, _COLUMNS)
+        self._memory = SharedMemory(_FLAGS + 4 * vehicles, _COLUMNS * vehicles, vehicles)
+        self._flags = self._memory.flags
+        self.gone, self._ready, self._armed, self.thaws = self._flags[_FLAGS:].reshape(4, vehicles)
+        self._rows = self._memory.numbers.reshape(vehicles, _COLUMNS)
         self._rows[:] = np.nan
         self._armed[:] = 1
-        self._texts = numbers
 
     @property
     def goal(self) -> int:
@@ -78,9 +70,7 @@ class SharedPage:
     def show_companion(self, k: int, ready: bool, waiting: str) -> None:
         """Write whether companion ``k`` is under way, and what it waits for."""
         self._ready[k] = ready
-        data = waiting.encode()[: _TEXT - 1]
-        begin = self._texts + k * _TEXT
-        self._memory[begin : begin + _TEXT] = data + bytes(_TEXT - len(data))
+        self._memory.write(k, waiting)
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -106,5 +96,4 @@ class SharedPage:
 
     def waiting(self, k: int) -> str:
         """Return what companion ``k`` waits for."""
-        begin = self._texts + k * _TEXT
-        return self._memory[begin : begin + _TEXT].rstrip(b"\0").decode(errors="replace")
+        return self._memory.read(k)

@@ -1,4 +1,4 @@
-"""Reader of ``.npz`` files with checks: damage is an error that names it, and no value is guessed."""
+"""Reader of ``.npz`` files with checks: an error names the damaged array or the cause."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from outrider.errors import Fault, InputError
 
 MOST_BYTES = 1 << 30
 """Largest total size of a file's arrays: an hour of a hundred vehicles at 50 Hz has half of it."""
-_ALLOWED = "allowed: what this version of outrider leaves"
+_ALLOWED = "needed: a file written by this version of outrider"
 
 _DAMAGE = (
     OSError,
@@ -33,7 +33,7 @@ _DAMAGE = (
 """Exceptions that reading a damaged archive of arrays may raise."""
 
 Shapes = Mapping[str, Sequence[int | str]]
-"""Shape by name of array: a number is that size, a letter the same size wherever it stands."""
+"""Required shape by name of array. A number is a fixed size; equal letters have equal sizes everywhere."""
 Arrays = dict[str, NDArray[np.generic]]
 
 
@@ -41,14 +41,14 @@ def read_arrays(path: Path, shapes: Shapes) -> Arrays:
     """Read the arrays that ``shapes`` names.
 
     Raises InputError for a file that cannot be read, and for an array that is missing, has another shape or
-    holds no numbers.
+    holds neither signed integers nor floats.
     """
     found: Arrays = {}
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
         if size > MOST_BYTES:
-            raise _fault(path, f"unpacks to {size} bytes; at most {MOST_BYTES} are read")
+            raise _fault(path, f"unpacks to {size} bytes; allowed: at most {MOST_BYTES}")
         with np.load(path, allow_pickle=False) as file:
             for name in shapes:
                 if name in file:
@@ -61,7 +61,7 @@ def read_arrays(path: Path, shapes: Shapes) -> Arrays:
         if name not in found:
             raise _fault(path, f"holds no {name}; {_ALLOWED}")
         if found[name].dtype.kind not in "if":
-            raise _fault(path, f"{name} holds no numbers; {_ALLOWED}")
+            raise _fault(path, f"{name} holds neither signed integers nor floats; {_ALLOWED}")
         has = found[name].shape
         fits = len(has) == len(shape) and all(
             size == (sizes.setdefault(axis, size) if isinstance(axis, str) else axis)

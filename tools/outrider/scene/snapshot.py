@@ -1,4 +1,4 @@
-"""Snapshot of a flight for a view: what it shows at one time."""
+"""Data of a flight at one time, as a view displays them."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 KNOTS = 17
-"""Largest number of rows of a plan."""
+"""Number of rows of every plan: a shorter one is filled up, a longer one is cut off."""
 
 
 class State(NamedTuple):
     """State of one vehicle.
 
-    What it does, the age (s) of the oldest data among its neighbours, the CPU time (ms) of its last plan, and
-    how often an old plan was kept. NaN and None for unknown values.
+    ``mode``: phase and kind of its horizon; ``age_s``: age of the oldest data among its neighbours;
+    ``plan_ms``: CPU time of its last plan; ``held``: how often an old plan was kept. NaN and None for unknown
+    values.
     """
 
     mode: str = ""
@@ -30,9 +31,9 @@ class State(NamedTuple):
 class Snapshot(NamedTuple):
     """Snapshot at ``time`` s after the goal event: K vehicles, M moving obstacles, fleet-local ENU, SI.
 
-    Missing values are NaN. ``position`` (K, 3); ``attitude`` (K, 4): w x y z of bodies with x forward, y
-    left, z up; ``plan`` (K, KNOTS, 6): position and velocity at the knots, the last one repeated; ``target``
-    (3,); ``moving`` (M, 3); ``states`` (K).
+    Missing values are NaN. ``stage``: stage of the flight; ``position`` (K, 3); ``attitude`` (K, 4): w x y z
+    of bodies with x forward, y left, z up; ``plan`` (K, KNOTS, 6): position and velocity at the knots, the
+    last one repeated; ``target`` (3,); ``moving`` (M, 3); ``states`` (K,).
     """
 
     time: float
@@ -56,7 +57,7 @@ class Pair(NamedTuple):
 def nearest(position: Single) -> Pair:
     """Return the nearest pair of vehicles at ``position`` (K, 3).
 
-    The distance is infinite if there are fewer than two.
+    The distance is infinite if there are fewer than two; both indices are then 0.
     """
     count = len(position)
     if count < 2:
@@ -70,7 +71,7 @@ def nearest(position: Single) -> Pair:
 
 
 def padded(plan: Array) -> Single:
-    """Return a plan's positions and velocities (n, 6) as (KNOTS, 6), filled up with the last knot."""
+    """Return a plan's positions and velocities (n, 6) as (KNOTS, 6), filled up with the last knot or cut off."""
     result = np.empty((KNOTS, 6), dtype=np.float32)
     count = min(len(plan), KNOTS)
     result[:count] = plan[:count]
@@ -83,9 +84,9 @@ NO_PLAN.flags.writeable = False
 
 
 _TO_ENU = np.array([0.0, np.sqrt(0.5), np.sqrt(0.5), 0.0])
-"""Half a turn about north-east: NED to ENU, and back."""
+"""Rotation by 180° about the horizontal north-east axis: NED to ENU, and back."""
 _OF_BODY = np.array([0.0, 1.0, 0.0, 0.0])
-"""Half a turn about the nose: FLU to FRD, and back."""
+"""Rotation by 180° about the body's x axis: FLU to FRD, and back."""
 
 
 def enu_attitude(attitude: Array) -> Array:
@@ -94,7 +95,7 @@ def enu_attitude(attitude: Array) -> Array:
 
 
 def euler_attitude(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the attitude (4,) of FLU in ENU for the angles (rad) of ATTITUDE, those of FRD in NED."""
+    """Convert the angles (rad) of ATTITUDE, FRD body in NED, to the quaternion (4,) of the FLU body in ENU."""
     result = np.array([1.0, 0.0, 0.0, 0.0])
     for axis, angle in ((3, yaw), (2, pitch), (1, roll)):
         turn = np.zeros(4)
@@ -104,7 +105,7 @@ def euler_attitude(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Return the Hamilton product of (…, 4)."""
+    """Return the Hamilton product of quaternions ``a`` and ``b`` (…, 4), w x y z."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     parts = (

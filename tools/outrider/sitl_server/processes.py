@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import time
 from math import ceil
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Final
 
 from mavlink_bridge.clocks.clock import PacedClock, WallClock
 from mavlink_bridge.links.link import Link
 from outrider.errors import OutriderError
+from outrider.processes.children import Children
 from outrider.processes.cores import cores
 from outrider.sitl_server.request import Request
 from outrider.sitl_server.shared_page import SharedPage
@@ -45,39 +43,31 @@ class Processes:
             Worker(number, indices, asked, {str(index): links[index] for index in indices}, self.board, state)
             for number, indices in enumerate(self.groups)
         ]
-        self._processes: list[BaseProcess] = []
+        self._children = Children()
 
     def start(self) -> None:
         """Compile, then fork the processes."""
         first = self._asked.autopilot(0, 0, Saved())
         for now in (0, PERIOD):
             first.step(now, [])
-        fork = multiprocessing.get_context("fork")
         # One clock for all processes: vehicles of different processes fly in the same air.
         clock = PacedClock(WallClock(), self._asked.speed, STRIDE, self.board)
         for number, worker in enumerate(self._workers):
-            process = fork.Process(target=self._child, args=(worker, clock), name=f"squad-{number}")
-            process.start()
-            self._processes.append(process)
+            self._children.start(str(number), self._child, worker, clock)
         self._close(None)
 
     def check(self) -> None:
         """Raise OutriderError if a process has ended, which none does by itself."""
-        for number, process in enumerate(self._processes):
-            if process.exitcode is not None:
-                fault = self.board.fault(number) or f"its process ended with status {process.exitcode}"
-                systems = ", ".join(str(self._asked.systems[index]) for index in self.groups[number])
-                raise OutriderError(f"vehicles {systems}: {fault}")
+        for name, status in self._children.ended().items():
+            number = int(name)
+            fault = self.board.fault(number) or f"its process ended with status {status}"
+            systems = ", ".join(str(self._asked.systems[index]) for index in self.groups[number])
+            raise OutriderError(f"vehicles {systems}: {fault}")
 
     def stop(self) -> None:
         """Ask all processes to end, wait for them, and kill those that do not end in time."""
         self.board.stop = True
-        until = time.monotonic() + _FAREWELL
-        for process in self._processes:
-            process.join(max(until - time.monotonic(), 0.1))
-            if process.is_alive():
-                process.kill()
-                process.join()
+        self._children.join(_FAREWELL)
         self._close(None)
 
     def _child(self, worker: Worker, clock: PacedClock) -> None:

@@ -6,17 +6,12 @@ does not matter.
 
 from __future__ import annotations
 
-import mmap
 from typing import Final, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from outrider.processes.shared_memory import SharedMemory
 
 SAYINGS: Final = 8
 """Number of latest texts that are stored per vehicle."""
-_TEXT: Final = 256
-_FLAGS: Final = 16
-"""Size of two numbers (bytes)."""
 
 
 class VehicleSnapshot(NamedTuple):
@@ -58,7 +53,7 @@ class Pace(NamedTuple):
 
 
 _VEHICLE: Final = 15
-_SQUAD: Final = len(Pace._fields)
+_GROUP: Final = len(Pace._fields)
 
 
 class SharedPage:
@@ -68,15 +63,12 @@ class SharedPage:
     """
 
     def __init__(self, vehicles: int, groups: int) -> None:
-        numbers = vehicles * _VEHICLE + groups * _SQUAD
-        texts = vehicles * SAYINGS + groups
-        self._memory = mmap.mmap(-1, _FLAGS + 8 * numbers + texts * _TEXT)
-        self._flags: NDArray[np.int64] = np.frombuffer(self._memory, dtype=np.int64, count=2)
-        every = np.frombuffer(self._memory, dtype=np.float64, offset=_FLAGS, count=numbers)
-        self._vehicles: NDArray[np.float64] = every[: vehicles * _VEHICLE].reshape(vehicles, _VEHICLE)
-        self._groups: NDArray[np.float64] = every[vehicles * _VEHICLE :].reshape(groups, _SQUAD)
-        self._texts = _FLAGS + 8 * numbers
-        self._faults = self._texts + vehicles * SAYINGS * _TEXT
+        numbers, texts = vehicles * _VEHICLE + groups * _GROUP, vehicles * SAYINGS + groups
+        self._memory = memory = SharedMemory(2, numbers, texts)
+        self._flags = memory.flags
+        self._vehicles = memory.numbers[: vehicles * _VEHICLE].reshape(vehicles, _VEHICLE)
+        self._groups = memory.numbers[vehicles * _VEHICLE :].reshape(groups, _GROUP)
+        self._faults = vehicles * SAYINGS
 
     @property
     def stop(self) -> bool:
@@ -121,11 +113,11 @@ class SharedPage:
 
     def say(self, index: int, number: int, text: str) -> None:
         """Write the text ``number`` (0…) of vehicle ``index``."""
-        self._write(self._texts + (index * SAYINGS + number % SAYINGS) * _TEXT, text)
+        self._memory.write(index * SAYINGS + number % SAYINGS, text)
 
     def saying(self, index: int, number: int) -> str:
         """Return the text ``number`` of vehicle ``index``, one of its latest."""
-        return self._read(self._texts + (index * SAYINGS + number % SAYINGS) * _TEXT)
+        return self._memory.read(index * SAYINGS + number % SAYINGS)
 
     def show_pace(self, group: int, pace: Pace) -> None:
         """Write the timing of group ``group``."""
@@ -140,15 +132,8 @@ class SharedPage:
 
     def fail(self, group: int, text: str) -> None:
         """Write the reason why the process of ``group`` ended."""
-        self._write(self._faults + group * _TEXT, text)
+        self._memory.write(self._faults + group, text)
 
     def fault(self, group: int) -> str:
         """Return the reason why the process of ``group`` ended; empty if there is none."""
-        return self._read(self._faults + group * _TEXT)
-
-    def _write(self, begin: int, text: str) -> None:
-        data = text.encode(errors="replace")[: _TEXT - 1]
-        self._memory[begin : begin + _TEXT] = data + bytes(_TEXT - len(data))
-
-    def _read(self, begin: int) -> str:
-        return self._memory[begin : begin + _TEXT].split(b"\0")[0].decode(errors="replace")
+        return self._memory.read(self._faults + group)

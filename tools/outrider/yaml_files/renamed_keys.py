@@ -1,4 +1,4 @@
-"""Former names of keys: they still load, and are reported with the present name."""
+"""Replacement of former names of keys by the present ones, with a remark for each."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from outrider.yaml_files.tree import Entry, Flaw, Items, Mapping, Tree
 
 
 def present_names(tree: Tree, schema: Schema) -> tuple[Tree, list[Flaw], list[Flaw]]:
-    """Return ``tree`` with the present names of its keys, a remark for each former name, and the faults.
+    """Return ``tree`` with the present names of its keys, one remark for each former name, and the faults.
 
-    A model states its former names as ``renamed`` in its JSON Schema. A key that is given under both names is
-    a fault.
+    ``renamed`` in a model's JSON Schema maps each former name to the present one. A key that is given twice,
+    under whichever names, is a fault.
     """
     remarks: list[Flaw] = []
     faults: list[Flaw] = []
@@ -26,11 +26,13 @@ def _renamed(tree: Tree, schema: Schema, remarks: list[Flaw], faults: list[Flaw]
     entries: dict[str, Entry] = {}
     for key, entry in tree.entries.items():
         name = _former(schema).get(key, key)
-        if name in tree.entries and name != key:
-            faults.append(Flaw(entry.at, f"{key!r} is the former name of {name!r}; allowed: one of them"))
+        if name != key and (name in tree.entries or name in entries):
+            faults.append(Flaw(entry.at, f"{key!r} and {name!r} are the same key; needed: only {name!r}"))
             continue
         if name != key:
-            remarks.append(Flaw(entry.at, f"{key!r} is called {name!r} now; the former name still loads"))
+            remarks.append(
+                Flaw(entry.at, f"{key!r} was renamed to {name!r}; the former name is still accepted")
+            )
         entries[name] = entry._replace(tree=_renamed(entry.tree, schema.child(name), remarks, faults))
     return tree._replace(entries=entries)
 

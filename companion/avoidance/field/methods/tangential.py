@@ -1,21 +1,21 @@
-"""Tangential band (Sec. III-D.3): inside a band around an obstacle a force about its centre acts.
+"""Tangential band (Sec. III-D.3): a force perpendicular to the line from the obstacle to the vehicle.
 
-Ω_t is lowered there, eq. (17).
+Inside a band around an obstacle, F_tang acts, and the terminal weight Ω_t is lowered, eq. (17).
 
-F_tang(0) = k_tang ‖∇J‖ α̂,  α̂ ⊥ α, eq. (16), the same for the whole horizon. Eq. (18) adds
-it to the repulsion.
+F_tang(0) = k_tang ‖∇J‖ α̂,  α̂ ⊥ α, eq. (16), the same for the whole horizon. Eq. (18) adds it to the
+repulsion. α is the direction from the obstacle to the vehicle, ∇J the gradient of the cost at the end of the
+last plan.
 
-Deviations from the paper. The gradient is its norm divided by Ω_t. The band reaches from the obstacle to
-d_safe + d_band, and further for an obstacle that closes fast (``reach_s`` times the closing speed): turning
-aside takes time, not distance. The force grows from zero at the band's edge, quickly up to u_max − the input
-cancels so much of it − and then up to ``force_max`` at ``d_full``. It acts only about obstacles that are in
-the way: ahead, fading out from 60° off the bow to abeam, so that the band is left once the obstacle is
-passed; not beyond the destination, fading out over d_safe; and not when the vehicle has almost arrived. The
-sense is latched per obstacle for as long as the encounter lasts; otherwise it chatters when the bearing
-crosses zero. With one turning sense for all vehicles, an obstacle may be on the side on which it is not to be
-passed; the force about it leads back, and fades out with the bearing to that side. Obstacles with no way
-between them (``gap``) are passed as one, with one sense: with a sense for each, a vehicle before a U would be
-sent between its ends.
+Deviations from the paper. ‖∇J‖ is divided by Ω_t. The band reaches from the obstacle to d_safe + d_band, and
+further for an obstacle that closes fast (``reach_s`` times the closing speed), because turning aside takes a
+given time. The force grows from zero at the band's edge, first steeply to u_max (which the input can cancel),
+then to ``force_max`` at ``d_full``. It acts in full up to 60° from the direction to the destination, and
+vanishes at 90°, so that the band is left once the obstacle is passed. It vanishes for obstacles more than
+d_safe beyond the destination, and when the vehicle has almost arrived. The sense of an obstacle is kept while
+its weight is positive; otherwise it would alternate when the bearing crosses zero. With a common turning
+sense an obstacle may be on the side on which it is not to be passed. The force about it then points away from
+the destination, and fades out with the bearing to that side. Obstacles less than ``gap`` apart share one
+sense; otherwise a vehicle before a U-shaped group would be steered into it.
 """
 
 from __future__ import annotations
@@ -30,26 +30,29 @@ from companion.config.planning import TangentialConfig, TurningSense
 from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
 
-_ABEAM = 0.5
-"""Cosine of the bearing off the bow up to which the force is whole; it vanishes abeam."""
-_ASIDE, _PASSED = 0.4, 0.8
-"""Sines of the bearing off the bow, to the side on which an obstacle with a given sense is not passed.
+_COSINE_FULL = 0.5
+"""Cosine of the angle between the directions to the destination and to the obstacle (60°).
 
-Up to the first the force is whole; from the second on it is none: it would lead back.
+Up to that angle the force is whole; it vanishes at 90°.
+"""
+_SINE_FULL, _SINE_NONE = 0.4, 0.8
+"""Sines of that angle, to the side on which an obstacle with a given sense is not to be passed.
+
+Up to the first the force is whole; from the second on it is zero.
 """
 _STEEP = 2.0
-"""One over the cosine of the elevation up to which the force is whole; it vanishes overhead."""
+"""1/cos of the elevation (60°) up to which the force is whole; it vanishes straight above and below."""
 _QUICK = 10.0
-"""Factor by which the force grows faster up to u_max than beyond."""
+"""The part of the force up to u_max is whole at 1/``_QUICK`` of the full weight."""
 _NEAR = 1e-6
 _THERE, _ON_THE_WAY = 0.5, 1.5
-"""Remaining distance (m) at which the force starts, and at which it is whole.
+"""Distance (m) to the destination up to which the force is zero, and from which it is whole.
 
-In a moving formation the remaining way is tenths of a metre in any direction, and a force across it throws a
-vehicle out of the formation.
+In a moving formation this distance is a few tenths of a metre in changing directions; a lateral force would
+push the vehicle out of its place.
 """
 _SLOW, _SOON = 0.5, 3.0
-"""Relative speed (m/s) below which no obstacle closes, and time (s) beyond which nothing counts."""
+"""Speed (m/s) that regularises the time of closest approach, and the longest such time (s)."""
 _RIGHT: Array = np.array([1.0])
 _LEFT: Array = np.array([-1.0])
 
@@ -65,7 +68,7 @@ class Tangential:
         self._sense: dict[int, float] = {}
 
     def influence(self, scene: Scene, influence: Influence) -> Influence:
-        """Return the influence with F_tang of every obstacle ahead whose band holds the vehicle added."""
+        """Add F_tang of every obstacle ahead in whose band the vehicle is."""
         obstacles = scene.obstacles
         if not obstacles.ids:
             self._sense.clear()
@@ -74,10 +77,10 @@ class Tangential:
         square = away * away
         flat = np.sqrt(square[:, 0] + square[:, 1]) + _NEAR
         distance = np.sqrt(square.sum(axis=1)) + _NEAR
-        # An obstacle straight above or below can be passed on no side.
+        # An obstacle straight above or below has no horizontal passing direction.
         weight = self._weights(scene, away, distance) * shares(_STEEP * flat / distance)
         self._release(obstacles, weight)
-        # α̂ = ± ẑ × α, horizontal: passing never costs height.
+        # α̂ = ± ẑ × α is horizontal: the force does not change the height.
         senses = self._senses(obstacles, weight, away, scene.to_go)
         if self._turning != "own":
             weight = weight * _onward(senses, away, flat, scene.to_go)
@@ -93,8 +96,8 @@ class Tangential:
             u_max * min(1.0, _QUICK * whole) + (config.force_max - u_max) * whole,
         )
         direction = total / norm
-        # A vehicle that already moves sideways is not made faster, or it would be thrown out: its speed stays
-        # one that half of u_max stops within the remaining distance.
+        # The force falls with the speed along it, to zero at the speed from which half of u_max stops within
+        # the distance to the destination.
         sideways = float((scene.velocity - scene.destination_velocity) @ direction)
         most = min(config.pass_speed, sqrt(u_max * sqrt(scene.to_go @ scene.to_go)) + _NEAR)
         strength *= share(reserve(sideways, most))
@@ -115,14 +118,16 @@ class Tangential:
         to_go = scene.to_go
         length = sqrt(to_go @ to_go) + _NEAR
         along = -(away @ to_go) / length
-        ahead = shares(along / (_ABEAM * distance))
+        ahead = shares(along / (_COSINE_FULL * distance))
         before = shares(1.0 + (length - along) / obstacles.d_safe)
         before *= share((length - _THERE) / (_ON_THE_WAY - _THERE))
         weights: Array = depth * ahead * before * self._meeting(obstacles, away, moving - scene.velocity)
         return weights
 
     def _meeting(self, obstacles: Obstacles, away: Array, velocity: Array) -> Array:
-        """Return how near (0…1) each obstacle comes if both keep their velocities.
+        """Return a share (0…1) by the closest approach of each obstacle at constant velocities.
+
+        1 is within ``d_full``, 0 is d_safe or more.
 
         ``velocity`` (M, 3), m/s, is relative to the own velocity.
         """
@@ -187,14 +192,14 @@ class Tangential:
 
 
 def _onward(senses: Array, away: Array, flat: Array, to_go: Array) -> Array:
-    """Return how much (0…1) each force about an obstacle leads on rather than back, (M,).
+    """Return the share (0…1) of the force about each obstacle, (M,), with a common turning sense.
 
-    With one turning sense for all, an obstacle can be on the side on which it is not to be passed. ``away``
+    The share falls where the force points away from the destination. ``away``
     (M, 3), m, leads from the obstacles to the vehicle; ``flat`` (M,) are its horizontal norms.
     """
     length = sqrt(to_go @ to_go) + _NEAR
     sine = senses * (away[:, 0] * to_go[1] - away[:, 1] * to_go[0]) / (flat * length)
-    return shares((sine + _PASSED) / (_PASSED - _ASIDE))
+    return shares((sine + _SINE_NONE) / (_SINE_NONE - _SINE_FULL))
 
 
 def groups(places: Array, radius: Array, gap: float) -> list[list[int]]:

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from companion.avoidance.field.methods import Influence
-from companion.avoidance.field.methods.tangential import _ASIDE, _PASSED
+from companion.avoidance.field.methods.tangential import _SINE_FULL, _SINE_NONE
 from companion.config.planning import TangentialConfig
 from tests.companion.band import NOTHING, force, method, scene
 from tests.companion.rig import LAWS, ZERO, numbers, obstacles, vectors
@@ -106,7 +106,7 @@ def test_at_the_destination_it_is_zero(place, sense):
 
 
 @LAWS
-@given(distance=numbers(0.5, 3.9), sine=numbers(-_ASIDE, _ASIDE), velocity=vectors(5.0))
+@given(distance=numbers(0.5, 3.9), sine=numbers(-_SINE_FULL, _SINE_FULL), velocity=vectors(5.0))
 def test_right_and_left_are_opposite_for_what_is_ahead(distance, sine, velocity):
     others = obstacles([[distance * np.sqrt(1.0 - sine**2), distance * sine, 0.0]], [velocity])
     right, left = (force(others, sense=sense)[0] for sense in ("right", "left"))
@@ -120,12 +120,12 @@ def test_the_force_about_an_obstacle_leads_back_no_further_than_its_bearing_allo
     for place in places:
         f, _ = force(obstacles([place]), velocity=own, sense=sense)
         # The course is east.
-        assert f[0] >= -_PASSED * np.linalg.norm(f) - 1e-9
+        assert f[0] >= -_SINE_NONE * np.linalg.norm(f) - 1e-9
 
 
 @pytest.mark.parametrize(("sense", "side"), [("right", -1.0), ("left", 1.0)])
 def test_an_obstacle_well_on_the_other_side_is_passed_there(sense, side):
-    angle = side * (np.arcsin(_PASSED) + 0.01)
+    angle = side * (np.arcsin(_SINE_NONE) + 0.01)
     place = 2.0 * np.array([np.cos(angle), np.sin(angle), 0.0])
     assert method(sense).influence(scene(obstacles([place])), NOTHING) is NOTHING
 
