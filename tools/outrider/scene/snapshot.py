@@ -71,7 +71,7 @@ def nearest(position: Single) -> Pair:
 
 
 def padded(plan: Array) -> Single:
-    """Return a plan's positions and velocities (n, 6) as (KNOTS, 6), filled up with the last knot or cut off."""
+    """Return a plan's positions and velocities (n, 6) as (KNOTS, 6): filled with the last knot, or cut off."""
     result = np.empty((KNOTS, 6), dtype=np.float32)
     count = min(len(plan), KNOTS)
     result[:count] = plan[:count]
@@ -95,7 +95,7 @@ def enu_attitude(attitude: Array) -> Array:
 
 
 def euler_attitude(roll: float, pitch: float, yaw: float) -> Array:
-    """Convert the angles (rad) of ATTITUDE, FRD body in NED, to the quaternion (4,) of the FLU body in ENU."""
+    """Convert the angles (rad) of ATTITUDE, of FRD in NED, to the quaternion (4,) of FLU in ENU."""
     result = np.array([1.0, 0.0, 0.0, 0.0])
     for axis, angle in ((3, yaw), (2, pitch), (1, roll)):
         turn = np.zeros(4)
