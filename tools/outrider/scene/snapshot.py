@@ -71,7 +71,7 @@ def nearest(position: Single) -> Pair:
 
 
 def padded(plan: Array) -> Single:
-    """Return a plan's positions and velocities (n, 6) as (KNOTS, 6): filled with the last knot, or cut off."""
+    """Return a plan's positions and velocities (n, 6) as (KNOTS, 6), filled up with the last knot."""
     result = np.empty((KNOTS, 6), dtype=np.float32)
     count = min(len(plan), KNOTS)
     result[:count] = plan[:count]
