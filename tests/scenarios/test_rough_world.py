@@ -212,7 +212,12 @@ class Row:
 PX4 = {"flavour": "px4"}
 GONE = {**fault("vanish"), "cap_s": 12.0}
 BLIND = fault("gps_loss", for_s=3_600.0)
-SHIFTED = {**fault("gps_jump", at_s=0.0, for_s=3_600.0, offset=[5.0, 0.0, 0.0]), "cap_s": 13.0}
+SHIFTED = {
+    **fault("gps_jump", at_s=0.0, for_s=3_600.0, offset=[5.0, 0.0, 0.0]),
+    "starts": {"radius": 16.0},
+    "cap_s": 16.0,
+}
+"""It is believed after seven seconds: the way must take longer."""
 SIDES = {"partitions": [{"at_s": 1.0, "for_s": 4.0, "members": [11, 12]}]}
 BURSTS = {"links": {"swarm": {"loss": 0.3, "burst": 10.0}}}
 ROWS = (

@@ -139,7 +139,7 @@ def test_who_may_be_flying_is_never_told_to_take_off(flavour, airborne):
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("heard", [(), (landed(0),)], ids=["nothing said", "undefined"])
+@pytest.mark.parametrize("received", [(), (landed(0),)], ids=["nothing said", "undefined"])
 def test_an_armed_vehicle_of_which_nobody_says_where_it_is_is_left_alone(flavour, received):
     rig = Rig(flavour, READY._replace(own=state(8.0)))
     assert rig.pilot.go(HEIGHT)

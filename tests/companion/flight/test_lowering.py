@@ -42,7 +42,7 @@ def limits(draw):
 
 
 @pytest.mark.parametrize("flavour", PROFILES)
-@pytest.mark.parametrize("heard", [True, False], ids=["read", "assumed"])
+@pytest.mark.parametrize("received", [True, False], ids=["read", "assumed"])
 def test_stock_firmware_follows_the_shipped_files(flavour, received):
     profile = PROFILES[flavour]
     config = load(find("companions", flavour), FlyConfig).companion

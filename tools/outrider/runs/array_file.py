@@ -15,7 +15,7 @@ from outrider.errors import Fault, InputError
 
 MOST_BYTES = 1 << 30
 """Largest total size of a file's arrays: an hour of a hundred vehicles at 50 Hz has half of it."""
-_ALLOWED = "needed: a file written by this version of outrider"
+_ALLOWED = "allowed: a file written by this version of outrider"
 
 _DAMAGE = (
     OSError,

@@ -225,7 +225,7 @@ class TestFarewell:
         receive(book, OTHER, plan(4, x=1.0), OWN, now=NOW + 4 * LENGTH)
         assert not book.missing(EPOCH + 4 * LENGTH)
 
-    @pytest.mark.parametrize("told", range(-1, 9))
+    @pytest.mark.parametrize("announced", range(-1, 9))
     def test_after_the_own_one_only_those_count_with_us_who_cannot_believe_it_any_more(
         self, announced: int
     ) -> None:
