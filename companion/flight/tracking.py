@@ -187,12 +187,12 @@ class Tracking:
 
     def _shape(self, dt: float, reference: Motion, shaping: Shaping | None) -> None:
         """Advance the prediction of the autopilot's own trajectory by one step."""
-        reported = reference.acceleration[:2] + self.compensation[:2]
+        asked = reference.acceleration[:2] + self.compensation[:2]
         if shaping is None:
-            self._fed = reported
+            self._fed = asked
             return
         place, speed = self._ahead
-        wanted = reported - shaping.velocity * (speed + shaping.position * place)
+        wanted = asked - shaping.velocity * (speed + shaping.position * place)
         self._fed = self._fed + _limited(wanted - self._fed, shaping.jerk * dt)
         speed = speed + dt * (self._fed - reference.acceleration[:2])
         self._ahead = np.stack([place + dt * speed, speed])

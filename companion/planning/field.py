@@ -43,7 +43,6 @@ class FieldAvoidance:
         """Last plan of the ``planner``; None before the first."""
         self.log = PlanLog()
         """Log of all plans since the last ``shed``."""
-        self._fastest: Array = np.array(config.limits.v_max)
         self._fading = fading(config)
         self._shares_surface = isinstance(config.formation, Spread)
         self._plans = self._relaxed = 0
@@ -85,7 +84,6 @@ class FieldAvoidance:
 
     def keep(self, lowered: Lowered) -> None:
         """Plan, brake and compensate within ``lowered``, the limits that the autopilot can follow."""
-        self._fastest = np.array(lowered.limits.v_max)
         self.planner.keep(lowered.limits)
         self.guard.keep(lowered.limits)
         self.tracking.keep(lowered.acceleration)
@@ -157,7 +155,7 @@ class FieldAvoidance:
         if not self._shares_surface or not rises or view.own is None:
             return None
         own, horizon = view.own, self._config.horizon
-        velocity = clipped(own.velocity, self._fastest)
+        velocity = clipped(own.velocity, np.array(self._pilot.planned_limits.v_max))
         return roll_out(now, horizon.dt_us, own.position, velocity, np.zeros((horizon.steps + 1, 3)))
 
     def _observe(self, now: int, measured: Motion) -> None:

@@ -34,15 +34,15 @@ def settings(case: Case) -> Iterator[Finding]:
     """Yield one finding for each known parameter, and one for those that are not known."""
     if case.profile is None:
         return
-    not_encoded = []
+    unreported = []
     for rule in rules(px4=case.px4):
         value = case.parameter(rule.name)
         if value is None:
-            not_encoded.append(rule)
+            unreported.append(rule)
         else:
             severity, why, do = rule.judge(value, case)
             yield Finding(f"{rule.name} = {value:g}", severity, why, do)
-    urgent = [rule for rule in not_encoded if rule.name in _URGENT]
+    urgent = [rule for rule in unreported if rule.name in _URGENT]
     for rule in urgent:
         yield Finding(
             f"{rule.name} is not {'in the log' if case.log else 'told'}",
@@ -52,7 +52,7 @@ def settings(case: Case) -> Iterator[Finding]:
             if case.px4
             else f"Read it (param show {rule.name}).",
         )
-    others = [rule.name for rule in not_encoded if rule not in urgent]
+    others = [rule.name for rule in unreported if rule not in urgent]
     if others:
         yield Finding(
             f"not {'in the log' if case.log else 'told'}: {', '.join(others)}",

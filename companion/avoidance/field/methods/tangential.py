@@ -194,8 +194,8 @@ class Tangential:
 def _onward(senses: Array, away: Array, flat: Array, to_go: Array) -> Array:
     """Return the share (0…1) of the force about each obstacle, (M,), with a common turning sense.
 
-    The share falls where the force points away from the destination. ``away``
-    (M, 3), m, leads from the obstacles to the vehicle; ``flat`` (M,) are its horizontal norms.
+    The share falls where the force points away from the destination. ``away`` (M, 3), m, leads from the
+    obstacles to the vehicle; ``flat`` (M,) are its horizontal norms.
     """
     length = sqrt(to_go @ to_go) + _NEAR
     sine = senses * (away[:, 0] * to_go[1] - away[:, 1] * to_go[0]) / (flat * length)
