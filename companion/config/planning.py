@@ -9,6 +9,8 @@ from pydantic import Field, model_validator
 
 from companion.values.settings import Positive, Settings, WireStep
 
+Sine = Annotated[float, Field(ge=0.0, le=1.0)]
+
 MethodName = Literal["baseline", "swivel", "approach_angle", "tangential"]
 
 
@@ -150,6 +152,17 @@ class TangentialConfig(Settings):
     gap: float = Field(
         3.2, ge=0.0, le=100.0, description="m between surfaces; what is nearer to each other is passed as one"
     )
+    wrong_side: tuple[Sine, Sine] | None = Field(
+        (0.4, 0.8),
+        description="sines of the bearing, from the course to the side on which a common turning sense does"
+        " not pass an obstacle: whole up to the first, zero from the second on; null: whole everywhere",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.wrong_side is not None and not self.wrong_side[0] < self.wrong_side[1]:
+            raise ValueError(f"wrong_side {list(self.wrong_side)}: the first must be less than the second")
+        return self
 
 
 class SwivelConfig(Settings):

@@ -14,8 +14,9 @@ vanishes at 90°, so that the band is left once the obstacle is passed. It vanis
 d_safe beyond the destination, and when the vehicle has almost arrived. The sense of an obstacle is kept while
 its weight is positive; otherwise it would alternate when the bearing crosses zero. With a common turning
 sense an obstacle may be on the side on which it is not to be passed. The force about it then points away from
-the destination, and fades out with the bearing to that side. Obstacles less than ``gap`` apart share one
-sense; otherwise a vehicle before a U-shaped group would be steered into it.
+the destination, and fades out with the bearing to that side (``wrong_side``): the whole force pushes vehicles
+out of a ring. Where all ways cross in one place, the whole force makes the vehicles turn about that place.
+Obstacles less than ``gap`` apart share one sense; otherwise a vehicle would be steered into a U-shaped group.
 """
 
 from __future__ import annotations
@@ -34,11 +35,6 @@ _COSINE_FULL = 0.5
 """Cosine of the angle between the directions to the destination and to the obstacle (60°).
 
 Up to that angle the force is whole; it vanishes at 90°.
-"""
-_SINE_FULL, _SINE_NONE = 0.4, 0.8
-"""Sines of that angle, to the side on which an obstacle with a given sense is not to be passed.
-
-Up to the first the force is whole; from the second on it is zero.
 """
 _STEEP = 2.0
 """1/cos of the elevation (60°) up to which the force is whole; it vanishes straight above and below."""
@@ -82,8 +78,8 @@ class Tangential:
         self._release(obstacles, weight)
         # α̂ = ± ẑ × α is horizontal: the force does not change the height.
         senses = self._senses(obstacles, weight, away, scene.to_go)
-        if self._turning != "own":
-            weight = weight * _onward(senses, away, flat, scene.to_go)
+        if self._turning != "own" and self._config.wrong_side is not None:
+            weight = weight * _onward(senses, away, flat, scene.to_go, *self._config.wrong_side)
         signed = weight * senses / flat
         total = np.array([-(signed @ away[:, 1]), signed @ away[:, 0], 0.0])
         norm = sqrt(total @ total)
@@ -191,15 +187,16 @@ class Tangential:
             self._sense.setdefault(name, sense)
 
 
-def _onward(senses: Array, away: Array, flat: Array, to_go: Array) -> Array:
+def _onward(senses: Array, away: Array, flat: Array, to_go: Array, whole: float, zero: float) -> Array:
     """Return the share (0…1) of the force about each obstacle, (M,), with a common turning sense.
 
-    The share falls where the force points away from the destination. ``away`` (M, 3), m, leads from the
-    obstacles to the vehicle; ``flat`` (M,) are its horizontal norms.
+    The share falls where the force points away from the destination: from 1 at the sine ``whole`` of the
+    bearing to 0 at the sine ``zero``. ``away`` (M, 3), m, leads from the obstacles to the vehicle; ``flat``
+    (M,) are its horizontal norms.
     """
     length = sqrt(to_go @ to_go) + _NEAR
     sine = senses * (away[:, 0] * to_go[1] - away[:, 1] * to_go[0]) / (flat * length)
-    return shares((sine + _SINE_NONE) / (_SINE_NONE - _SINE_FULL))
+    return shares((sine + zero) / (zero - whole))
 
 
 def groups(places: Array, radius: Array, gap: float) -> list[list[int]]:

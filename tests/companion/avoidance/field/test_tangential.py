@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from companion.avoidance.field.methods import Influence
-from companion.avoidance.field.methods.tangential import _SINE_FULL, _SINE_NONE
 from companion.config.planning import TangentialConfig
 from tests.companion.band import NOTHING, force, method, scene
 from tests.companion.rig import LAWS, ZERO, numbers, obstacles, vectors
@@ -16,6 +16,8 @@ from tests.companion.rig import LAWS, ZERO, numbers, obstacles, vectors
 D_SAFE = 3.0
 CONFIG = TangentialConfig()
 EDGE = D_SAFE + CONFIG.d_band
+assert CONFIG.wrong_side is not None
+WHOLE, ZERO_FROM = CONFIG.wrong_side
 SENSES = st.sampled_from(["own", "right", "left"])
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
@@ -106,7 +108,7 @@ def test_at_the_destination_it_is_zero(place, sense):
 
 
 @LAWS
-@given(distance=numbers(0.5, 3.9), sine=numbers(-_SINE_FULL, _SINE_FULL), velocity=vectors(5.0))
+@given(distance=numbers(0.5, 3.9), sine=numbers(-WHOLE, WHOLE), velocity=vectors(5.0))
 def test_right_and_left_are_opposite_for_what_is_ahead(distance, sine, velocity):
     others = obstacles([[distance * np.sqrt(1.0 - sine**2), distance * sine, 0.0]], [velocity])
     right, left = (force(others, sense=sense)[0] for sense in ("right", "left"))
@@ -120,14 +122,29 @@ def test_the_force_about_an_obstacle_leads_back_no_further_than_its_bearing_allo
     for place in places:
         f, _ = force(obstacles([place]), velocity=own, sense=sense)
         # The course is east.
-        assert f[0] >= -_SINE_NONE * np.linalg.norm(f) - 1e-9
+        assert f[0] >= -ZERO_FROM * np.linalg.norm(f) - 1e-9
 
 
 @pytest.mark.parametrize(("sense", "side"), [("right", -1.0), ("left", 1.0)])
 def test_an_obstacle_well_on_the_other_side_is_passed_there(sense, side):
-    angle = side * (np.arcsin(_SINE_NONE) + 0.01)
+    angle = side * (np.arcsin(ZERO_FROM) + 0.01)
     place = 2.0 * np.array([np.cos(angle), np.sin(angle), 0.0])
     assert method(sense).influence(scene(obstacles([place])), NOTHING) is NOTHING
+
+
+@LAWS
+@given(place=vectors(4.0), velocity=vectors(5.0))
+def test_without_a_wrong_side_right_and_left_are_opposite_everywhere(place, velocity):
+    there = scene(obstacles([place], [velocity]))
+    right, left = (
+        method(sense, wrong_side=None).influence(there, NOTHING).force for sense in ("right", "left")
+    )
+    np.testing.assert_array_equal(right, -left)
+
+
+def test_a_wrong_side_whose_force_ends_before_it_begins_to_fade_is_refused():
+    with pytest.raises(ValidationError, match="the first must be less"):
+        TangentialConfig(wrong_side=(0.8, 0.4))
 
 
 def test_passing_right_leaves_the_obstacle_on_the_left():
