@@ -153,7 +153,7 @@ class BackupNode:
                 self._local = self._fleet.local(message.latitude, message.longitude, message.altitude)
             case SetpointLocal():
                 self._received = (now, message) if self._agrees(now, message) else None
-            case CommandLong(command=command) if command == NAV_LAND:
+            case CommandLong() if message.command == NAV_LAND:
                 self._forget()
             case Tunnel():
                 self._file(now, message)

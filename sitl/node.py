@@ -13,10 +13,9 @@ import numpy.typing as npt
 
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, SetupSigning, Source, Vector
+from mavlink_bridge.messages import BY_TYPE, Message, SetupSigning, Source, Vector
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.converters import BY_TYPE
 from mavlink_bridge.wire.packing import parcels
 from mavlink_bridge.wire.signing import Signing
 from sitl.autopilot.command_protocol import Orders

@@ -4,213 +4,26 @@ Angles are radians, distances metres, latitudes and longitudes degrees (float64,
 cm is kept), times integer µs. Positions stay local NED or geodetic as in the message; only ``frames``
 converts them. ``None`` stands for a field that the sender marked unknown. The values are tuples rather than
 dataclasses because they are created thousands of times a second, and a tuple costs a third as much.
+
+A message is declared in one place: its class, with the decorator ``declaration.message``, in the module of
+its subject.
 """
 
 from __future__ import annotations
 
-from mavlink_bridge.messages.flight import (
-    Attitude,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    EkfStatus,
-    ExtendedSysState,
-    FenceStatus,
-    FollowTarget,
-    GlobalPosition,
-    GpsGlobalOrigin,
-    Heartbeat,
-    LocalPosition,
-    Ping,
-    PositionTarget,
-    SetpointAttitude,
-    SetpointGlobal,
-    SetpointLocal,
-    StatusText,
-    SysStatus,
-    SystemTime,
-    Timesync,
-    Tunnel,
-)
-from mavlink_bridge.messages.missions import (
-    MissionAck,
-    MissionClearAll,
-    MissionCount,
-    MissionCurrent,
-    MissionItem,
-    MissionItemFloat,
-    MissionItemReached,
-    MissionRequest,
-    MissionRequestFloat,
-    MissionRequestList,
-    MissionSetCurrent,
-    MissionWritePartialList,
-)
-from mavlink_bridge.messages.services import (
-    AutopilotVersion,
-    FileTransfer,
-    HomePosition,
-    MessageInterval,
-    ParamRequestList,
-    ParamRequestRead,
-    ParamSet,
-    ParamValue,
-    RequestDataStream,
-    SetGpsGlobalOrigin,
-    SetHomePosition,
-    SetMode,
-    SetupSigning,
-)
+from mavlink_bridge.messages.commands import *
+from mavlink_bridge.messages.declaration import BY_ID, BY_TYPE, Converter, Message
+from mavlink_bridge.messages.links import *
+from mavlink_bridge.messages.missions import *
+from mavlink_bridge.messages.motion import *
+from mavlink_bridge.messages.origin import *
+from mavlink_bridge.messages.parameters import *
+from mavlink_bridge.messages.sensors import *
+from mavlink_bridge.messages.setpoints import *
+from mavlink_bridge.messages.simulation import *
 from mavlink_bridge.messages.source import Source, Vector
-from mavlink_bridge.messages.status import (
-    Altitude,
-    AttitudeQuaternion,
-    BatteryStatus,
-    EstimatorStatus,
-    GpsRaw,
-    HighresImu,
-    HilState,
-    RawImu,
-    SimState,
-    SimulationState,
-    VfrHud,
-)
-from mavlink_bridge.messages.surroundings import (
-    AdsbVehicle,
-    CameraTrackingGeo,
-    NamedValue,
-    ObstacleDistance,
-)
+from mavlink_bridge.messages.status import *
+from mavlink_bridge.messages.surroundings import *
 
-Message = (
-    Heartbeat
-    | SysStatus
-    | SystemTime
-    | Ping
-    | Attitude
-    | LocalPosition
-    | GlobalPosition
-    | GpsGlobalOrigin
-    | CommandInt
-    | CommandLong
-    | CommandAck
-    | SetpointLocal
-    | SetpointGlobal
-    | SetpointAttitude
-    | PositionTarget
-    | Timesync
-    | FollowTarget
-    | FenceStatus
-    | EkfStatus
-    | ExtendedSysState
-    | StatusText
-    | Tunnel
-    | SetMode
-    | ParamRequestRead
-    | ParamRequestList
-    | ParamValue
-    | ParamSet
-    | SetGpsGlobalOrigin
-    | RequestDataStream
-    | FileTransfer
-    | AutopilotVersion
-    | HomePosition
-    | SetHomePosition
-    | MessageInterval
-    | MissionWritePartialList
-    | MissionItemFloat
-    | MissionRequestFloat
-    | MissionSetCurrent
-    | MissionCurrent
-    | MissionRequestList
-    | MissionCount
-    | MissionClearAll
-    | MissionItemReached
-    | MissionAck
-    | MissionRequest
-    | MissionItem
-    | GpsRaw
-    | AttitudeQuaternion
-    | VfrHud
-    | Altitude
-    | BatteryStatus
-    | EstimatorStatus
-    | RawImu
-    | HighresImu
-    | SimState
-    | SimulationState
-    | HilState
-    | SetupSigning
-    | AdsbVehicle
-    | NamedValue
-    | CameraTrackingGeo
-    | ObstacleDistance
-)
-
-__all__ = [
-    "AdsbVehicle",
-    "Altitude",
-    "Attitude",
-    "AttitudeQuaternion",
-    "AutopilotVersion",
-    "BatteryStatus",
-    "CameraTrackingGeo",
-    "CommandAck",
-    "CommandInt",
-    "CommandLong",
-    "EkfStatus",
-    "EstimatorStatus",
-    "ExtendedSysState",
-    "FenceStatus",
-    "FileTransfer",
-    "FollowTarget",
-    "GlobalPosition",
-    "GpsGlobalOrigin",
-    "GpsRaw",
-    "Heartbeat",
-    "HighresImu",
-    "HilState",
-    "HomePosition",
-    "LocalPosition",
-    "Message",
-    "MessageInterval",
-    "MissionAck",
-    "MissionClearAll",
-    "MissionCount",
-    "MissionCurrent",
-    "MissionItem",
-    "MissionItemFloat",
-    "MissionItemReached",
-    "MissionRequest",
-    "MissionRequestFloat",
-    "MissionRequestList",
-    "MissionSetCurrent",
-    "MissionWritePartialList",
-    "NamedValue",
-    "ObstacleDistance",
-    "ParamRequestList",
-    "ParamRequestRead",
-    "ParamSet",
-    "ParamValue",
-    "Ping",
-    "PositionTarget",
-    "RawImu",
-    "RequestDataStream",
-    "SetGpsGlobalOrigin",
-    "SetHomePosition",
-    "SetMode",
-    "SetpointAttitude",
-    "SetpointGlobal",
-    "SetpointLocal",
-    "SetupSigning",
-    "SimState",
-    "SimulationState",
-    "Source",
-    "StatusText",
-    "SysStatus",
-    "SystemTime",
-    "Timesync",
-    "Tunnel",
-    "Vector",
-    "VfrHud",
-]
+__all__ = ["BY_ID", "BY_TYPE", "Converter", "Message", "Source", "Vector"]
+__all__ += [kind.__name__ for kind in BY_TYPE]

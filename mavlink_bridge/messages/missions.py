@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from mavlink_bridge.messages.declaration import message
+from mavlink_bridge.messages.fields import Fields
 from mavlink_bridge.messages.source import Source
 
 
+@message("MISSION_WRITE_PARTIAL_LIST", size_v1=6)
 class MissionWritePartialList(NamedTuple):
     """MISSION_WRITE_PARTIAL_LIST (38): items ``start`` to ``end``, both included, will be sent again."""
 
@@ -22,6 +25,7 @@ class MissionWritePartialList(NamedTuple):
     mission_type: int
 
 
+@message("MISSION_ITEM", size_v1=37)
 class MissionItemFloat(NamedTuple):
     """MISSION_ITEM (39), the old form: ``x``, ``y`` in degrees or metres as float32."""
 
@@ -39,7 +43,15 @@ class MissionItemFloat(NamedTuple):
     autocontinue: int
     mission_type: int
 
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> MissionItemFloat:
+        return MissionItemFloat(source, fields[:4], *fields[4:])
 
+    def encode(self) -> Fields:
+        return *self.params, *self[2:]
+
+
+@message("MISSION_REQUEST", size_v1=4)
 class MissionRequestFloat(NamedTuple):
     """MISSION_REQUEST (40), the old form."""
 
@@ -50,6 +62,7 @@ class MissionRequestFloat(NamedTuple):
     mission_type: int
 
 
+@message("MISSION_SET_CURRENT")
 class MissionSetCurrent(NamedTuple):
     """MISSION_SET_CURRENT (41)."""
 
@@ -59,6 +72,7 @@ class MissionSetCurrent(NamedTuple):
     target_component: int
 
 
+@message("MISSION_CURRENT", size_v1=2, layout="<HHBBIII", more=("mission_id", "fence_id", "rally_points_id"))
 class MissionCurrent(NamedTuple):
     """MISSION_CURRENT (42).
 
@@ -76,6 +90,7 @@ class MissionCurrent(NamedTuple):
     rally_id: int
 
 
+@message("MISSION_REQUEST_LIST", size_v1=2)
 class MissionRequestList(NamedTuple):
     """MISSION_REQUEST_LIST (43)."""
 
@@ -85,6 +100,7 @@ class MissionRequestList(NamedTuple):
     mission_type: int
 
 
+@message("MISSION_COUNT", size_v1=4, layout="<HBBBI", more=("opaque_id",))
 class MissionCount(NamedTuple):
     """MISSION_COUNT (44)."""
 
@@ -96,6 +112,7 @@ class MissionCount(NamedTuple):
     opaque_id: int
 
 
+@message("MISSION_CLEAR_ALL", size_v1=2)
 class MissionClearAll(NamedTuple):
     """MISSION_CLEAR_ALL (45)."""
 
@@ -105,6 +122,7 @@ class MissionClearAll(NamedTuple):
     mission_type: int
 
 
+@message("MISSION_ITEM_REACHED")
 class MissionItemReached(NamedTuple):
     """MISSION_ITEM_REACHED (46)."""
 
@@ -112,6 +130,7 @@ class MissionItemReached(NamedTuple):
     seq: int
 
 
+@message("MISSION_ACK", size_v1=3, layout="<BBBBI", more=("opaque_id",))
 class MissionAck(NamedTuple):
     """MISSION_ACK (47): ``result`` is MAV_MISSION_RESULT."""
 
@@ -123,6 +142,7 @@ class MissionAck(NamedTuple):
     opaque_id: int
 
 
+@message("MISSION_REQUEST_INT", size_v1=4)
 class MissionRequest(NamedTuple):
     """MISSION_REQUEST_INT (51)."""
 
@@ -133,6 +153,7 @@ class MissionRequest(NamedTuple):
     mission_type: int
 
 
+@message("MISSION_ITEM_INT", size_v1=37)
 class MissionItem(NamedTuple):
     """MISSION_ITEM_INT (73): ``x``, ``y`` are the raw int32 (degE7, or 0.1 mm in local frames)."""
 
@@ -149,3 +170,10 @@ class MissionItem(NamedTuple):
     current: int
     autocontinue: int
     mission_type: int
+
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> MissionItem:
+        return MissionItem(source, fields[:4], *fields[4:])
+
+    def encode(self) -> Fields:
+        return *self.params, *self[2:]

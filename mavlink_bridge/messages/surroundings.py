@@ -2,11 +2,32 @@
 
 from __future__ import annotations
 
+from math import degrees, isfinite, nan, radians, remainder, tau
 from typing import NamedTuple
 
+from mavlink_bridge.errors import EncodeError
+from mavlink_bridge.messages.declaration import message
+from mavlink_bridge.messages.fields import (
+    FULL_CIRCLE_CDEG,
+    UNKNOWN_U16,
+    Fields,
+    ascii_bytes,
+    ascii_text,
+    degrees_e7,
+    on_globe,
+)
 from mavlink_bridge.messages.source import Source, Vector
 
+SECTORS = 72
+_NAME = 10
+_CALLSIGN = 8
+_SECOND = 1_000_000
+# Bits of ADSB_FLAGS.
+_COORDINATES, _ALTITUDE, _HEADING, _VELOCITY, _CALLED, _CLIMB = 0x1, 0x2, 0x4, 0x8, 0x10, 0x80
+_GEOMETRIC = 1
 
+
+@message("ADSB_VEHICLE")
 class AdsbVehicle(NamedTuple):
     """ADSB_VEHICLE (246): an aircraft that a receiver detected ``age`` (µs, whole seconds) ago.
 
@@ -27,7 +48,55 @@ class AdsbVehicle(NamedTuple):
     emitter: int
     age: int
 
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> AdsbVehicle | None:
+        address, latitude, longitude, altitude, heading, speed, climb, flags, _, kind, name, emitter, age = (
+            fields
+        )
+        if not (flags & _COORDINATES and on_globe(latitude, longitude)):
+            return None
+        return AdsbVehicle(
+            source,
+            address,
+            latitude / 1e7,
+            longitude / 1e7,
+            altitude / 1e3 if flags & _ALTITUDE else None,
+            kind == _GEOMETRIC,
+            remainder(radians(heading / 100), tau)
+            if flags & _HEADING and heading <= FULL_CIRCLE_CDEG
+            else None,
+            speed / 1e2 if flags & _VELOCITY else None,
+            climb / 1e2 if flags & _CLIMB else None,
+            ascii_text(name[:_CALLSIGN]) if flags & _CALLED else "",
+            emitter,
+            age * _SECOND,
+        )
 
+    def encode(self) -> Fields:
+        known = (
+            (_ALTITUDE, self.altitude is not None),
+            (_HEADING, self.course is not None),
+            (_VELOCITY, self.speed is not None),
+            (_CALLED, bool(self.callsign)),
+            (_CLIMB, self.climb is not None),
+        )
+        return (
+            self.address,
+            *degrees_e7(self.latitude, self.longitude),
+            round((self.altitude or 0.0) * 1e3),
+            round(degrees(self.course or 0.0) * 100) % FULL_CIRCLE_CDEG,
+            round((self.speed or 0.0) * 1e2),
+            round((self.climb or 0.0) * 1e2),
+            _COORDINATES | sum(bit for bit, valid in known if valid),
+            0,
+            int(self.geometric),
+            ascii_bytes("ADSB_VEHICLE: callsign", self.callsign, _CALLSIGN),
+            self.emitter,
+            self.age // _SECOND,
+        )
+
+
+@message("NAMED_VALUE_FLOAT")
 class NamedValue(NamedTuple):
     """NAMED_VALUE_FLOAT (251): a figure for a ground station to plot; ``name`` of at most 10 characters."""
 
@@ -36,7 +105,18 @@ class NamedValue(NamedTuple):
     name: str
     value: float
 
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> NamedValue | None:
+        time, value, name = fields
+        return NamedValue(source, time * 1000, ascii_text(name), value) if isfinite(value) else None
 
+    def encode(self) -> Fields:
+        if not isfinite(self.value):
+            raise EncodeError(f"NAMED_VALUE_FLOAT: value = {self.value} is not finite")
+        return self.time_boot // 1000, self.value, ascii_bytes("NAMED_VALUE_FLOAT: name", self.name, _NAME)
+
+
+@message("CAMERA_TRACKING_GEO_STATUS")
 class CameraTrackingGeo(NamedTuple):
     """CAMERA_TRACKING_GEO_STATUS (276): position of the object that a camera tracks.
 
@@ -51,7 +131,30 @@ class CameraTrackingGeo(NamedTuple):
     altitude: float
     velocity_ned: Vector | None
 
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> CameraTrackingGeo | None:
+        latitude, longitude, altitude = fields[:3]
+        # A camera reports an unknown velocity as NaN; accuracies may hold any value.
+        north, east, down = fields[5:8]
+        if not (on_globe(latitude, longitude) and isfinite(altitude)):
+            return None
+        velocity = (north, east, down) if isfinite(north + east + down) else None
+        return CameraTrackingGeo(source, fields[12], latitude / 1e7, longitude / 1e7, altitude, velocity)
 
+    def encode(self) -> Fields:
+        return (
+            *degrees_e7(self.latitude, self.longitude),
+            self.altitude,
+            nan,
+            nan,
+            *(self.velocity_ned or (nan, nan, nan)),
+            *(nan,) * 4,
+            self.status,
+            0,
+        )
+
+
+@message("OBSTACLE_DISTANCE", finite=True)
 class ObstacleDistance(NamedTuple):
     """OBSTACLE_DISTANCE (330): distance (m) of the nearest obstacle in each of 72 sectors.
 
@@ -70,3 +173,34 @@ class ObstacleDistance(NamedTuple):
     max_distance: float
     offset: float
     frame: int
+
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> ObstacleDistance:
+        time, distances = fields[0], fields[1 : 1 + SECTORS]
+        least, most, sensor, whole, increment, offset, frame = fields[1 + SECTORS :]
+        return ObstacleDistance(
+            source,
+            time,
+            sensor,
+            tuple(None if distance == UNKNOWN_U16 else distance / 1e2 for distance in distances),
+            radians(increment or whole),
+            least / 1e2,
+            most / 1e2,
+            radians(offset),
+            frame,
+        )
+
+    def encode(self) -> Fields:
+        if len(self.distances) != SECTORS:
+            raise EncodeError(f"OBSTACLE_DISTANCE: {len(self.distances)} distances; allowed: {SECTORS}")
+        return (
+            self.time,
+            *(UNKNOWN_U16 if distance is None else round(distance * 1e2) for distance in self.distances),
+            round(self.min_distance * 1e2),
+            round(self.max_distance * 1e2),
+            self.sensor,
+            0,
+            degrees(self.increment),
+            degrees(self.offset),
+            self.frame,
+        )

@@ -10,9 +10,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.messages import Message, Source, StatusText
-from mavlink_bridge.wire.converters import BY_ID, BY_TYPE, Converter
-from mavlink_bridge.wire.fields.flight import TEXT_LENGTH, text_chunks
+from mavlink_bridge.messages import BY_ID, BY_TYPE, Converter, Message, Source, StatusText
+from mavlink_bridge.messages.status import TEXT_LENGTH, text_chunks
 from mavlink_bridge.wire.framing import SIGNED_FLAG, Frame, Framer, frame_v1, frame_v2
 from mavlink_bridge.wire.signing import Signing
 

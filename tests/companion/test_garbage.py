@@ -8,10 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from companion.values.phase import Phase
-from mavlink_bridge.messages import CommandLong, SetpointLocal, Source
+from mavlink_bridge.messages import BY_ID, CommandLong, SetpointLocal, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.converters import TABLE
 from mavlink_bridge.wire.framing import frame_v1, frame_v2
 from tests.companion.bench import (
     AUTOPILOT,
@@ -29,7 +28,7 @@ from tests.companion.rig import QUICK
 SHARED = settings(QUICK, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 """One bench for all examples of a law that says that nothing changes."""
 PLACE = np.array([0.0, 0.0, 5.0])
-ROWS = st.sampled_from(TABLE)
+ROWS = st.sampled_from(tuple(BY_ID.values()))
 BYTES = st.binary(max_size=300)
 
 
@@ -156,7 +155,7 @@ def test_bad_frames_are_counted():
 @st.composite
 def seeming(draw, kinds):
     """A frame of one of ``kinds`` whose fields are as likely at their ends as anywhere."""
-    row = draw(st.sampled_from([row for row in TABLE if row.id in kinds]))
+    row = draw(st.sampled_from([row for row in BY_ID.values() if row.id in kinds]))
     size = row.struct.size
     byte = st.sampled_from((0, 1, 2, 7, 12, 0x7F, 0x80, 0xFF)) | st.integers(0, 255)
     payload = bytes(draw(st.lists(byte, min_size=24, max_size=24)) * (size // 24 + 1))[:size]

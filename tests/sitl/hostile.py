@@ -12,10 +12,9 @@ from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.key import Key
-from mavlink_bridge.messages import CommandLong, Message, Source
+from mavlink_bridge.messages import BY_TYPE, CommandLong, Message, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.converters import BY_TYPE
 from tests.sitl.autopilot_rig import LINK, Rig
 
 RATE = 10_000

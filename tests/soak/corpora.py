@@ -12,6 +12,8 @@ from typing import NamedTuple
 from mavlink_bridge import messages as m
 from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
+    BY_ID,
+    BY_TYPE,
     Attitude,
     CommandAck,
     CommandInt,
@@ -34,7 +36,6 @@ from mavlink_bridge.messages import (
     Tunnel,
 )
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.converters import BY_TYPE, TABLE
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
 from outrider.resources import config_root
 from tests.mavlink_bridge.recorded_logs import PIECES
@@ -167,7 +168,7 @@ def messages(fingerprint: int = 0, now: int = NOW) -> tuple[Known, ...]:
         Known("swarm", plan(fingerprint, now)),
         *(Known("autopilot", message) for message in services()),
     )
-    missing = {row.message for row in TABLE} - {type(known.message) for known in found}
+    missing = {row.message for row in BY_ID.values()} - {type(known.message) for known in found}
     if missing:
         raise LookupError(f"no good message of {missing}")
     return found

@@ -9,7 +9,7 @@ from math import inf, nan
 from random import Random
 from struct import Struct
 
-from mavlink_bridge.wire.converters import BY_ID, Converter
+from mavlink_bridge.messages import BY_ID, Converter
 from mavlink_bridge.wire.framing import SIGNED_FLAG, START_V1, Frame, frame_v1, frame_v2, leading_frames
 
 MOST = 1 << 16

@@ -12,6 +12,7 @@ import numpy as np
 
 from companion.errors import SolverError
 from mavlink_bridge.messages import (
+    BY_TYPE,
     Attitude,
     GpsGlobalOrigin,
     Heartbeat,
@@ -24,7 +25,6 @@ from mavlink_bridge.messages import (
     SystemTime,
 )
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.converters import BY_TYPE
 from mavlink_bridge.wire.framing import frame_v2, leading_frames
 from tests.companion.bench import field_of
 from tests.soak.air_nodes import FENCE, GROUND, Edit

@@ -22,6 +22,7 @@ from companion.values.components import COMPONENT
 from companion.values.phase import Phase
 from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
+    BY_ID,
     CommandAck,
     ExtendedSysState,
     GlobalPosition,
@@ -36,7 +37,6 @@ from mavlink_bridge.messages import (
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.converters import BY_ID
 from mavlink_bridge.wire.framing import leading_frames
 from mavlink_bridge.wire.signing import Signing
 from tests.mavlink_bridge.recorded_logs import PIECES, SHIPPED, WHOLE

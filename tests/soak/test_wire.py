@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from random import Random
 
-from mavlink_bridge.messages import Heartbeat, Message, Source, StatusText
+from mavlink_bridge.messages import BY_TYPE, Heartbeat, Message, Source, StatusText
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.converters import BY_TYPE
 from mavlink_bridge.wire.framing import LONGEST_FRAME, Frame, Framer
 from tests.soak.campaigns import Mutants
 from tests.soak.corpora import frames, logs, messages

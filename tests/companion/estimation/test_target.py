@@ -15,8 +15,7 @@ from companion.config.estimation import TrackConfig
 from companion.estimation.target import Target
 from companion.estimation.tracks import Track
 from companion.telemetry.reception import accepts
-from mavlink_bridge.messages import CameraTrackingGeo, FollowTarget, GlobalPosition, Source
-from mavlink_bridge.wire.converters import BY_TYPE
+from mavlink_bridge.messages import BY_TYPE, CameraTrackingGeo, FollowTarget, GlobalPosition, Source
 from tests.companion.bench import FLEET, START, SYSTEM, TARGET, Bench
 from tests.companion.rig import LAWS, QUICK, numbers, vectors
 

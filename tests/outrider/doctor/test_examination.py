@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from companion.flight.vehicle import PREARM_OK
 from mavlink_bridge.messages import (
+    BY_ID,
     Attitude,
     GlobalPosition,
     GpsGlobalOrigin,
@@ -31,7 +32,6 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.tlog.log import TlogReader
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.converters import BY_ID
 from mavlink_bridge.wire.framing import CRC_EXTRA, frame_v1, frame_v2, leading_frames
 from mavlink_bridge.wire.param_value import number_of
 from outrider.doctor.boot_clock import BootClock

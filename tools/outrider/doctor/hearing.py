@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from mavlink_bridge.messages import Source
-from mavlink_bridge.wire.converters import BY_ID
+from mavlink_bridge.messages import BY_ID, Source
 from mavlink_bridge.wire.framing import Frame
 from outrider.doctor.speaker import Speaker
 

@@ -1,0 +1,146 @@
+"""Messages of sensors: GNSS receiver and inertial measurement unit."""
+
+from __future__ import annotations
+
+from math import degrees, radians, remainder, tau
+from typing import NamedTuple
+
+from mavlink_bridge.messages.declaration import message
+from mavlink_bridge.messages.fields import (
+    FULL_CIRCLE_CDEG,
+    UNKNOWN_U16,
+    Fields,
+    degrees_e7,
+    int16,
+    on_globe,
+    or_none,
+    or_unknown,
+)
+from mavlink_bridge.messages.source import Source, Vector
+
+_UNKNOWN_U8 = 0xFF
+_MILLI_G = 9.80665e-3
+# Every field of HIGHRES_IMU.
+_ALL_UPDATED = 0x1FFF
+
+
+@message("GPS_RAW_INT", size_v1=30)
+class GpsRaw(NamedTuple):
+    """GPS_RAW_INT (24).
+
+    ``time`` µs since boot; ``hdop``, ``vdop`` dilutions; ``speed`` over ground and ``course`` (clockwise from
+    north); the three accuracies in m, m and m/s, 0 when not known.
+    """
+
+    source: Source
+    time: int
+    fix_type: int
+    latitude: float
+    longitude: float
+    altitude: float
+    hdop: float | None
+    vdop: float | None
+    speed: float | None
+    course: float | None
+    satellites: int | None
+    altitude_ellipsoid: float
+    horizontal_accuracy: float
+    vertical_accuracy: float
+    speed_accuracy: float
+
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> GpsRaw | None:
+        time, latitude, longitude, altitude, hdop, vdop, speed, course, fix, satellites = fields[:10]
+        if not on_globe(latitude, longitude):
+            return None
+        return GpsRaw(
+            source,
+            time,
+            fix,
+            latitude / 1e7,
+            longitude / 1e7,
+            altitude / 1e3,
+            or_none(hdop, 1e2),
+            or_none(vdop, 1e2),
+            or_none(speed, 1e2),
+            remainder(radians(course / 100), tau) if course <= FULL_CIRCLE_CDEG else None,
+            None if satellites == _UNKNOWN_U8 else satellites,
+            fields[10] / 1e3,
+            fields[11] / 1e3,
+            fields[12] / 1e3,
+            fields[13] / 1e3,
+        )
+
+    def encode(self) -> Fields:
+        return (
+            self.time,
+            *degrees_e7(self.latitude, self.longitude),
+            round(self.altitude * 1e3),
+            or_unknown("hdop", self.hdop, 1e2),
+            or_unknown("vdop", self.vdop, 1e2),
+            or_unknown("speed", self.speed, 1e2),
+            UNKNOWN_U16 if self.course is None else round(degrees(self.course) * 100) % FULL_CIRCLE_CDEG,
+            self.fix_type,
+            _UNKNOWN_U8 if self.satellites is None else self.satellites,
+            round(self.altitude_ellipsoid * 1e3),
+            round(self.horizontal_accuracy * 1e3),
+            round(self.vertical_accuracy * 1e3),
+            round(self.speed_accuracy * 1e3),
+            0,
+            0,
+        )
+
+
+@message("RAW_IMU", size_v1=26)
+class RawImu(NamedTuple):
+    """RAW_IMU (27): specific force (m/s², FRD), body rates (rad/s) and magnetic field (gauss)."""
+
+    source: Source
+    time_boot: int
+    specific_force: Vector
+    body_rates: Vector
+    magnetic_field: Vector
+
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> RawImu:
+        x, y, z = (value * _MILLI_G for value in fields[1:4])
+        p, q, r, north, east, down = (value / 1e3 for value in fields[4:10])
+        return RawImu(source, fields[0], (x, y, z), (p, q, r), (north, east, down))
+
+    def encode(self) -> Fields:
+        force = (int16(value / _MILLI_G) for value in self.specific_force)
+        rest = (int16(value * 1e3) for value in (*self.body_rates, *self.magnetic_field))
+        return self.time_boot, *force, *rest, 0, 0
+
+
+@message("HIGHRES_IMU", finite=True, size_v1=62)
+class HighresImu(NamedTuple):
+    """HIGHRES_IMU (105): as RAW_IMU, plus static pressure (hPa), pressure altitude (m), temperature (°C)."""
+
+    source: Source
+    time_boot: int
+    specific_force: Vector
+    body_rates: Vector
+    magnetic_field: Vector
+    pressure: float
+    pressure_altitude: float
+    temperature: float
+
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> HighresImu:
+        return HighresImu(
+            source, fields[0], fields[1:4], fields[4:7], fields[7:10], fields[10], fields[12], fields[13]
+        )
+
+    def encode(self) -> Fields:
+        motion = *self.specific_force, *self.body_rates, *self.magnetic_field
+        return (
+            self.time_boot,
+            *motion,
+            self.pressure,
+            0.0,
+            self.pressure_altitude,
+            self.temperature,
+            _ALL_UPDATED,
+            0,
+        )
