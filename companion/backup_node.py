@@ -17,8 +17,10 @@ disarmed vehicle or three seconds without a heartbeat discard all plans.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.committed import horizon_of, rests
 from companion.config import CompanionConfig
@@ -26,11 +28,9 @@ from companion.estimation.origins import Origins
 from companion.flight.autopilots import Profile, is_guided
 from companion.flight.autopilots.known import profile_of
 from companion.flight.setpoint import setpoint
-from companion.flight.state_machine import NAV_LAND
-from companion.flight.vehicle import ARMED, HEARTBEAT_LOST
+from companion.flight.vehicle import HEARTBEAT_LOST
 from companion.goals.heading import Yaw
-from companion.telemetry.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
-from companion.values.components import AUTOPILOT, COMPONENT
+from companion.values.components import COMPONENT
 from companion.values.horizon import Horizon
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, LocalFrame
@@ -52,8 +52,8 @@ from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 from mavlink_bridge.wire.roster import unpack as unpack_roster
 from mavlink_bridge.wire.signing import Signing
 
-BACKUP = 191
-"""MAV_COMP_ID_ONBOARD_COMPUTER."""
+BACKUP: Final[int] = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER
+"""Component id of the backup node."""
 _AGREES = 0.3
 """Largest distance (m) between a set-point and the own plan: what is flown while the set-point travels."""
 _EPOCHS = 4
@@ -61,7 +61,11 @@ _EPOCHS = 4
 _SECOND = 1_000_000
 _SILENT = 4
 """Number of consecutive missing set-points after which the companion counts as silent."""
-_HEARTBEAT, _SETPOINT, _ORIGIN, _COMMAND, _TUNNEL = 0, 84, 49, 76, 385
+_OF_AUTOPILOT = frozenset((mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN))
+_OF_COMPANION = frozenset(
+    (mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED, mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
+)
+"""Message ids that are received on the autopilot's link, by sender."""
 
 
 class BackupNode:
@@ -81,15 +85,17 @@ class BackupNode:
                 lambda identifier, sender, component: (
                     sender == system
                     and (
-                        (component == AUTOPILOT and identifier in (_HEARTBEAT, _ORIGIN))
-                        or (component == COMPONENT and identifier in (_SETPOINT, _COMMAND))
+                        (component == mavlink.MAV_COMP_ID_AUTOPILOT1 and identifier in _OF_AUTOPILOT)
+                        or (component == COMPONENT and identifier in _OF_COMPANION)
                     )
                 ),
                 signing,
             ),
             "swarm": Codec(
                 lambda identifier, sender, component: (
-                    sender == system and component == COMPONENT and identifier == _TUNNEL
+                    sender == system
+                    and component == COMPONENT
+                    and identifier == mavlink.MAVLINK_MSG_ID_TUNNEL
                 ),
                 signing,
             ),
@@ -142,7 +148,8 @@ class BackupNode:
         if now < self._next_beat:
             return []
         self._next_beat = now + _SECOND
-        beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+        kind, autopilot = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
+        beat = Heartbeat(self._own, kind, autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE)
         return [Datagram("autopilot", self._codecs["autopilot"].encode(beat))]
 
     def _hear(self, now: int, message: Message) -> None:
@@ -153,7 +160,7 @@ class BackupNode:
                 self._local = self._fleet.local(message.latitude, message.longitude, message.altitude)
             case SetpointLocal():
                 self._received = (now, message) if self._agrees(now, message) else None
-            case CommandLong() if message.command == NAV_LAND:
+            case CommandLong() if message.command == mavlink.MAV_CMD_NAV_LAND:
                 self._forget()
             case Tunnel():
                 self._file(now, message)
@@ -208,5 +215,6 @@ class BackupNode:
             return None
         beat = self._beat[1]
         profile = profile_of(beat)
-        steers = profile is not None and beat.base_mode & ARMED and is_guided(profile, beat)
+        armed = beat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+        steers = profile is not None and armed and is_guided(profile, beat)
         return profile if steers else None

@@ -6,8 +6,11 @@ the companion's, because the companion may be on the link as well. It answers no
 
 from __future__ import annotations
 
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config import CompanionConfig
-from companion.flight.readiness import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
 from companion.node import Companion
 from companion.shadow import Onlooker, ShadowCompanion
 from companion.world import View
@@ -22,9 +25,9 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.node import Datagram
 
-ONLOOKER = 194
-"""MAV_COMP_ID_ONBOARD_COMPUTER4."""
-REQUESTS = (SET_MESSAGE_INTERVAL, REQUEST_MESSAGE)
+ONLOOKER: Final[int] = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER4
+"""Component id of the shadow companion."""
+REQUESTS = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)
 """Commands that change nothing in a vehicle's behaviour."""
 
 

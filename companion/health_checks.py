@@ -6,17 +6,46 @@ import numpy as np
 
 from companion.config import CompanionConfig
 from companion.estimation.time_sync import RoundTrips
-from companion.flight.health_monitor import HealthMonitor, Situation
-from companion.flight.reactions import Reactions
+from companion.flight.health_monitor import Change, HealthMonitor, Reaction, Situation
 from companion.flight.state_machine import Pilot
 from companion.planning.avoidance import Avoidance
 from companion.telemetry.status_text import Severity, StatusReporter
+from companion.values.phase import STEERED
 from companion.world import View, World
 
 _PERIOD = 100_000
 """Period of the health checks, µs."""
 _PLAIN = str.maketrans({"²": "2", "³": "3", "°": "deg"})
 """Replacements for STATUSTEXT, which is ASCII."""
+
+
+class Reactions:
+    """Pending reactions to present concerns; a reaction in progress outlives its concern."""
+
+    def __init__(self) -> None:
+        self._owed: dict[str, Reaction] = {}
+
+    def note(self, change: Change) -> None:
+        """Record a concern that began or ended."""
+        concern = change.concern
+        if not change.begins:
+            self._owed.pop(concern.name, None)
+        elif concern.reaction is not Reaction.TELL:
+            self._owed[concern.name] = concern.reaction
+
+    def follow(self, pilot: Pilot) -> None:
+        """Order the most severe pending reaction.
+
+        If the concern began during the take-off, or while another controller had the vehicle, its reaction
+        waits until the companion steers.
+        """
+        if not self._owed or pilot.phase not in STEERED:
+            return
+        if Reaction.LAND in self._owed.values():
+            pilot.alight()
+        else:
+            pilot.come_back()
+        self._owed.clear()
 
 
 class HealthChecks:
@@ -90,3 +119,12 @@ class HealthChecks:
         for text in list(limits.remarks)[len(limits.remarks) - new :]:
             self._reporter.say(Severity.WARNING, text.translate(_PLAIN))
         self._reported = limits.said
+
+
+def report_silence(now: int, world: World, reporter: StatusReporter) -> None:
+    """Report target and distance sensors of ``world`` that are silent at ``now`` (µs), and their return."""
+    if world.config.task == "escort" and world.target.age(now) is not None:
+        reporter.watch(world.target.at(now) is None, "Target lost", "Target is back")
+    if world.sensed.proximity is not None:
+        silent = world.sensed.proximity.silent(now)
+        reporter.watch(silent, "Obstacle sensor silent", "Obstacle sensor is back")

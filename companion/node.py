@@ -15,7 +15,7 @@ from companion.estimation.time_sync import RoundTrips
 from companion.flight.orders import Orders
 from companion.flight.state_machine import Pilot
 from companion.goals.goals import Goals
-from companion.health_checks import HealthChecks
+from companion.health_checks import HealthChecks, report_silence
 from companion.planning.avoidance import Avoidance, Tally
 from companion.planning.certified import CertifiedAvoidance
 from companion.planning.field import FieldAvoidance
@@ -25,7 +25,6 @@ from companion.planning.setpoints import Setpoints
 from companion.telemetry.metrics import Metrics
 from companion.telemetry.reception import LINKS, accepts
 from companion.telemetry.sharing import Sharing
-from companion.telemetry.silence import report_silence
 from companion.telemetry.status_text import StatusReporter
 from companion.values.components import COMPONENT
 from companion.values.horizon import Horizon

@@ -6,6 +6,7 @@ from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.estimation.origins import Origins
@@ -16,7 +17,6 @@ from companion.obstacles.moving import MovingObstacles
 from companion.obstacles.neighbours import Neighbours
 from companion.obstacles.sensed import Sensed, Stance
 from companion.obstacles.static import FixedObstacles
-from companion.values.components import AUTOPILOT
 from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
 from mavlink_bridge.frames import FleetFrame, LocalFrame
@@ -210,7 +210,7 @@ class World:
         if own is None or local is None or own.age > config.guard.own_stale_us:
             return
         when = now - config.proximity.delay_us
-        if message.source.component == AUTOPILOT:
+        if message.source.component == mavlink.MAV_COMP_ID_AUTOPILOT1:
             stamped = self._own.when(now, message.time)
             when = stamped if now - config.proximity.age_us <= stamped <= now else when
         place = own.position - 1e-6 * (now - when) * own.velocity

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.frames import FleetFrame
@@ -39,7 +40,6 @@ from sitl.config.autopilot import AutopilotConfig
 from sitl.environment.weather import WeatherConfig
 from sitl.estimation.sensors import Estimate
 from sitl.snapshot import SnapshotReader
-from sitl.telemetry.reports import HEARTBEAT, ORIGIN
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
 from sitl.telemetry.streams import usual_rates
@@ -52,11 +52,21 @@ from sitl.vehicle.multirotor import Reference, VehicleState
 LINK: Final = "autopilot"
 """The only link of the node."""
 
-# MAV_COMP_ID_AUTOPILOT1
-_COMPONENT: Final = 1
-# Message ids of SET_MODE, PING, GLOBAL_POSITION_INT, COMMAND_INT, COMMAND_LONG, SET_ATTITUDE_TARGET,
-# SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT, TIMESYNC, FOLLOW_TARGET. The services add their own.
-_RECEIVED: Final = frozenset((4, 11, 33, 75, 76, 82, 84, 86, 111, 144))
+# Message ids; the services add their own.
+_RECEIVED: Final = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_PING,
+        mavlink.MAVLINK_MSG_ID_SET_MODE,
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_COMMAND_INT,
+        mavlink.MAVLINK_MSG_ID_COMMAND_LONG,
+        mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
+        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
+        mavlink.MAVLINK_MSG_ID_TIMESYNC,
+        mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET,
+    )
+)
 # Limit of messages in answer to one datagram; the rest of the datagram is ignored.
 _ANSWERS: Final = 32
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
@@ -93,7 +103,7 @@ class Autopilot:
         self._values = Values(_TABLES[config.flavour](len(vehicle.rotors)), config, saved.parameters)
         self._configured = config
         self.config = config = self._values.configured(config)
-        self._source = source = Source(config.system_id, _COMPONENT)
+        self._source = source = Source(config.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._outbox: list[Message] = []
         reporter = StatusReporter(source, self._outbox)
         self._firmware: Firmware = _FIRMWARE[config.flavour](config)
@@ -213,7 +223,7 @@ class Autopilot:
         was_ready = self._commander.ready
         self._commander.watch(self._now, self._plant.vehicle.on_ground, self._plant.sensors.gps.located)
         if self._commander.ready and not was_ready:
-            self._telemetry.request(ORIGIN)
+            self._telemetry.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
         if self._battery is not None and self._battery.due(self._now):
             self._battery.advance(self._now, self._plant.state.rotor_speeds.tolist())
         if self._now >= self._failsafes.next_due:
@@ -230,7 +240,7 @@ class Autopilot:
             mode = self._commander.mode
             self._reception.handle(message, self._now, self._plant.estimate())
             if self._announces and self._commander.mode is not mode:
-                self._telemetry.request(HEARTBEAT)
+                self._telemetry.request(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
         self._trust.watch(self._now)
         self._work_due = self._services.next_due
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import MissionCurrent, Source
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.failsafes import Failsafes
-from sitl.autopilot.firmware import ARMED, Firmware, Mode
+from sitl.autopilot.firmware import Firmware, Mode
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.plant import Plant
 from sitl.config.autopilot import AutopilotConfig
-from sitl.telemetry.identity import version
-from sitl.telemetry.reports import IN_AIR, LANDING, ON_GROUND, TAKING_OFF, Snapshot
+from sitl.telemetry.reports import Snapshot
+from sitl.telemetry.status_reports import version
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 from sitl.values.setpoints import Setpoint
@@ -23,9 +25,11 @@ from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.ground import GRAVITY
 
 # In the air; IDLE (thrust cut) counts as landing because touchdown is imminent.
-_LANDED_STATES: Final = {Activity.TAKEOFF: TAKING_OFF, Activity.LAND: LANDING, Activity.IDLE: LANDING}
-# MAV_SYS_STATUS_GEOFENCE: MAVProxy takes a cleared bit as a breach, because ArduPilot always sets it.
-_GEOFENCE: Final = 0x100000
+_LANDED_STATES: Final = {
+    Activity.TAKEOFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
+    Activity.LAND: mavlink.MAV_LANDED_STATE_LANDING,
+    Activity.IDLE: mavlink.MAV_LANDED_STATE_LANDING,
+}
 
 
 class SnapshotReader:
@@ -61,7 +65,8 @@ class SnapshotReader:
         self._rotors = len(vehicle.rotors)
         self._hovering = _squares(hover_speeds(vehicle).tolist())
         reported = config.streams == "normal" and config.flavour == "ardupilot"
-        self._unbreached = _GEOFENCE if reported else 0
+        # MAVProxy takes a cleared bit as a breach, because ArduPilot always sets it.
+        self._unbreached = mavlink.MAV_SYS_STATUS_GEOFENCE if reported else 0
         self._now = 0
 
     def configure(self, config: AutopilotConfig) -> None:
@@ -72,6 +77,7 @@ class SnapshotReader:
         """Return the snapshot at ``now`` (µs since boot)."""
         self._now = now
         commander, flavour, plant = self._commander, self._flavour, self._plant
+        armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if commander.armed else 0
         return Snapshot(
             self._source,
             now,
@@ -81,7 +87,7 @@ class SnapshotReader:
             commander.armed,
             self._rotors,
             flavour.autopilot,
-            flavour.base_mode(commander.mode) | (ARMED if commander.armed else 0),
+            flavour.base_mode(commander.mode) | armed,
             flavour.custom_mode(commander.mode),
             self._landed_state(),
             self._target,
@@ -111,10 +117,12 @@ class SnapshotReader:
     def _landed_state(self) -> int:
         """Return the MAV_LANDED_STATE; a descent without a controller is not LANDING."""
         if self._commander.landed:
-            return ON_GROUND
-        if self._commander.mode is Mode.POSITION:
-            return IN_AIR
-        return _LANDED_STATES.get(self._guidance.activity, IN_AIR)
+            state: int = mavlink.MAV_LANDED_STATE_ON_GROUND
+        elif self._commander.mode is Mode.POSITION:
+            state = mavlink.MAV_LANDED_STATE_IN_AIR
+        else:
+            state = _LANDED_STATES.get(self._guidance.activity, mavlink.MAV_LANDED_STATE_IN_AIR)
+        return state
 
     def _target(self) -> Setpoint | None:
         guidance = self._guidance

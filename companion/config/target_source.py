@@ -7,9 +7,12 @@ too. All go through the same track, with its gates: ``CompanionConfig.target``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Literal
 
 from pydantic import Field
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.values.settings import Settings
 
@@ -55,9 +58,18 @@ TargetSource = Annotated[
 ]
 
 
+_MESSAGES: Mapping[str, int] = MappingProxyType(
+    {
+        "global_position": mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        "follow_target": mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET,
+        "camera": mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS,
+    }
+)
+
+
 def message_of(source: TargetSource) -> int | None:
     """Return the id of the MAVLink message that is used; None for a fixed place."""
-    return {"global_position": 33, "follow_target": 144, "camera": 276}.get(source.kind)
+    return _MESSAGES.get(source.kind)
 
 
 def speaker_of(source: TargetSource, system: int, target: int) -> int | None:

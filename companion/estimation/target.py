@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.config.target_source import CameraSource, FixedSource, message_of, speaker_of
 from companion.estimation.tracks import State, Track
 from companion.values.horizon import Array
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
-from mavlink_bridge.messages import CameraTrackingGeo, FollowTarget, GlobalPosition, Message, Source
-
-_KINDS = {33: GlobalPosition, 144: FollowTarget, 276: CameraTrackingGeo}
-_TRACKING = 1
-"""CAMERA_TRACKING_STATUS_FLAGS_ACTIVE."""
+from mavlink_bridge.messages import (
+    BY_ID,
+    CameraTrackingGeo,
+    FollowTarget,
+    GlobalPosition,
+    Message,
+    Source,
+)
 
 
 class Target:
@@ -28,7 +32,8 @@ class Target:
         self._config = config
         self._fleet = fleet
         self._system = system
-        self._kind = _KINDS.get(message_of(source) or 0)
+        number = message_of(source)
+        self._kind = None if number is None else BY_ID[number].message
         self._believed = speaker_of(source, system, target_system)
         self._links = ("target", "autopilot") if isinstance(source, CameraSource) else ("target",)
         self._fixed = None
@@ -107,7 +112,10 @@ class Target:
             # Three zeros also stand for an unknown velocity.
             told = message.velocity if message.velocity is not None and any(message.velocity) else None
             velocity, stamp = None if told is None else ned_to_enu(told), message.time_boot
-        elif isinstance(message, CameraTrackingGeo) and message.status == _TRACKING:
+        elif (
+            isinstance(message, CameraTrackingGeo)
+            and message.status == mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE
+        ):
             velocity = None if message.velocity_ned is None else ned_to_enu(message.velocity_ned)
             stamp = 0
         else:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import CommandAck, CommandLong, Message, Source
 
-ACCEPTED, IN_PROGRESS = 0, 5
-DO_SET_MODE = 176
 _RETRY = 500_000
 _EXPIRY = 15_000_000
 """µs after which an acknowledged command without effect is sent again; longer than a take-off."""
@@ -47,7 +47,7 @@ class Commands:
         if call is None:
             return
         self._answered.add(call)
-        if message.result in (ACCEPTED, IN_PROGRESS):
+        if message.result in (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS):
             self._acknowledged.add(call)
         elif self._results.get(call) != message.result:
             self.refused += 1
@@ -90,7 +90,8 @@ class Commands:
             return []
         self._sent[key], self._asked[command] = now, key
         p1, p2, p3, p4, p5, p6, p7 = params
-        return [CommandLong(self._own, self._own.system, 1, command, 0, (p1, p2, p3, p4, p5, p6, p7))]
+        target = self._own.system, mavlink.MAV_COMP_ID_AUTOPILOT1
+        return [CommandLong(self._own, *target, command, 0, (p1, p2, p3, p4, p5, p6, p7))]
 
     def _recent(self, now: int, call: _Call | None) -> bool:
         return call is not None and now - self._sent.get(call, -_RETRY) < _RETRY

@@ -11,9 +11,11 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config import CompanionConfig
 from companion.flight.guard import Holding
-from companion.flight.vehicle import CRITICAL, Vehicle
+from companion.flight.vehicle import Vehicle
 from companion.telemetry.status_text import Severity
 from companion.values.phase import Phase
 from companion.world import View
@@ -187,7 +189,8 @@ class HealthMonitor:
             return Concern(
                 "custody", "Vehicle taken over: no set-points until a go", severity=Severity.NOTICE
             )
-        if beat.system_status >= CRITICAL:
+        # The higher states also mean a failsafe.
+        if beat.system_status >= mavlink.MAV_STATE_CRITICAL:
             return Concern("failsafe", "Autopilot reports a failsafe")
         return None
 

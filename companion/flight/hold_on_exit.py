@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.flight.autopilots import Profile
 from companion.flight.autopilots.px4 import PX4
-from companion.flight.command_protocol import ACCEPTED, DO_SET_MODE
 from companion.flight.vehicle import Vehicle
-from companion.values.components import AUTOPILOT, COMPONENT
+from companion.values.components import COMPONENT
 from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
@@ -25,7 +26,7 @@ _AGAIN, _GRANTED = 100_000, 1_500_000
 """µs between two requests, and after an accepted one: by then the heartbeat has reported it."""
 _PATIENCE = 3_000_000
 """µs until the attempt is given up."""
-_HEARTBEAT, _ACK = 0, 77
+_RECEIVED = frozenset((mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_COMMAND_ACK))
 
 
 class LastWord:
@@ -54,7 +55,7 @@ class LastWord:
         self._signing = signing
         self._codec = Codec(
             lambda identifier, sender, component: (
-                identifier in (_HEARTBEAT, _ACK) and sender == system and component == AUTOPILOT
+                identifier in _RECEIVED and sender == system and component == mavlink.MAV_COMP_ID_AUTOPILOT1
             ),
             signing,
         )
@@ -82,7 +83,7 @@ class LastWord:
                 if not isinstance(message, CommandAck):
                     self._vehicle.receive(message)
                     self._fresh = True
-                elif message.command == DO_SET_MODE and message.result == ACCEPTED and self._asked:
+                elif self._asked and _grants(message):
                     self._next = now + _GRANTED
         if not self.over:
             self.said = self._verdict(late=now >= self._until)
@@ -90,7 +91,8 @@ class LastWord:
             return []
         self._next, self._asked = now + _AGAIN, True
         hold = self._profile.hold_call
-        order = CommandLong(self._own, self._own.system, AUTOPILOT, DO_SET_MODE, 0, hold)
+        target = self._own.system, mavlink.MAV_COMP_ID_AUTOPILOT1
+        order = CommandLong(self._own, *target, mavlink.MAV_CMD_DO_SET_MODE, 0, hold)
         return [Datagram("autopilot", self._codec.encode(order))]
 
     def _verdict(self, *, late: bool) -> str:
@@ -118,3 +120,7 @@ class LastWord:
     def _steered(self) -> bool:
         """Whether the vehicle is armed and in guided mode."""
         return self._vehicle.armed and self._vehicle.in_guided_mode
+
+
+def _grants(ack: CommandAck) -> bool:
+    return (ack.command, ack.result) == (mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_RESULT_ACCEPTED)

@@ -6,16 +6,15 @@ returns and lands, NAV_LAND lands.
 
 from __future__ import annotations
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config import CompanionConfig
-from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF, Pilot
+from companion.flight.state_machine import Pilot
 from companion.goals.goals import Goals
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source
 
-NAV_LOITER_UNLIM, NAV_RETURN, DO_REPOSITION = 17, 20, 192
-ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
-_GLOBAL = (0, 5)
-"""MAV_FRAME_GLOBAL and MAV_FRAME_GLOBAL_INT."""
+_GLOBAL = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _HIGHEST = 1e5
 """m; the comparison also rejects NaN."""
 
@@ -42,17 +41,24 @@ class Orders:
         if (message.target_system, message.target_component) != self._own:
             return []
         taken = self._taken(message)
-        result = UNSUPPORTED if taken is None else ACCEPTED if taken else DENIED
+        if taken is None:
+            result = mavlink.MAV_RESULT_UNSUPPORTED
+        else:
+            result = mavlink.MAV_RESULT_ACCEPTED if taken else mavlink.MAV_RESULT_DENIED
         return [CommandAck(self._own, message.command, result, 0, 0, *message.source)]
 
     def _taken(self, order: CommandInt | CommandLong) -> bool | None:
         """Return whether the command is accepted; None for an unknown one."""
         pilot = self._pilot
         if isinstance(order, CommandInt):
-            return self._reposition(order) if order.command == DO_REPOSITION else None
-        if order.command == NAV_TAKEOFF:
+            return self._reposition(order) if order.command == mavlink.MAV_CMD_DO_REPOSITION else None
+        if order.command == mavlink.MAV_CMD_NAV_TAKEOFF:
             return pilot.go(order.params[6])
-        plain = {NAV_LAND: pilot.land, NAV_LOITER_UNLIM: pilot.hold, NAV_RETURN: pilot.come_back}
+        plain = {
+            mavlink.MAV_CMD_NAV_LAND: pilot.land,
+            mavlink.MAV_CMD_NAV_LOITER_UNLIM: pilot.hold,
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: pilot.come_back,
+        }
         obey = plain.get(order.command)
         return None if obey is None else obey()
 

@@ -8,11 +8,10 @@ innovation to gate of 1 or more: then GPS is refused, and the estimator dead-rec
 
 from __future__ import annotations
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import EkfStatus, EstimatorStatus, GpsRaw, Message
 
-_FIX_3D = 3
-_ABSOLUTE = 0x10
-"""ESTIMATOR_POS_HORIZ_ABS, the same in both messages."""
 _REFUSES = 1.0
 _COASTING = 0.1
 """m/s²: two standard deviations of the acceleration error of dead reckoning."""
@@ -42,10 +41,11 @@ class Positioning:
     def receive(self, message: Message) -> None:
         """Receive a message of the autopilot."""
         if isinstance(message, GpsRaw):
-            fix = message.fix_type >= _FIX_3D
+            fix = message.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX
             self._fix = fix if fix or self._fix is not None else None
         elif isinstance(message, EkfStatus | EstimatorStatus):
-            absolute = bool(message.flags & _ABSOLUTE)
+            # EKF_POS_HORIZ_ABS is the same bit.
+            absolute = bool(message.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS)
             self._absolute = absolute if absolute or self._absolute is not None else None
             # NaN means not tested.
             self._refused = absolute and message.horizontal >= _REFUSES

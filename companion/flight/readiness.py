@@ -6,37 +6,44 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.flight.autopilot_limits import AutopilotLimits
 from companion.flight.autopilots import Params
-from companion.flight.command_protocol import DO_SET_MODE, Commands
-from companion.flight.vehicle import UNDEFINED, Vehicle
+from companion.flight.command_protocol import Commands
+from companion.flight.vehicle import Vehicle
 from companion.world import View
 from mavlink_bridge.messages import CommandAck, Message
 
-REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, GPS_GLOBAL_ORIGIN = 512, 511, 49
 OPERATORS_GO = "the operator's go"
 """Value of ``missing`` when everything else is ready."""
 _BESIDE = 30.0
 """m; largest distance outside the box, on each axis, at which a vehicle may start."""
 _FAR = 20_000.0
 """m between the fleet origin and the autopilot's own: beyond this, one of the two is wrong."""
-STREAMS: Mapping[int, int] = MappingProxyType({32: 20_000, 30: 100_000, 1: 1_000_000, 245: 500_000})
+STREAMS: Mapping[int, int] = MappingProxyType(
+    {
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20_000,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE: 100_000,
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1_000_000,
+        mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 500_000,
+    }
+)
 """Requested message ids and intervals (µs).
 
-LOCAL_POSITION_NED, ATTITUDE, SYS_STATUS and EXTENDED_SYS_STATE. The attitude is used only for the direction
-of the nose when the set-points begin.
+The attitude is used only for the direction of the nose when the set-points begin.
 """
-GPS_RAW, HEALTH = 24, 500_000
-"""GPS_RAW_INT, and the interval (µs) of it and of the message with the estimator's status.
+HEALTH = 500_000
+"""Interval (µs) of GPS_RAW_INT and of the message with the estimator's status.
 
 A start does not require them: a vehicle may have neither.
 """
 
 
 def _interval(message: int, interval: int) -> tuple[int, Params]:
-    return SET_MESSAGE_INTERVAL, (float(message), float(interval), 0.0, 0.0, 0.0, 0.0, 0.0)
+    params = (float(message), float(interval), 0.0, 0.0, 0.0, 0.0, 0.0)
+    return mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, params
 
 
 _NEEDED = tuple(_interval(message, interval) for message, interval in STREAMS.items())
@@ -74,7 +81,8 @@ class Readiness:
         profile = self._vehicle.profile
         if profile is None or not self._vehicle.alive:
             return []
-        wanted = [_interval(message, HEALTH) for message in (GPS_RAW, profile.estimator_message)]
+        health = mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, profile.estimator_message
+        wanted = [_interval(message, HEALTH) for message in health]
         open_ = [call for call in wanted if not self._wishes.answered(*call)]
         return self._wishes.call(now, *open_[0]) if open_ else []
 
@@ -105,7 +113,7 @@ class Readiness:
             return unseen
         if astray := self._astray(view):
             return astray
-        if vehicle.armed and vehicle.landed_state == UNDEFINED:
+        if vehicle.armed and vehicle.landed_state == mavlink.MAV_LANDED_STATE_UNDEFINED:
             # A vehicle that may be flying must not receive a take-off command.
             return "EXTENDED_SYS_STATE, whether the armed vehicle is on the ground"
         if not vehicle.healthy:
@@ -153,12 +161,11 @@ class Readiness:
         profile, vehicle = self._vehicle.profile, self._vehicle
         if profile is not None and vehicle.alive and vehicle.starved and not vehicle.healthy:
             # If another controller sends set-points the checks pass, and the mode is that controller's.
-            calls += self._commands.call(now, DO_SET_MODE, profile.hold_call)
+            calls += self._commands.call(now, mavlink.MAV_CMD_DO_SET_MODE, profile.hold_call)
         if self._vehicle.heartbeat is not None:
             for command, params in sorted(_NEEDED, key=lambda call: self._commands.sent_at(*call)):
                 calls += self._commands.call(now, command, params)
             # Repeated from time to time: an autopilot that restarted elsewhere has another origin.
-            calls += self._commands.call(
-                now, REQUEST_MESSAGE, (GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            )
+            origin = (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            calls += self._commands.call(now, mavlink.MAV_CMD_REQUEST_MESSAGE, origin)
         return calls + self.limits.step(now)

@@ -10,13 +10,13 @@ from __future__ import annotations
 from math import isfinite
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.goals.heading import Yaw
 from companion.values.horizon import Array, Horizon
 from mavlink_bridge.frames import LocalFrame
 from mavlink_bridge.messages import SetpointLocal, Source, Vector
 
-FRAME_LOCAL_NED = 1
 NONE: Array = np.zeros(3)
 """No compensation."""
 NONE.flags.writeable = False
@@ -37,7 +37,7 @@ def setpoint(
     v_max: Array = UNBOUNDED,
     lead: int = 0,
 ) -> SetpointLocal:
-    """Return SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame (frame 1).
+    """Return SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame.
 
     It contains the ``horizon`` and ``yaw`` at ``time`` (µs). ``compensation`` (3,), m/s², is added to the
     acceleration and ``bias`` (3,), m/s, to the velocity (``tracking``), which ``v_max`` (3,) bounds. The
@@ -53,8 +53,8 @@ def setpoint(
         own,
         since_boot,
         own.system,
-        1,
-        FRAME_LOCAL_NED,
+        mavlink.MAV_COMP_ID_AUTOPILOT1,
+        mavlink.MAV_FRAME_LOCAL_NED,
         mask,
         _vector(local.position_to_local(motion.position)),
         _vector(local.velocity_to_local(velocity)),

@@ -11,24 +11,23 @@ from __future__ import annotations
 
 from math import inf
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig
 from companion.flight.autopilot_limits import AutopilotLimits
 from companion.flight.autopilots import Loop, Profile, Step
-from companion.flight.command_protocol import DO_SET_MODE, Commands
+from companion.flight.command_protocol import Commands
 from companion.flight.control_authority import ControlAuthority, Owner, Passage
 from companion.flight.landing import Landing, landed
 from companion.flight.readiness import Readiness
-from companion.flight.takeoff import NAV_TAKEOFF, Takeoff
+from companion.flight.takeoff import Takeoff
 from companion.flight.vehicle import Vehicle
 from companion.values.horizon import Array
 from companion.values.phase import STEERED, Phase
 from companion.world import View
 from mavlink_bridge.messages import CommandAck, Message, ParamValue, Source
 
-__all__ = ["NAV_LAND", "NAV_TAKEOFF", "Phase", "Pilot"]
-
-NAV_LAND = 21
 _NAN = float("nan")
 _ARMS = 2_000_000
 """µs after the last arm command during which a heartbeat may still report the vehicle as disarmed."""
@@ -109,7 +108,7 @@ class Pilot:
         profile = self.profile
         if self.guided or profile is None or self.phase is not Phase.PREPARE or not self.streaming:
             return self.guided
-        return self._commands.taken(now, DO_SET_MODE, profile.mode_call, _BEATS)
+        return self._commands.taken(now, mavlink.MAV_CMD_DO_SET_MODE, profile.mode_call, _BEATS)
 
     @property
     def streaming(self) -> bool:
@@ -295,7 +294,7 @@ class Pilot:
                 return []
         if self._passage.entered:
             return []
-        return self._commands.call(now, NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
+        return self._commands.call(now, mavlink.MAV_CMD_NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
 
     def _leave(self, now: int, view: View) -> list[Message]:
         """Return the mode command after disarming, and end the flight.
@@ -313,7 +312,7 @@ class Pilot:
             if not vehicle.alive:
                 return []
             if vehicle.mode in profile.land_modes | {profile.guided_custom_mode}:
-                return self._commands.call(now, DO_SET_MODE, profile.hold_call)
+                return self._commands.call(now, mavlink.MAV_CMD_DO_SET_MODE, profile.hold_call)
         self.phase = Phase.DONE
         return []
 
@@ -337,7 +336,7 @@ class Pilot:
         """Request the guided mode again, after only the time-out has ended it."""
         if self.profile is None:
             return []
-        return self._commands.call(now, DO_SET_MODE, self.profile.mode_call)
+        return self._commands.call(now, mavlink.MAV_CMD_DO_SET_MODE, self.profile.mode_call)
 
     def _start_anew(self) -> None:
         """Restart from the beginning: a new go is needed."""

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from math import inf
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.estimation.tracks import State
 from companion.flight.autopilots import Profile, Step
-from companion.flight.command_protocol import DO_SET_MODE, Commands
-from companion.flight.vehicle import IN_AIR, ON_GROUND, UNDEFINED, Vehicle
+from companion.flight.command_protocol import Commands
+from companion.flight.vehicle import Vehicle
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Message
 
-ARM_DISARM, NAV_TAKEOFF = 400, 22
 _STILL, _CALM = 0.3, 2_000_000
 """m/s and µs: a vehicle slower than this in the air for so long has finished its take-off."""
 _NEARLY = 0.7
@@ -23,6 +24,7 @@ An escort may begin during the climb above both: the autopilot takes up to 3 s f
 """
 _THERE, _FAST = 0.3, 3.0
 """m above the requested height, and m/s, beyond which the escort may not begin during the climb."""
+_NOT_UP = (mavlink.MAV_LANDED_STATE_UNDEFINED, mavlink.MAV_LANDED_STATE_ON_GROUND)
 _NAN = float("nan")
 
 
@@ -46,7 +48,7 @@ class Takeoff:
         """Begin at the state ``own``, on the ground or in flight."""
         self.start = own.position.copy()
         self._ground = float(own.position[2])
-        self._flying_already = self._vehicle.armed and self._vehicle.landed_state != ON_GROUND
+        self._flying_already = self._vehicle.flies
         self._calm_since = None
         self._step = 0
 
@@ -81,10 +83,11 @@ class Takeoff:
         step = profile.steps[self._step]
         if step is Step.MODE:
             done = vehicle.in_guided_mode
-            call = self._commands.call(now, DO_SET_MODE, profile.mode_call)
+            call = self._commands.call(now, mavlink.MAV_CMD_DO_SET_MODE, profile.mode_call)
         elif step is Step.ARM:
             done = vehicle.armed
-            call = self._commands.call(now, ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            arm = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            call = self._commands.call(now, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, arm)
             if call:
                 self.asked_to_arm = now
         else:
@@ -92,12 +95,9 @@ class Takeoff:
             done = self._flying_already or self._is_up(now, own, climbed, height, floor)
             above_sea = self._origin_altitude + self._ground + height
             altitude = above_sea if profile.takeoff_absolute else height
-            up = self._flying_already or vehicle.landed_state not in (UNDEFINED, ON_GROUND)
-            call = (
-                []
-                if up
-                else self._commands.call(now, NAV_TAKEOFF, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude))
-            )
+            up = self._flying_already or vehicle.landed_state not in _NOT_UP
+            climb = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude)
+            call = [] if up else self._commands.call(now, mavlink.MAV_CMD_NAV_TAKEOFF, climb)
         if done:
             self._step += 1
             self._commands.forget()
@@ -114,12 +114,13 @@ class Takeoff:
         """
         speed = float(abs(own.velocity).max())
         still = speed < _STILL
-        if self._vehicle.landed_state == ON_GROUND:
+        if self._vehicle.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND:
             self._calm_since = None
             return False
         if own.position[2] > floor + _ROOM and _ENOUGH * height < climbed < height + _THERE and speed < _FAST:
             return True
-        if not still or self._vehicle.landed_state != IN_AIR or climbed < 0.5 * height:
+        in_air = self._vehicle.landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
+        if not still or not in_air or climbed < 0.5 * height:
             self._calm_since = None
         elif self._calm_since is None:
             self._calm_since = now

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.flight.autopilots import Profile, is_guided
 from companion.flight.autopilots.known import profile_of
 from companion.flight.positioning import Positioning
@@ -18,13 +20,6 @@ from mavlink_bridge.messages import (
     SysStatus,
 )
 
-WARNING = 4
-"""MAV_SEVERITY_WARNING."""
-ARMED, PREARM_OK, INVALID = 0x80, 0x10000000, 8
-UNDEFINED, ON_GROUND, IN_AIR = 0, 1, 2
-"""MAV_LANDED_STATE; other values mean taking off or landing."""
-CRITICAL = 5
-"""MAV_STATE_CRITICAL; this and higher values indicate a failsafe."""
 HEARTBEAT_LOST = 3_000_000
 """µs without a heartbeat after which the autopilot's mode is unknown."""
 _TEXTS = 16
@@ -54,7 +49,7 @@ class Vehicle:
     def receive(self, message: Message) -> None:
         """Receive a message of the autopilot."""
         if isinstance(message, Heartbeat):
-            if message.autopilot != INVALID:
+            if message.autopilot != mavlink.MAV_AUTOPILOT_INVALID:
                 self.heartbeat = message
                 self.profile = profile_of(message)
         elif isinstance(message, SysStatus):
@@ -66,7 +61,7 @@ class Vehicle:
         elif isinstance(message, StatusText):
             self.texts.append(message)
             self.reported += 1
-            if message.severity <= WARNING:
+            if message.severity <= mavlink.MAV_SEVERITY_WARNING:
                 self.said = message.text
 
     def tick(self, now: int) -> None:
@@ -91,7 +86,8 @@ class Vehicle:
     @property
     def armed(self) -> bool:
         """Whether the motors are armed, according to the last heartbeat."""
-        return self.heartbeat is not None and bool(self.heartbeat.base_mode & ARMED)
+        beat = self.heartbeat
+        return beat is not None and bool(beat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
 
     @property
     def guided(self) -> bool:
@@ -112,7 +108,7 @@ class Vehicle:
     @property
     def flies(self) -> bool:
         """Whether the vehicle may be in the air."""
-        return self.armed and self.landed_state != ON_GROUND
+        return self.armed and self.landed_state != mavlink.MAV_LANDED_STATE_ON_GROUND
 
     @property
     def left_by_us(self) -> bool:
@@ -128,11 +124,12 @@ class Vehicle:
     @property
     def healthy(self) -> bool:
         """Whether its pre-arm checks have passed."""
-        return self.status is not None and bool(self.status.health & PREARM_OK)
+        return self.status is not None and bool(self.status.health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
 
     @property
     def landed_state(self) -> int:
-        """Last reported MAV_LANDED_STATE, UNDEFINED if the report is too old."""
+        """Last reported MAV_LANDED_STATE, undefined if the report is too old."""
+        undefined: int = mavlink.MAV_LANDED_STATE_UNDEFINED
         if self._extended is None or self.now - self._extended_at > HEARTBEAT_LOST:
-            return UNDEFINED
+            return undefined
         return self._extended.landed_state

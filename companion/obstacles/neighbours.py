@@ -14,6 +14,7 @@ from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.estimation.estimator import Measured
@@ -23,7 +24,6 @@ from companion.obstacles.reachable_ball import Ball, flown_on
 from companion.obstacles.relevance_filter import Ages, RelevanceFilter
 from companion.obstacles.trusted_peers import TrustedPeers
 from companion.obstacles.uncertainty import ReportedUncertainty
-from companion.values.components import AUTOPILOT
 from companion.values.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.values.obstacles import Obstacles
 from companion.values.vectors import limit
@@ -133,7 +133,7 @@ class Neighbours:
         system, component = message.source
         if system == self._system:
             return
-        by_autopilot = component == AUTOPILOT
+        by_autopilot = component == mavlink.MAV_COMP_ID_AUTOPILOT1
         if by_autopilot and now - self._spoken.get(system, now - _VOICE) < _VOICE:
             # Its companion reports the position already, dated by another clock.
             return
@@ -204,7 +204,7 @@ class Neighbours:
         """Return whether position and plan messages of this sender need not be decoded now."""
         if not self.relevance.ignores(system):
             return False
-        if component != AUTOPILOT and not self._by_autopilot.get(system, True):
+        if component != mavlink.MAV_COMP_ID_AUTOPILOT1 and not self._by_autopilot.get(system, True):
             # The companion's ignored messages still have priority over its autopilot's.
             self._spoken[system] = self.relevance.now
         return True

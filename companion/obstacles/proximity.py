@@ -13,6 +13,7 @@ from math import pi, sin
 from typing import NamedTuple
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config.obstacles import ProximityConfig
 from companion.obstacles.static import Axes
@@ -21,10 +22,8 @@ from mavlink_bridge.messages import ObstacleDistance, Source
 
 FIRST_ID = 10_000
 """Ids of posts begin here: above those of fixed obstacles."""
-BODY = 12
-"""MAV_FRAME_BODY_FRD: angles are relative to the nose."""
-_NORTH = (0, 1)
-"""MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED: angles are relative to north."""
+_FROM_NORTH = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_LOCAL_NED)
+"""Frames in which angles are relative to north; in MAV_FRAME_BODY_FRD they are relative to the nose."""
 _SENSORS = 8
 """Maximum number of sensors, and of messages within ``_OFTEN``."""
 _OFTEN = 20_000
@@ -76,7 +75,7 @@ def returns(scan: ObstacleDistance, reach: float) -> Returns | None:
     width = abs(scan.increment)
     if not width >= _LEAST_SECTOR or not 0.0 <= scan.min_distance <= scan.max_distance > 0.0:
         return None
-    if scan.frame != BODY and scan.frame not in _NORTH:
+    if scan.frame not in (mavlink.MAV_FRAME_BODY_FRD, *_FROM_NORTH):
         return None
     count = min(len(scan.distances), int(2.0 * pi / width + 1e-6))
     distances = np.array([np.nan if one is None else one for one in scan.distances[:count]])

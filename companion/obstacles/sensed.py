@@ -8,9 +8,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
-from companion.obstacles.proximity import BODY, Proximity
+from companion.obstacles.proximity import Proximity
 from companion.obstacles.static import Axes
 from companion.obstacles.traffic import FIRST_ID as TRAFFIC
 from companion.obstacles.traffic import Traffic
@@ -47,7 +48,7 @@ class Sensed:
 
         ``stance``: the vehicle's pose when the message was true; ``known`` (K, 3): positions of neighbours.
         """
-        zero = stance.yaw if message.frame == BODY else stance.north
+        zero = stance.yaw if message.frame == mavlink.MAV_FRAME_BODY_FRD else stance.north
         if self.proximity is not None and zero is not None:
             self.proximity.receive(now, stance.time, message, stance.place, zero, known)
 

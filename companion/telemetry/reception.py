@@ -4,22 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config import CompanionConfig
 from companion.config.target_source import CameraSource, message_of, speaker_of
-from companion.values.components import AUTOPILOT
 
-_DISTANCES, _TRAFFIC = 330, 246
-"""Message ids of distance sensors and of traffic.
-
-Sensors of the own system may send on both links; traffic may come from any sender on the swarm link.
-"""
-_PARAMETER = 22
-_WHERE = {33, 385}
+_WHERE = {mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mavlink.MAVLINK_MSG_ID_TUNNEL}
 """Messages with a neighbour's position and plan: not decoded while the relevance filter ignores it."""
 _WANTED = {
-    "autopilot": {0, 1, 24, 30, 32, 49, 77, 111, 193, 230, 245, 253},
-    "swarm": {33, 111, 385},
-    "ground": {75, 76},
+    "autopilot": {
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+        mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+        mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
+        mavlink.MAVLINK_MSG_ID_TIMESYNC,
+        mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+        mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+        mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+        mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+    },
+    "swarm": {
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_TIMESYNC,
+        mavlink.MAVLINK_MSG_ID_TUNNEL,
+    },
+    "ground": {mavlink.MAVLINK_MSG_ID_COMMAND_INT, mavlink.MAVLINK_MSG_ID_COMMAND_LONG},
 }
 LINKS = ("autopilot", "swarm", "target", "ground")
 """The links of a companion."""
@@ -40,15 +52,17 @@ def accepts(
     """
     wanted = _WANTED.get(link, set())
     if link == "autopilot" and config.limits_from_autopilot:
-        wanted = wanted | {_PARAMETER}
+        wanted = wanted | {mavlink.MAVLINK_MSG_ID_PARAM_VALUE}
     source = config.target_source
-    sensors = {_DISTANCES} if config.proximity is not None else set()
-    sensors |= {_TRAFFIC} if config.traffic is not None else set()
+    distances = {mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE} if config.proximity is not None else set()
+    traffic = {mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE} if config.traffic is not None else set()
+    # Sensors of the own system may send on both links.
+    sensors = distances | traffic
     reported, speaker = message_of(source), speaker_of(source, system, target)
     if link == "autopilot":
         camera = reported if isinstance(source, CameraSource) else None
         return lambda identifier, sender, component: (
-            (identifier in wanted and sender == system and component == AUTOPILOT)
+            (identifier in wanted and sender == system and component == mavlink.MAV_COMP_ID_AUTOPILOT1)
             or (identifier in sensors and sender == system)
             or (identifier == camera and sender == speaker)
         )
@@ -57,7 +71,8 @@ def accepts(
             identifier == reported and (speaker is None or sender == speaker)
         )
     if link == "swarm":
-        wanted = wanted | (sensors & {_TRAFFIC})
+        # Traffic may come from any sender.
+        wanted = wanted | traffic
         return lambda identifier, sender, component: (
             (
                 identifier in wanted

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon
 from companion.world import View
@@ -18,7 +20,6 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
 from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 from mavlink_bridge.wire.uncertainty import pack as pack_doubt
 
-ONBOARD_CONTROLLER, AUTOPILOT_INVALID, ACTIVE = 18, 8, 4
 _SECOND = 1_000_000
 _TAKES_BACK = 3_000_000
 """µs after the last position uncertainty during which an uncertainty of 0 is sent."""
@@ -59,7 +60,8 @@ class Sharing:
         rates = self._config.rates
         shared = Shared([], [])
         if self._passes(0, now, _SECOND):
-            beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+            kind, autopilot = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
+            beat = Heartbeat(self._own, kind, autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE)
             shared.autopilot.append(beat)
             shared.swarm.append(beat)
         fresh = view.own is not None and view.own.age <= self._config.guard.own_stale_us

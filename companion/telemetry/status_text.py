@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config.flight import GroundMessagesConfig
 from mavlink_bridge.messages import Source, StatusText
 
@@ -16,11 +18,11 @@ _WAITING = 16
 class Severity(IntEnum):
     """Used values of MAV_SEVERITY."""
 
-    CRITICAL = 2
-    ERROR = 3
-    WARNING = 4
-    NOTICE = 5
-    INFO = 6
+    CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
+    ERROR = mavlink.MAV_SEVERITY_ERROR
+    WARNING = mavlink.MAV_SEVERITY_WARNING
+    NOTICE = mavlink.MAV_SEVERITY_NOTICE
+    INFO = mavlink.MAV_SEVERITY_INFO
 
 
 class StatusReporter:

@@ -1,10 +1,9 @@
-"""MAVLink component ids of a vehicle's computers."""
+"""MAVLink component id of the companion."""
 
 from __future__ import annotations
 
-COMPONENT = 195
-"""MAV_COMP_ID_PATHPLANNER."""
+from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
 
-AUTOPILOT = 1
-"""MAV_COMP_ID_AUTOPILOT1; the vehicle's position is accepted from no other of its components."""
+COMPONENT: Final[int] = mavlink.MAV_COMP_ID_PATHPLANNER

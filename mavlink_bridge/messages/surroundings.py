@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import degrees, isfinite, nan, radians, remainder, tau
 from typing import NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.messages.declaration import message
 from mavlink_bridge.messages.fields import (
@@ -22,9 +24,6 @@ SECTORS = 72
 _NAME = 10
 _CALLSIGN = 8
 _SECOND = 1_000_000
-# Bits of ADSB_FLAGS.
-_COORDINATES, _ALTITUDE, _HEADING, _VELOCITY, _CALLED, _CLIMB = 0x1, 0x2, 0x4, 0x8, 0x10, 0x80
-_GEOMETRIC = 1
 
 
 @message("ADSB_VEHICLE")
@@ -53,32 +52,32 @@ class AdsbVehicle(NamedTuple):
         address, latitude, longitude, altitude, heading, speed, climb, flags, _, kind, name, emitter, age = (
             fields
         )
-        if not (flags & _COORDINATES and on_globe(latitude, longitude)):
+        if not (flags & mavlink.ADSB_FLAGS_VALID_COORDS and on_globe(latitude, longitude)):
             return None
         return AdsbVehicle(
             source,
             address,
             latitude / 1e7,
             longitude / 1e7,
-            altitude / 1e3 if flags & _ALTITUDE else None,
-            kind == _GEOMETRIC,
+            altitude / 1e3 if flags & mavlink.ADSB_FLAGS_VALID_ALTITUDE else None,
+            kind == mavlink.ADSB_ALTITUDE_TYPE_GEOMETRIC,
             remainder(radians(heading / 100), tau)
-            if flags & _HEADING and heading <= FULL_CIRCLE_CDEG
+            if flags & mavlink.ADSB_FLAGS_VALID_HEADING and heading <= FULL_CIRCLE_CDEG
             else None,
-            speed / 1e2 if flags & _VELOCITY else None,
-            climb / 1e2 if flags & _CLIMB else None,
-            ascii_text(name[:_CALLSIGN]) if flags & _CALLED else "",
+            speed / 1e2 if flags & mavlink.ADSB_FLAGS_VALID_VELOCITY else None,
+            climb / 1e2 if flags & mavlink.ADSB_FLAGS_VERTICAL_VELOCITY_VALID else None,
+            ascii_text(name[:_CALLSIGN]) if flags & mavlink.ADSB_FLAGS_VALID_CALLSIGN else "",
             emitter,
             age * _SECOND,
         )
 
     def encode(self) -> Fields:
         known = (
-            (_ALTITUDE, self.altitude is not None),
-            (_HEADING, self.course is not None),
-            (_VELOCITY, self.speed is not None),
-            (_CALLED, bool(self.callsign)),
-            (_CLIMB, self.climb is not None),
+            (mavlink.ADSB_FLAGS_VALID_ALTITUDE, self.altitude is not None),
+            (mavlink.ADSB_FLAGS_VALID_HEADING, self.course is not None),
+            (mavlink.ADSB_FLAGS_VALID_VELOCITY, self.speed is not None),
+            (mavlink.ADSB_FLAGS_VALID_CALLSIGN, bool(self.callsign)),
+            (mavlink.ADSB_FLAGS_VERTICAL_VELOCITY_VALID, self.climb is not None),
         )
         return (
             self.address,
@@ -87,7 +86,7 @@ class AdsbVehicle(NamedTuple):
             round(degrees(self.course or 0.0) * 100) % FULL_CIRCLE_CDEG,
             round((self.speed or 0.0) * 1e2),
             round((self.climb or 0.0) * 1e2),
-            _COORDINATES | sum(bit for bit, valid in known if valid),
+            mavlink.ADSB_FLAGS_VALID_COORDS | sum(bit for bit, valid in known if valid),
             0,
             int(self.geometric),
             ascii_bytes("ADSB_VEHICLE: callsign", self.callsign, _CALLSIGN),

@@ -20,6 +20,8 @@ from struct import Struct
 from types import TracebackType
 from typing import NamedTuple, Self
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.stretch import Record, Stretch, leading_records
 from mavlink_bridge.wire.framing import (
@@ -32,7 +34,6 @@ from mavlink_bridge.wire.framing import (
     leading_frames,
     without_signature,
 )
-from mavlink_bridge.wire.signing import SETUP_SIGNING
 
 __all__ = ["LINKS", "PLAUSIBLE_JUMP", "Record", "TlogReader", "TlogReport", "TlogWriter", "read_tlog"]
 
@@ -120,7 +121,7 @@ class TlogWriter:
             at += len(frame.data)
 
     def _record(self, stamp: bytes, frame: Frame) -> bytes:
-        if frame.message_id == SETUP_SIGNING:
+        if frame.message_id == mavlink.MAVLINK_MSG_ID_SETUP_SIGNING:
             self.withheld += 1
             return b""
         self.records += 1

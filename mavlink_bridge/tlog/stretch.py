@@ -10,8 +10,9 @@ from struct import Struct
 from typing import NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import all as mavlink
 
-from mavlink_bridge.wire.framing import CRC_EXTRA, SIGNATURE_LENGTH, SIGNED_FLAG, START_V1, START_V2
+from mavlink_bridge.wire.framing import CRC_EXTRA
 
 SHORTEST_RECORD = 16
 """Bytes: a stamp and a version 1 frame without payload."""
@@ -54,15 +55,15 @@ def leading_records(data: bytes, start: int, before: int) -> Stretch:
     extra_v1, extra_v2 = _EXTRA_V1, _EXTRA_V2.get
     while at <= last:
         stamp, mark, length = head(data, at)
-        if mark == START_V2:
+        if mark == mavlink.PROTOCOL_MARKER_V2:
             end = at + 18 + length
             stop = end + 2
             if data[at + 10]:
-                if data[at + 10] != SIGNED_FLAG:
+                if data[at + 10] != mavlink.MAVLINK_IFLAG_SIGNED:
                     break
-                stop += SIGNATURE_LENGTH
+                stop += mavlink.MAVLINK_SIGNATURE_BLOCK_LEN
             extra = extra_v2(data[at + 15 : at + 18])
-        elif mark == START_V1:
+        elif mark == mavlink.PROTOCOL_MARKER_V1:
             end = at + 14 + length
             stop = end + 2
             extra = extra_v1[data[at + 13]]

@@ -9,10 +9,12 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.messages import BY_ID, BY_TYPE, Converter, Message, Source, StatusText
 from mavlink_bridge.messages.status import TEXT_LENGTH, text_chunks
-from mavlink_bridge.wire.framing import SIGNED_FLAG, Frame, Framer, frame_v1, frame_v2
+from mavlink_bridge.wire.framing import Frame, Framer, frame_v1, frame_v2
 from mavlink_bridge.wire.signing import Signing
 
 Accept = Callable[[int, int, int], bool]
@@ -145,7 +147,7 @@ class Codec:
         signing, number = self._signing, self._next(source)
         if signing is None or signing.key is None:
             return frame_v2(row.id, row.crc_extra, source, number, payload)
-        frame = frame_v2(row.id, row.crc_extra, source, number, payload, SIGNED_FLAG)
+        frame = frame_v2(row.id, row.crc_extra, source, number, payload, mavlink.MAVLINK_IFLAG_SIGNED)
         return signing.sign(frame, self._link)
 
     def _next(self, source: Source) -> int:

@@ -15,19 +15,17 @@ from struct import Struct
 from typing import NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
-from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
-START_V1, START_V2 = 0xFE, 0xFD
+_MARKERS = (mavlink.PROTOCOL_MARKER_V1, mavlink.PROTOCOL_MARKER_V2)
 _DATAGRAM = 512
 LONGEST_FRAME = 280  # version 2: 10 header, 255 payload, 2 checksum, 13 signature
-SIGNATURE_LENGTH = 13
-SIGNED_FLAG = 0x01
 
 STARTS = re.compile(b"[\xfd\xfe]")
 _HEADER_V1 = Struct("<6B")
 _HEADER_V2 = Struct("<7BHB")
 CRC_EXTRA: dict[int, bytes] = {
-    number: bytes((kind.crc_extra,)) for number, kind in dialect.mavlink_map.items()
+    number: bytes((kind.crc_extra,)) for number, kind in mavlink.mavlink_map.items()
 }
 """CRC_EXTRA by message id.
 
@@ -73,17 +71,17 @@ def frame_at(data: bytes, start: int) -> Frame | Flaw:
     if start >= size:
         return Flaw.PARTIAL
     mark = data[start]
-    if mark == START_V2:
+    if mark == mavlink.PROTOCOL_MARKER_V2:
         if start + 10 > size:
             return Flaw.PARTIAL
         _, length, flags, _, sequence, system, component, low, high = _HEADER_V2.unpack_from(data, start)
-        if flags > SIGNED_FLAG:
+        if flags > mavlink.MAVLINK_IFLAG_SIGNED:
             return Flaw.FALSE_START
-        version, signed, message_id = 2, flags == SIGNED_FLAG, low | high << 16
+        version, signed, message_id = 2, flags == mavlink.MAVLINK_IFLAG_SIGNED, low | high << 16
         body = start + 10
         end = body + length
-        stop = end + 2 + SIGNATURE_LENGTH if signed else end + 2
-    elif mark == START_V1:
+        stop = end + 2 + mavlink.MAVLINK_SIGNATURE_BLOCK_LEN if signed else end + 2
+    elif mark == mavlink.PROTOCOL_MARKER_V1:
         if start + 6 > size:
             return Flaw.PARTIAL
         _, length, sequence, system, component, message_id = _HEADER_V1.unpack_from(data, start)
@@ -141,8 +139,9 @@ def leading_frames(data: bytes) -> tuple[tuple[Frame, ...], int]:
 def claimed_length(data: bytes, start: int) -> int | None:
     """Return the length that the frame at ``data[start]`` claims, verified or not; None if it claims none."""
     mark = data[start : start + 1]
-    if mark == b"\xfd" and start + 3 <= len(data) and data[start + 2] <= SIGNED_FLAG:
-        return 12 + data[start + 1] + SIGNATURE_LENGTH * data[start + 2]
+    if mark == b"\xfd" and start + 3 <= len(data) and data[start + 2] <= mavlink.MAVLINK_IFLAG_SIGNED:
+        signature: int = mavlink.MAVLINK_SIGNATURE_BLOCK_LEN * data[start + 2]
+        return 12 + data[start + 1] + signature
     if mark == b"\xfe" and start + 2 <= len(data):
         return 8 + data[start + 1]
     return None
@@ -158,11 +157,18 @@ def frame_v2(
 ) -> bytes:
     """Return a version 2 frame; trailing zeros of ``payload`` are cut off, down to one byte.
 
-    ``flags``: SIGNED_FLAG if a signature will be appended.
+    ``flags``: MAVLINK_IFLAG_SIGNED if a signature will be appended.
     """
     payload = payload.rstrip(b"\0") or b"\0"
     body = _HEADER_V2.pack(
-        START_V2, len(payload), flags, 0, sequence, *source, message_id & 0xFFFF, message_id >> 16
+        mavlink.PROTOCOL_MARKER_V2,
+        len(payload),
+        flags,
+        0,
+        sequence,
+        *source,
+        message_id & 0xFFFF,
+        message_id >> 16,
     )
     body += payload
     return body + mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")
@@ -172,7 +178,7 @@ def frame_v1(
     message_id: int, crc_extra: bytes, source: tuple[int, int], sequence: int, payload: bytes
 ) -> bytes:
     """Return a version 1 frame of ``payload``, which must be complete and without extension fields."""
-    body = _HEADER_V1.pack(START_V1, len(payload), sequence, *source, message_id) + payload
+    body = _HEADER_V1.pack(mavlink.PROTOCOL_MARKER_V1, len(payload), sequence, *source, message_id) + payload
     return body + mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")
 
 
@@ -181,9 +187,9 @@ def without_signature(data: bytes) -> bytes:
 
     The checksum of the result is correct if that of ``data`` is.
     """
-    if data[0] != START_V2 or data[2] != SIGNED_FLAG:
+    if data[0] != mavlink.PROTOCOL_MARKER_V2 or data[2] != mavlink.MAVLINK_IFLAG_SIGNED:
         return data
-    end = len(data) - SIGNATURE_LENGTH - 2
+    end: int = len(data) - mavlink.MAVLINK_SIGNATURE_BLOCK_LEN - 2
     body = data[:2] + b"\0" + data[3:end]
     # The checksum is linear: the contribution of CRC_EXTRA to both cancels in their difference.
     change = mcrf4xx(data[1:end] + b"\0") ^ mcrf4xx(body[1:] + b"\0")
@@ -240,13 +246,13 @@ class Framer:
                     continue
                 if after == size and not whole:
                     break
-                if after == size or data[after] in (START_V1, START_V2):
+                if after == size or data[after] in _MARKERS:
                     self.unknown += 1
                     if self._returns_unknown:
                         found.append(frame)
                     at = after
                     continue
-            if data[at] in (START_V1, START_V2):
+            if data[at] in _MARKERS:
                 self.bad += 1
             following = STARTS.search(data, at + 1)
             resume = size if following is None else following.start()

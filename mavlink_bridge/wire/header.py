@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-_MAGIC: Final = {0xFD: 5, 0xFE: 3}
+from pymavlink.dialects.v20 import all as mavlink
+
+_MAGIC: Final = {mavlink.PROTOCOL_MARKER_V2: 5, mavlink.PROTOCOL_MARKER_V1: 3}
 """Offset of the system id in MAVLink 2 and 1."""
 
 
@@ -24,6 +26,6 @@ class Header(NamedTuple):
 
 def header(frame: bytes) -> Header:
     """Read the header of a complete frame."""
-    if frame[0] == 0xFD:
+    if frame[0] == mavlink.PROTOCOL_MARKER_V2:
         return Header(frame[5], frame[6], int.from_bytes(frame[7:10], "little"))
     return Header(frame[3], frame[4], frame[5])

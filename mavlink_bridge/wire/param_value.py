@@ -10,9 +10,18 @@ from math import isfinite
 from struct import unpack
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import ParamValue
 
-_INTEGERS: Final = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
+_INTEGERS: Final = {
+    mavlink.MAV_PARAM_TYPE_UINT8: "<Bxxx",
+    mavlink.MAV_PARAM_TYPE_INT8: "<bxxx",
+    mavlink.MAV_PARAM_TYPE_UINT16: "<Hxx",
+    mavlink.MAV_PARAM_TYPE_INT16: "<hxx",
+    mavlink.MAV_PARAM_TYPE_UINT32: "<I",
+    mavlink.MAV_PARAM_TYPE_INT32: "<i",
+}
 """Layout of the integer types by MAV_PARAM_TYPE."""
 
 

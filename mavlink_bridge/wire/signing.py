@@ -11,6 +11,8 @@ from collections.abc import Collection
 from enum import Enum
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.key import Key
 from mavlink_bridge.wire.framing import Frame
 
@@ -24,10 +26,8 @@ MINUTE: Final = 6_000_000
 """Steps by which the first stamp of a new stream may be behind the newest stamp."""
 STREAMS: Final = 256
 """Largest number of streams that are remembered; only a holder of the key can create one."""
-SETUP_SIGNING: Final = 256
-"""Id of the message that transfers a key."""
-RADIOS: Final = frozenset((109, 166))
-"""RADIO_STATUS and RADIO, which come from telemetry radios; these have no key."""
+RADIOS: Final = frozenset((mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO))
+"""Messages that come from telemetry radios; these have no key."""
 
 
 class Refusal(Enum):

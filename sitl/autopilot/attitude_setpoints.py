@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import SetpointAttitude, Vector
 from sitl.values.setpoints import ACCELERATION, VELOCITY, Reading, Refusal, Setpoint
 
@@ -19,10 +21,6 @@ HOVERING: Final = 0.5
 STEEPEST: Final = math.radians(45.0)
 """Largest tilt that is followed (rad)."""
 
-# ATTITUDE_TARGET_TYPEMASK
-_IGNORE_YAW_RATE: Final = 0x04
-_IGNORE_THRUST: Final = 0x40
-_IGNORE_ATTITUDE: Final = 0x80
 _UNIT: Final = (0.9, 1.1)
 _QUICKEST: Final = 100.0
 
@@ -65,13 +63,14 @@ def thrusting(message: SetpointAttitude) -> Reading:
 
 
 def _fault(message: SetpointAttitude) -> Refusal | None:
-    if message.type_mask & _IGNORE_ATTITUDE:
+    mask, yaw_rate = message.type_mask, _yaw_rate(message)
+    if mask & mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE:
         return Refusal("Attitude refused: body rates alone are not flown")
-    if message.type_mask & _IGNORE_THRUST or not 0.0 <= message.thrust <= 1.0:
+    if mask & mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE or not 0.0 <= message.thrust <= 1.0:
         return Refusal("Attitude refused: no thrust from 0 to 1")
     if not _UNIT[0] <= math.hypot(*message.attitude) <= _UNIT[1]:
         return Refusal("Attitude refused: not a unit quaternion")
-    if not message.type_mask & _IGNORE_YAW_RATE and not abs(message.body_rates[2]) <= _QUICKEST:
+    if yaw_rate is not None and not abs(yaw_rate) <= _QUICKEST:
         return Refusal("Attitude refused: yaw rate out of range")
     return None
 
@@ -97,4 +96,5 @@ def _yaw(message: SetpointAttitude) -> float:
 
 
 def _yaw_rate(message: SetpointAttitude) -> float | None:
-    return None if message.type_mask & _IGNORE_YAW_RATE else message.body_rates[2]
+    ignored = message.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
+    return None if ignored else message.body_rates[2]

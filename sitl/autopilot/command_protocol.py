@@ -6,22 +6,16 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import CommandInt, CommandLong
 from sitl.autopilot.commander import Commander
-from sitl.autopilot.firmware import ACCEPTED, CUSTOM, DENIED, UNSUPPORTED, Denial, Firmware, Mode
-
-# MAV_CMD
-LAND: Final = 21
-TAKEOFF: Final = 22
-SET_MODE: Final = 176
-ARM: Final = 400
+from sitl.autopilot.firmware import Denial, Firmware, Mode
+from sitl.values.home import ABOVE_HOME, ABOVE_SEA
 
 _FORCED: Final = 21196.0
 # INT32_MAX in a field of COMMAND_INT
 NOWHERE: Final = 0x7FFFFFFF
-# MAV_FRAME
-_GLOBAL: Final = (0, 5)
-_RELATIVE: Final = (3, 6)
 
 
 class Order(NamedTuple):
@@ -67,10 +61,10 @@ class Orders:
         self._commander = commander
         self._flavour = flavour
         self._handlers: dict[int, Handler] = {
-            LAND: self._land,
-            TAKEOFF: self._take_off,
-            SET_MODE: self._set_mode,
-            ARM: self._arm,
+            mavlink.MAV_CMD_NAV_LAND: self._land,
+            mavlink.MAV_CMD_NAV_TAKEOFF: self._take_off,
+            mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm,
             **more,
         }
 
@@ -78,15 +72,15 @@ class Orders:
         """Execute a command addressed to this vehicle that arrived at ``now`` (µs)."""
         handler = self._handlers.get(message.command)
         if handler is None:
-            return Verdict(UNSUPPORTED, f"Command {message.command} is not supported")
+            return Verdict(mavlink.MAV_RESULT_UNSUPPORTED, f"Command {message.command} is not supported")
         denial = handler(_order(message, now))
-        return Verdict(ACCEPTED, "") if denial is None else Verdict(*denial)
+        return Verdict(mavlink.MAV_RESULT_ACCEPTED, "") if denial is None else Verdict(*denial)
 
     def set_mode(self, custom_mode: int, base_mode: int, now: int) -> Verdict:
         """Execute SET_MODE (11), which has the mode in one number, at ``now`` (µs)."""
         main, sub = self._flavour.split(custom_mode)
         denial = self._set_mode(Order((base_mode, main, sub), None, now))
-        return Verdict(ACCEPTED, "") if denial is None else Verdict(*denial)
+        return Verdict(mavlink.MAV_RESULT_ACCEPTED, "") if denial is None else Verdict(*denial)
 
     def _arm(self, order: Order) -> Denial | None:
         wanted, code = order.params[:2]
@@ -94,7 +88,7 @@ class Orders:
             return self._commander.arm(order.now, forced=code == _FORCED)
         if wanted == 0.0:
             return self._commander.disarm(forced=code == _FORCED)
-        return Denial(DENIED, "Arming: parameter 1 must be 0 or 1")
+        return Denial(mavlink.MAV_RESULT_DENIED, "Arming: parameter 1 must be 0 or 1")
 
     def _take_off(self, order: Order) -> Denial | None:
         return self._commander.take_off(order.params[6], order.relative, order.now)
@@ -104,12 +98,13 @@ class Orders:
 
     def _set_mode(self, order: Order) -> Denial | None:
         base, main, sub = order.params[:3]
-        if not (math.isfinite(base) and int(base) & CUSTOM and math.isfinite(main)):
-            return Denial(DENIED, "Mode refused: only custom modes are known")
+        custom = math.isfinite(base) and int(base) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        if not (custom and math.isfinite(main)):
+            return Denial(mavlink.MAV_RESULT_DENIED, "Mode refused: only custom modes are known")
         sub = sub if math.isfinite(sub) else 0.0
         mode = self._flavour.requested(int(main), int(sub))
         if mode is None:
-            return Denial(DENIED, f"Mode refused: {main:.0f}, {sub:.0f} is not known")
+            return Denial(mavlink.MAV_RESULT_DENIED, f"Mode refused: {main:.0f}, {sub:.0f} is not known")
         if mode is Mode.TAKEOFF:
             return self._commander.take_off(math.nan, None, order.now)
         return self._commander.enter(mode, order.now)
@@ -118,5 +113,5 @@ class Orders:
 def _order(message: CommandLong | CommandInt, now: int) -> Order:
     if isinstance(message, CommandLong):
         return Order(message.params, None, now)
-    relative = True if message.frame in _RELATIVE else False if message.frame in _GLOBAL else None
+    relative = True if message.frame in ABOVE_HOME else False if message.frame in ABOVE_SEA else None
     return Order((*message.params, message.x, message.y, message.z), relative, now, integer=True)

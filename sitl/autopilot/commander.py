@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from sitl.autopilot.autonomous_modes import MODES, AutonomousModes
-from sitl.autopilot.firmware import FAILED, TEMPORARILY_REJECTED, Denial, Firmware, Mode, Status
+from sitl.autopilot.firmware import Denial, Firmware, Mode, Status
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.missions.itinerary import Event
 from sitl.autopilot.setpoint_reception import SetpointReception
@@ -98,10 +100,10 @@ class Commander:
             return None
         if not forced:
             if not self.ready:
-                return Denial(TEMPORARILY_REJECTED, "Arming refused: no position yet")
+                return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Arming refused: no position yet")
             reason = self._flavour.arming_denial(self.status(now))
             if doubts := [reason] if reason else self.doubts():
-                return Denial(FAILED, f"Arming refused: {doubts[0]}")
+                return Denial(mavlink.MAV_RESULT_FAILED, f"Arming refused: {doubts[0]}")
         self.armed = True
         self._postpone(now)
         self._voice.inform("Armed")
@@ -114,7 +116,7 @@ class Commander:
     def disarm(self, *, forced: bool) -> Denial | None:
         """Stop the motors; in flight only if ``forced``, and then the vehicle falls."""
         if self.armed and not self.landed and not forced:
-            return Denial(FAILED, "Disarming refused: flying")
+            return Denial(mavlink.MAV_RESULT_FAILED, "Disarming refused: flying")
         if self.armed:
             self._stop("Disarmed")
         return None

@@ -7,24 +7,28 @@ from collections.abc import Sequence
 from enum import IntEnum
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import Vector
-from sitl.autopilot.missions.items import Item, Type
+from sitl.autopilot.missions.items import CIRCLES, POLYGONS, Item, Type
 from sitl.autopilot.missions.plans import Plans
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 
-# MAV_CMD_NAV_FENCE: vertices of inclusion and exclusion polygons, inclusion and exclusion circles
-_STAY_IN, _STAY_OUT, _CIRCLE_IN, _CIRCLE_OUT = 5001, 5002, 5003, 5004
 Point = tuple[float, float]
+_INCLUSIONS: Final = (
+    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+    mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION,
+)
 
 
 class Breach(IntEnum):
     """Values of FENCE_BREACH."""
 
-    NONE = 0
-    TOO_LOW = 1
-    TOO_HIGH = 2
-    BOUNDARY = 3
+    NONE = mavlink.FENCE_BREACH_NONE
+    TOO_LOW = mavlink.FENCE_BREACH_MINALT
+    TOO_HIGH = mavlink.FENCE_BREACH_MAXALT
+    BOUNDARY = mavlink.FENCE_BREACH_BOUNDARY
 
 
 class Rules(NamedTuple):
@@ -106,12 +110,13 @@ class Fences:
         at = 0
         while at < len(items):
             item, count = items[at], 1
-            if item.command in (_STAY_IN, _STAY_OUT):
+            stay_in = item.command in _INCLUSIONS
+            if item.command in POLYGONS:
                 count = int(item.params[0])
                 corners = tuple(self._point(corner) for corner in items[at : at + count])
-                areas.append(_Area(corners, 0.0, item.command == _STAY_IN))
-            elif item.command in (_CIRCLE_IN, _CIRCLE_OUT):
-                areas.append(_Area((self._point(item),), item.params[0], item.command == _CIRCLE_IN))
+                areas.append(_Area(corners, 0.0, stay_in))
+            elif item.command in CIRCLES:
+                areas.append(_Area((self._point(item),), item.params[0], stay_in))
             at += count
         return areas
 

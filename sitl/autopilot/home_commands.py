@@ -6,18 +6,17 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import SetGpsGlobalOrigin, SetHomePosition
 from sitl.autopilot.command_protocol import Handler, Order
-from sitl.autopilot.firmware import DENIED, TEMPORARILY_REJECTED, Denial
+from sitl.autopilot.firmware import Denial
 from sitl.estimation.sensors import Estimate
-from sitl.telemetry.reports import ORIGIN
 from sitl.telemetry.schedule import Telemetry
-from sitl.telemetry.status_reports import HOME
 from sitl.telemetry.status_text import StatusReporter
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 
-SET_HOME: Final = 179
 # Greatest accepted distance of home (m); a larger one is an error.
 _FAR: Final = 100_000.0
 
@@ -45,7 +44,7 @@ class HomeCommands:
         self._estimate = estimate
         self._ready = ready
         self._voice = voice
-        self.commands: dict[int, Handler] = {SET_HOME: self._set_home}
+        self.commands: dict[int, Handler] = {mavlink.MAV_CMD_DO_SET_HOME: self._set_home}
 
     def set_home(self, message: SetHomePosition, now: int) -> None:
         """Handle SET_HOME_POSITION (243)."""
@@ -56,7 +55,7 @@ class HomeCommands:
     def set_origin(self, _message: SetGpsGlobalOrigin, now: int) -> None:
         """Handle SET_GPS_GLOBAL_ORIGIN (48): refuse it and report the present origin."""
         self._voice.complain("Origin refused: it is set already", now)
-        self._telemetry.request(ORIGIN)
+        self._telemetry.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 
     def _set_home(self, order: Order) -> Denial | None:
         """Set home to the present position if parameter 1 is 1, else to parameters 5 to 7.
@@ -66,10 +65,10 @@ class HomeCommands:
         """
         if order.params[0] == 1.0:
             if not self._ready():
-                return Denial(TEMPORARILY_REJECTED, "Home refused: no position yet")
+                return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Home refused: no position yet")
             return self._move(*self._origin.geodetic(self._estimate().position))
         if order.integer and order.relative is None:
-            return Denial(DENIED, "Home refused: this frame is not known")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Home refused: this frame is not known")
         latitude, longitude, altitude = order.place
         if order.relative:
             altitude += self._home.altitude
@@ -77,9 +76,9 @@ class HomeCommands:
 
     def _move(self, latitude: float, longitude: float, altitude: float) -> Denial | None:
         if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and abs(altitude) <= _FAR):
-            return Denial(DENIED, "Home refused: no such place on the globe")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Home refused: no such place on the globe")
         if math.dist(self._origin.local(latitude, longitude, altitude), (0.0, 0.0, 0.0)) > _FAR:
-            return Denial(DENIED, "Home refused: more than 100 km from here")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Home refused: more than 100 km from here")
         self._home.move(latitude, longitude, altitude)
-        self._telemetry.request(HOME)
+        self._telemetry.request(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
         return None

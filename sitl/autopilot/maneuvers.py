@@ -6,9 +6,11 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.commander import Commander
-from sitl.autopilot.firmware import DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Denial, Firmware, Mode
+from sitl.autopilot.firmware import Denial, Firmware, Mode
 from sitl.autopilot.following import Following
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.missions.itinerary import Itinerary
@@ -16,19 +18,9 @@ from sitl.estimation.sensors import Estimate
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 
-# MAV_CMD
-LOITER: Final = 17
-FOLLOW: Final = 32
-YAW: Final = 115
-CHANGE_SPEED: Final = 178
-TERMINATE: Final = 185
-REPOSITION: Final = 192
-PAUSE: Final = 193
-CHECK: Final = 401
-
-_CHANGE_MODE: Final = 1
-# SPEED_TYPE: air and ground speed, which are equal because plans ignore wind; up, down.
-_LEVEL, _UP, _DOWN = (0.0, 1.0), 2.0, 3.0
+# Air and ground speed are equal, because plans ignore wind.
+_LEVEL: Final = (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED)
+_VERTICAL: Final = (mavlink.SPEED_TYPE_CLIMB_SPEED, mavlink.SPEED_TYPE_DESCENT_SPEED)
 # DO_CHANGE_SPEED: no change, default speed.
 _SAME, _USUAL = -1.0, -2.0
 _FASTEST: Final = 100.0
@@ -65,14 +57,18 @@ class Maneuvers:
         self._say_doubts = say_doubts
         self._speed: tuple[Mode, float] | None = None
         self.commands: dict[int, Handler] = {
-            LOITER: self._loiter,
-            CHANGE_SPEED: self._change_speed,
-            TERMINATE: self._terminate,
-            REPOSITION: self._reposition,
-            CHECK: self._check,
+            mavlink.MAV_CMD_NAV_LOITER_UNLIM: self._loiter,
+            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
+            mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
+            mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._check,
         }
         if flavour.stops:
-            self.commands |= {FOLLOW: self._follow, YAW: self._turn, PAUSE: self._pause}
+            self.commands |= {
+                mavlink.MAV_CMD_DO_FOLLOW: self._follow,
+                mavlink.MAV_CMD_CONDITION_YAW: self._turn,
+                mavlink.MAV_CMD_DO_PAUSE_CONTINUE: self._pause,
+            }
 
     def _loiter(self, order: Order) -> Denial | None:
         return self._commander.enter(self._flavour.loiter, order.now)
@@ -85,14 +81,14 @@ class Maneuvers:
     def _check(self, order: Order) -> Denial | None:
         # PX4 runs its checks in flight as well.
         if self._commander.armed and self._flavour.stops:
-            return Denial(TEMPORARILY_REJECTED, "Checks refused: armed")
+            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Checks refused: armed")
         self._say_doubts(order.now)
         return None
 
     def _follow(self, order: Order) -> Denial | None:
         system = order.params[0]
         if not 1.0 <= system <= 255.0:
-            return Denial(DENIED, "Follow refused: the system id must be 1 to 255")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Follow refused: the system id must be 1 to 255")
         self._following.choose(int(system))
         return None
 
@@ -101,10 +97,10 @@ class Maneuvers:
         kind, speed = order.params[:2]
         if speed == _SAME:
             return None
-        if kind in (_UP, _DOWN):
-            return Denial(UNSUPPORTED, "Speed refused: only the level one can be changed")
+        if kind in _VERTICAL:
+            return Denial(mavlink.MAV_RESULT_UNSUPPORTED, "Speed refused: only the level one can be changed")
         if kind not in _LEVEL or not (speed == _USUAL or 0.0 < speed <= _FASTEST):
-            return Denial(DENIED, "Speed refused: 0 to 100 m/s of kind 0 or 1")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Speed refused: 0 to 100 m/s of kind 0 or 1")
         wanted = None if speed == _USUAL else speed
         self._speed = None if wanted is None else (self._commander.mode, wanted)
         if self._commander.mode is Mode.MISSION:
@@ -115,23 +111,23 @@ class Maneuvers:
     def _pause(self, order: Order) -> Denial | None:
         wish = order.params[0]
         if self._commander.mode not in (Mode.MISSION, Mode.GUIDED):
-            return Denial(DENIED, "Pause refused: neither in AUTO nor in GUIDED")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Pause refused: neither in AUTO nor in GUIDED")
         if wish == 0.0:
             if not self._guidance.pause():
-                return Denial(FAILED, "Pause refused: neither on the way nor holding")
+                return Denial(mavlink.MAV_RESULT_FAILED, "Pause refused: neither on the way nor holding")
         elif wish == 1.0:
             self._guidance.go_on()
         else:
-            return Denial(DENIED, "Pause refused: parameter 1 must be 0 or 1")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Pause refused: parameter 1 must be 0 or 1")
         return None
 
     def _turn(self, order: Order) -> Denial | None:
         """Execute CONDITION_YAW: parameter 1 angle (degrees), 3 direction, 4 whether it is relative."""
         angle, _, direction, relative = order.params[:4]
         if not (0.0 <= angle <= 360.0 and relative in (0.0, 1.0)):
-            return Denial(DENIED, "Yaw refused: the angle must be 0 to 360 degrees")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Yaw refused: the angle must be 0 to 360 degrees")
         if self._commander.mode is not Mode.GUIDED or self._guidance.activity is Activity.IDLE:
-            return Denial(FAILED, "Yaw refused: not flying in GUIDED")
+            return Denial(mavlink.MAV_RESULT_FAILED, "Yaw refused: not flying in GUIDED")
         turn = math.radians(angle)
         if relative == 1.0:
             turn = self._guidance.yaw + (-turn if direction < 0.0 else turn)
@@ -146,15 +142,15 @@ class Maneuvers:
         """
         commander, guided = self._commander, self._flavour.repositioning
         if not commander.ready:
-            return Denial(TEMPORARILY_REJECTED, "Reposition refused: no position yet")
+            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Reposition refused: no position yet")
         target = self._target(order)
         if isinstance(target, Denial):
             return target
         flags = order.params[1]
-        may_change = math.isfinite(flags) and int(flags) & _CHANGE_MODE
+        may_change = math.isfinite(flags) and int(flags) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         if commander.mode is not guided:
             if not may_change:
-                return Denial(DENIED, f"Reposition refused: not in {guided.name}")
+                return Denial(mavlink.MAV_RESULT_DENIED, f"Reposition refused: not in {guided.name}")
             if denial := commander.enter(guided, order.now):
                 return denial
         if commander.armed and not commander.landed:
@@ -167,18 +163,18 @@ class Maneuvers:
         latitude, longitude, altitude = order.place
         here = self._estimate().position
         if order.relative is None and self._flavour.stops:
-            return Denial(DENIED, "Reposition refused: this frame is not known")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Reposition refused: this frame is not known")
         if not self._flavour.stops and (order.nowhere or not math.isfinite(latitude + longitude)):
             x, y, level = here[0], here[1], 0.0
         elif not (abs(latitude) <= _LAST[0] and abs(longitude) <= _LAST[1]) or latitude == longitude == 0.0:
-            return Denial(DENIED, "Reposition refused: no such place on the globe")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Reposition refused: no such place on the globe")
         else:
             # Height of level ground there, which the Earth's curvature lowers.
             x, y, level = self._origin.local(latitude, longitude, self._origin.altitude)
         if not math.isfinite(altitude) and not self._flavour.stops:
             return x, y, here[2]
         if not abs(altitude) <= 10_000.0:
-            return Denial(DENIED, "Reposition refused: the altitude is out of range")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Reposition refused: the altitude is out of range")
         above = self._home.altitude if order.relative else 0.0
         return x, y, level - (altitude + above - self._origin.altitude)
 

@@ -6,19 +6,13 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import Message, MessageInterval, RequestDataStream, Source
 from sitl.autopilot.command_protocol import Handler, Order
-from sitl.autopilot.firmware import DENIED, FAILED, UNSUPPORTED, Denial, Firmware
-from sitl.telemetry import status_reports as q
+from sitl.autopilot.firmware import Denial, Firmware
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.streams import members
-
-# MAV_CMD
-GET_HOME: Final = 410
-GET_INTERVAL: Final = 510
-SET_INTERVAL: Final = 511
-REQUEST: Final = 512
-CAPABILITIES: Final = 520
 
 _LAST_ID: Final = 0xFFFF
 # µs, half an hour: the largest interval that fits into MESSAGE_INTERVAL.
@@ -44,11 +38,13 @@ class Requests:
     def commands(self) -> dict[int, Handler]:
         """Handlers by MAV_CMD."""
         return {
-            SET_INTERVAL: self._set_interval,
-            GET_INTERVAL: self._get_interval,
-            REQUEST: self._request,
-            GET_HOME: self._always(q.HOME),
-            CAPABILITIES: self._always(q.AUTOPILOT_VERSION),
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
+            mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request,
+            mavlink.MAV_CMD_GET_HOME_POSITION: self._always(mavlink.MAVLINK_MSG_ID_HOME_POSITION),
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._always(
+                mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            ),
         }
 
     def stream(self, message: RequestDataStream, now: int) -> None:
@@ -71,18 +67,18 @@ class Requests:
     def _set_interval(self, order: Order) -> Denial | None:
         message_id, interval = order.params[:2]
         if not (math.isfinite(message_id) and math.isfinite(interval)):
-            return Denial(DENIED, "Interval refused: not a number")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Interval refused: not a number")
         if 0.0 < interval < self._flavour.shortest_interval:
-            return Denial(FAILED, f"Interval refused: {interval:.0f} us is too short")
+            return Denial(mavlink.MAV_RESULT_FAILED, f"Interval refused: {interval:.0f} us is too short")
         wanted = min(round(interval), _LONGEST)
         if not self._telemetry.set_interval(int(message_id), wanted, order.now):
-            return Denial(DENIED, f"Interval refused: no message {message_id:.0f}")
+            return Denial(mavlink.MAV_RESULT_DENIED, f"Interval refused: no message {message_id:.0f}")
         return None
 
     def _get_interval(self, order: Order) -> Denial | None:
         message_id = order.params[0]
         if not 0 <= message_id <= _LAST_ID:
-            return Denial(DENIED, "Interval refused: no such number")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Interval refused: no such number")
         interval = self._telemetry.interval(int(message_id))
         self._outbox.append(MessageInterval(self._source, interval, int(message_id)))
         return None
@@ -91,7 +87,7 @@ class Requests:
         message_id = order.params[0]
         if math.isfinite(message_id) and self._telemetry.request(int(message_id)):
             return None
-        return Denial(UNSUPPORTED, f"Request refused: no message {message_id:.0f}")
+        return Denial(mavlink.MAV_RESULT_UNSUPPORTED, f"Request refused: no message {message_id:.0f}")
 
     def _always(self, message_id: int) -> Callable[[Order], Denial | None]:
         def obey(_order: Order) -> Denial | None:

@@ -6,7 +6,9 @@ The module maps messages and commands to their handlers.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
+
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import (
     FileTransfer,
@@ -22,7 +24,7 @@ from mavlink_bridge.messages import (
 from sitl.autopilot import files
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.failures import Failures
-from sitl.autopilot.firmware import DENIED, Denial, Firmware
+from sitl.autopilot.firmware import Denial, Firmware
 from sitl.autopilot.home_commands import HomeCommands
 from sitl.autopilot.message_requests import Requests
 from sitl.autopilot.missions.service import MissionService
@@ -31,11 +33,6 @@ from sitl.autopilot.parameters.protocol import ParameterProtocol
 from sitl.autopilot.parameters.values import Values
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
-
-# MAV_CMD_PREFLIGHT_STORAGE, DO_FENCE_ENABLE; first parameter of the former
-STORAGE: Final = 245
-FENCE_ENABLE: Final = 207
-_READ, _WRITE, _RESET = 0.0, 1.0, 2.0
 
 
 class Services:
@@ -84,10 +81,10 @@ class Services:
             **home_commands.commands,
             **missions.commands,
             **failures.commands,
-            STORAGE: self._store,
+            mavlink.MAV_CMD_PREFLIGHT_STORAGE: self._store,
         }
         if flavour.stops:
-            self.commands[FENCE_ENABLE] = self._enable_fence
+            self.commands[mavlink.MAV_CMD_DO_FENCE_ENABLE] = self._enable_fence
         self._stream(0)
 
     @property
@@ -128,7 +125,7 @@ class Services:
         """Execute ArduPilot's DO_FENCE_ENABLE: parameter 1 is FENCE_ENABLE."""
         number = self._values.number("FENCE_ENABLE")
         if number is None or order.params[0] not in (0.0, 1.0):
-            return Denial(DENIED, "Fence refused: parameter 1 must be 0 or 1")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Fence refused: parameter 1 must be 0 or 1")
         self._values.set(number, order.params[0])
         self._now = order.now
         self._changed()
@@ -137,11 +134,11 @@ class Services:
     def _store(self, order: Order) -> Denial | None:
         """Execute PREFLIGHT_STORAGE: values are always kept; a reset restores the initial ones."""
         wish = order.params[0]
-        if wish == _RESET:
+        if wish == mavlink.PARAM_RESET_FACTORY_DEFAULT:
             self._values.reset()
             self._configure()
             self._stream(order.now, resets=True)
             return None
-        if wish in (_READ, _WRITE):
+        if wish in (mavlink.PARAM_READ_PERSISTENT, mavlink.PARAM_WRITE_PERSISTENT):
             return None
-        return Denial(DENIED, "Storage refused: parameter 1 must be 0, 1 or 2")
+        return Denial(mavlink.MAV_RESULT_DENIED, "Storage refused: parameter 1 must be 0, 1 or 2")

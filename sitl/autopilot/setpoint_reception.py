@@ -1,7 +1,8 @@
 """Reception of set-points: each is read, timestamped, and followed or refused.
 
-A refused set-point is answered with STATUSTEXT (253), at most once a second for the same reason. The vehicle
-then continues unchanged, or brakes where the firmware understands "stop".
+A set-point on the globe is first converted to the vehicle's own local NED. A refused set-point is answered
+with STATUSTEXT (253), at most once a second for the same reason. The vehicle then continues unchanged, or
+brakes where the firmware understands "stop".
 """
 
 from __future__ import annotations
@@ -9,20 +10,23 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from mavlink_bridge.messages import SetpointAttitude, SetpointGlobal, SetpointLocal
+from pymavlink.dialects.v20 import all as mavlink
+
+from mavlink_bridge.messages import SetpointAttitude, SetpointGlobal, SetpointLocal, Vector
 from sitl.autopilot.firmware import Firmware, Status
-from sitl.autopilot.global_setpoints import localised
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.telemetry.status_text import StatusReporter
-from sitl.values.home import Home
+from sitl.values.home import ABOVE_HOME, ABOVE_SEA, Home
 from sitl.values.origin import Origin
-from sitl.values.setpoints import POSITION, Pose, Reading, Setpoint, Stop
+from sitl.values.setpoints import IGNORE_POSITION, POSITION, ZERO, Pose, Reading, Refusal, Setpoint, Stop
 
 _SECOND: Final = 1_000_000
 # Rise (m), climb rate (m/s) or acceleration (m/s²) above which a set-point lifts the vehicle off the ground.
 _RISING: Final = (0.2, 0.1, 0.1)
 # Pause (µs) after which a set-point begins a new stream.
 _PAUSE: Final = 2 * _SECOND
+# Greatest latitude and longitude (degE7).
+_POLE, _DATE_LINE = 900_000_000, 1_800_000_000
 
 
 class Stream(NamedTuple):
@@ -95,7 +99,7 @@ class SetpointReception:
         if isinstance(message, SetpointAttitude):
             return self._flavour.read_attitude(message)
         if isinstance(message, SetpointGlobal):
-            local = localised(message, self._origin, self._home, stops=self._flavour.stops)
+            local = _localised(message, self._origin, self._home, stops=self._flavour.stops)
             return self._flavour.read(local, here) if isinstance(local, SetpointLocal) else local
         return self._flavour.read(message, here)
 
@@ -111,3 +115,43 @@ def _rises(setpoint: Setpoint, here: Pose) -> bool:
     level = setpoint.levels[2]
     z = (setpoint.position, setpoint.velocity, setpoint.acceleration)[level][2]
     return (here.position[2] if level == POSITION else 0.0) - z > _RISING[level]
+
+
+def _localised(
+    message: SetpointGlobal, origin: Origin, home: Home, *, stops: bool
+) -> SetpointLocal | Reading:
+    """Return ``message`` as SET_POSITION_TARGET_LOCAL_NED (84) in frame 1, or the reason against it.
+
+    ``stops``: an unknown frame means *stop*, as for ArduPilot; else the set-point is refused, as PX4 does.
+    Without a position the frame does not matter: velocities are along north, east and down.
+    """
+    position = ZERO
+    if message.type_mask & IGNORE_POSITION != IGNORE_POSITION:
+        # Frames above terrain are not supported, because there is no terrain.
+        if message.frame not in ABOVE_SEA | ABOVE_HOME:
+            reason = f"frame {message.frame}"
+            return Stop(f"Set-point stops: {reason}") if stops else Refusal(f"Set-point refused: {reason}")
+        if abs(message.x) > _POLE or abs(message.y) > _DATE_LINE:
+            return Refusal("Set-point refused: no such place on the globe")
+        position = _position(message, origin, home)
+    return SetpointLocal(
+        message.source,
+        message.time_boot,
+        message.target_system,
+        message.target_component,
+        mavlink.MAV_FRAME_LOCAL_NED,
+        message.type_mask,
+        position,
+        message.velocity,
+        message.acceleration,
+        message.yaw,
+        message.yaw_rate,
+    )
+
+
+def _position(message: SetpointGlobal, origin: Origin, home: Home) -> Vector:
+    """Return the position (m, local NED). A NaN altitude stays NaN; the set-point's check finds it."""
+    above = home.altitude if message.frame in ABOVE_HOME else 0.0
+    x, y, z = origin.local(message.x / 1e7, message.y / 1e7, origin.altitude)
+    # The Earth's curvature: at equal altitude z is not zero.
+    return x, y, z - (message.altitude + above - origin.altitude)

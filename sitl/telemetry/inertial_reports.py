@@ -9,10 +9,6 @@ from mavlink_bridge.messages import HighresImu, Message, RawImu, SimState, Vecto
 from sitl.telemetry.reports import Snapshot
 from sitl.values.attitudes import euler, quaternion, to_body
 
-RAW_IMU: Final = 27
-HIGHRES_IMU: Final = 105
-SIM_STATE: Final = 164
-
 # gauss, NED, as in Zurich.
 _EARTH_FIELD: Final = (0.2155, 0.0120, 0.4240)
 _SEA_LEVEL: Final = 1013.25

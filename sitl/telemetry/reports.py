@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import (
     Attitude,
     AutopilotVersion,
@@ -27,44 +29,48 @@ from mavlink_bridge.messages import (
 from sitl.estimation.sensors import Estimate
 from sitl.values.home import Home
 from sitl.values.origin import Origin
-from sitl.values.setpoints import LOCAL_NED, Setpoint, mask_of
+from sitl.values.setpoints import Setpoint, mask_of
 from sitl.vehicle.battery import Charge
 from sitl.vehicle.multirotor import VehicleState
 
-HEARTBEAT: Final = 0
-SYS_STATUS: Final = 1
-ATTITUDE: Final = 30
-LOCAL_POSITION: Final = 32
-GLOBAL_POSITION: Final = 33
-ORIGIN: Final = 49
-POSITION_TARGET: Final = 85
-EKF_STATUS: Final = 193
-EXTENDED_SYS_STATE: Final = 245
-
-ON_GROUND: Final = 1
-IN_AIR: Final = 2
-TAKING_OFF: Final = 3
-LANDING: Final = 4
-
 # MAV_TYPE by the number of rotors, else generic
-_TYPES: Final = {4: 2, 6: 13, 8: 14}
-_STANDBY: Final = 3
-_ACTIVE: Final = 4
-_CALIBRATING: Final = 2
-_CRITICAL: Final = 5
+_TYPES: Final = {
+    4: mavlink.MAV_TYPE_QUADROTOR,
+    6: mavlink.MAV_TYPE_HEXAROTOR,
+    8: mavlink.MAV_TYPE_OCTOROTOR,
+}
 
-# MAV_SYS_STATUS_SENSOR: gyro, accelerometer, magnetometer, barometer; control of rate, attitude, yaw, height
-# and position; motors, AHRS. GPS and the prearm check wait for a position.
-_SENSORS: Final = 0x1 | 0x2 | 0x4 | 0x8 | 0x400 | 0x800 | 0x1000 | 0x2000 | 0x4000 | 0x8000 | 0x200000
-_GPS: Final = 0x20
-_PREARM: Final = 0x10000000
-_BATTERY: Final = 0x2000000
+# Healthy from the start; GPS and the pre-arm check wait for a position.
+_SENSORS: Final = (
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | mavlink.MAV_SYS_STATUS_SENSOR_YAW_POSITION
+    | mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    | mavlink.MAV_SYS_STATUS_AHRS
+)
 
-# ESTIMATOR_STATUS_FLAGS: attitude, velocities, relative and absolute position, and their predictions.
-_EKF_READY: Final = 0x1 | 0x2 | 0x4 | 0x8 | 0x10 | 0x20 | 0x100 | 0x200
-_EKF_WAITING: Final = 0x1 | 0x80 | 0x400
-# Without GPS for too long: attitude, vertical velocity and height by barometer, constant position assumed.
-_EKF_LOST: Final = 0x1 | 0x4 | 0x20 | 0x80
+_EKF_READY: Final[int] = (
+    mavlink.EKF_ATTITUDE
+    | mavlink.EKF_VELOCITY_HORIZ
+    | mavlink.EKF_VELOCITY_VERT
+    | mavlink.EKF_POS_HORIZ_REL
+    | mavlink.EKF_POS_HORIZ_ABS
+    | mavlink.EKF_POS_VERT_ABS
+    | mavlink.EKF_PRED_POS_HORIZ_REL
+    | mavlink.EKF_PRED_POS_HORIZ_ABS
+)
+_EKF_WAITING: Final[int] = mavlink.EKF_ATTITUDE | mavlink.EKF_CONST_POS_MODE | mavlink.EKF_UNINITIALIZED
+# The flags that a third, and two thirds, of the start-up add.
+_EKF_VERTICAL: Final[int] = mavlink.EKF_VELOCITY_VERT | mavlink.EKF_POS_VERT_ABS
+_EKF_HORIZONTAL: Final[int] = mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_POS_HORIZ_REL
+# Without GPS for too long: height by barometer.
+_EKF_LOST: Final[int] = mavlink.EKF_ATTITUDE | _EKF_VERTICAL | mavlink.EKF_CONST_POS_MODE
 # Innovation over gate of a healthy filter.
 _TESTED: Final = 0.05
 
@@ -116,22 +122,24 @@ class Snapshot(NamedTuple):
 
 def heartbeat(s: Snapshot) -> Message:
     """Return HEARTBEAT (0)."""
-    idle = _STANDBY if s.ready else _CALIBRATING
-    flying = _ACTIVE if s.located else _CRITICAL
+    idle = mavlink.MAV_STATE_STANDBY if s.ready else mavlink.MAV_STATE_CALIBRATING
+    flying = mavlink.MAV_STATE_ACTIVE if s.located else mavlink.MAV_STATE_CRITICAL
     state = flying if s.armed else idle
-    return Heartbeat(s.source, _TYPES.get(s.rotors, 0), s.autopilot, s.base_mode, s.custom_mode, state)
+    kind = _TYPES.get(s.rotors, mavlink.MAV_TYPE_GENERIC)
+    return Heartbeat(s.source, kind, s.autopilot, s.base_mode, s.custom_mode, state)
 
 
 def sys_status(s: Snapshot) -> Message:
     """Return SYS_STATUS (1)."""
-    known = _SENSORS | _GPS | _PREARM
-    health = (known if s.ready else _SENSORS) & ~(0 if s.fixed else _GPS) | s.unbreached
+    gps, battery = mavlink.MAV_SYS_STATUS_SENSOR_GPS, mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    known = _SENSORS | gps | mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    health = (known if s.ready else _SENSORS) & ~(0 if s.fixed else gps) | s.unbreached
     if not s.armable:
-        health &= ~_PREARM
+        health &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
     if s.charge is None:
         return SysStatus(s.source, known, known, health, None, None)
-    known |= _BATTERY
-    return SysStatus(s.source, known, known, health | _BATTERY, s.charge.voltage, s.charge.remaining)
+    known |= battery
+    return SysStatus(s.source, known, known, health | battery, s.charge.voltage, s.charge.remaining)
 
 
 def attitude(s: Snapshot) -> Message:
@@ -175,7 +183,7 @@ def position_target(s: Snapshot) -> Message | None:
     return PositionTarget(
         s.source,
         s.time,
-        LOCAL_NED,
+        mavlink.MAV_FRAME_LOCAL_NED,
         mask_of(target),
         target.position,
         target.velocity,
@@ -192,7 +200,7 @@ def ekf_status(s: Snapshot) -> Message:
 
 
 def estimator_flags(s: Snapshot) -> int:
-    """Return ESTIMATOR_STATUS_FLAGS.
+    """Return EKF_STATUS_FLAGS; ESTIMATOR_STATUS_FLAGS have the same values (except EKF_UNINITIALIZED).
 
     While ``waking``: attitude at once, vertical velocity and height from a third, horizontal velocity and
     relative position from two thirds.
@@ -201,12 +209,13 @@ def estimator_flags(s: Snapshot) -> int:
         return _EKF_READY if s.ready else _EKF_LOST
     if s.waking < 1 / 3:
         return _EKF_WAITING
-    return _EKF_WAITING | 0x4 | 0x20 if s.waking < 2 / 3 else _EKF_WAITING | 0x2 | 0x4 | 0x8 | 0x20
+    horizontal = 0 if s.waking < 2 / 3 else _EKF_HORIZONTAL
+    return _EKF_WAITING | _EKF_VERTICAL | horizontal
 
 
 def extended_sys_state(s: Snapshot) -> Message:
     """Return EXTENDED_SYS_STATE (245)."""
-    return ExtendedSysState(s.source, 0, s.landed_state)
+    return ExtendedSysState(s.source, mavlink.MAV_VTOL_STATE_UNDEFINED, s.landed_state)
 
 
 Build = Callable[[Snapshot], Message | None]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import Message
 from sitl.config.autopilot import TelemetryRates
 from sitl.telemetry import inertial_reports as n
@@ -36,34 +38,42 @@ class Telemetry:
         (230), HIGHRES_IMU (105) and ALTITUDE (141).
         """
         self._streams = {
-            r.HEARTBEAT: _Stream(r.heartbeat, rates.heartbeat),
-            r.SYS_STATUS: _Stream(r.sys_status, rates.sys_status),
-            r.ATTITUDE: _Stream(r.attitude, rates.attitude),
-            r.LOCAL_POSITION: _Stream(r.local_position, rates.local_position),
-            r.GLOBAL_POSITION: _Stream(r.global_position, rates.global_position),
-            r.ORIGIN: _Stream(r.origin, rates.gps_global_origin),
-            r.POSITION_TARGET: _Stream(r.position_target, rates.position_target),
-            r.EXTENDED_SYS_STATE: _Stream(r.extended_sys_state, rates.extended_sys_state),
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: _Stream(r.heartbeat, rates.heartbeat),
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: _Stream(r.sys_status, rates.sys_status),
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: _Stream(r.attitude, rates.attitude),
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _Stream(r.local_position, rates.local_position),
+            mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _Stream(r.global_position, rates.global_position),
+            mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: _Stream(r.origin, rates.gps_global_origin),
+            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: _Stream(
+                r.position_target, rates.position_target
+            ),
+            mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _Stream(
+                r.extended_sys_state, rates.extended_sys_state
+            ),
         }
         if reports_ekf:
-            self._streams[r.EKF_STATUS] = _Stream(r.ekf_status, rates.ekf_status)
-            self._streams[n.RAW_IMU] = _Stream(n.raw_imu, 0.0)
-            self._streams[n.SIM_STATE] = _Stream(n.sim_state, 0.0)
+            self._streams[mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT] = _Stream(r.ekf_status, rates.ekf_status)
+            self._streams[mavlink.MAVLINK_MSG_ID_RAW_IMU] = _Stream(n.raw_imu, 0.0)
+            self._streams[mavlink.MAVLINK_MSG_ID_SIMSTATE] = _Stream(n.sim_state, 0.0)
         self._streams |= {
-            q.SYSTEM_TIME: _Stream(q.system_time, rates.system_time),
-            q.GPS_RAW: _Stream(q.gps_raw, rates.gps_raw),
-            q.ATTITUDE_QUATERNION: _Stream(q.attitude_quaternion, rates.attitude_quaternion),
-            q.MISSION_CURRENT: _Stream(q.mission_current, rates.mission_current),
-            q.VFR_HUD: _Stream(q.vfr_hud, rates.vfr_hud),
-            q.BATTERY_STATUS: _Stream(q.battery_status, rates.battery_status),
-            q.AUTOPILOT_VERSION: _Stream(q.autopilot_version, 0.0),
-            q.HOME: _Stream(q.home, rates.home_position),
-            q.FENCE_STATUS: _Stream(q.fence_status, 0.0),
+            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: _Stream(q.system_time, rates.system_time),
+            mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: _Stream(q.gps_raw, rates.gps_raw),
+            mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _Stream(
+                q.attitude_quaternion, rates.attitude_quaternion
+            ),
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: _Stream(q.mission_current, rates.mission_current),
+            mavlink.MAVLINK_MSG_ID_VFR_HUD: _Stream(q.vfr_hud, rates.vfr_hud),
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _Stream(q.battery_status, rates.battery_status),
+            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _Stream(q.autopilot_version, 0.0),
+            mavlink.MAVLINK_MSG_ID_HOME_POSITION: _Stream(q.home, rates.home_position),
+            mavlink.MAVLINK_MSG_ID_FENCE_STATUS: _Stream(q.fence_status, 0.0),
         }
         if not reports_ekf:
-            self._streams[n.HIGHRES_IMU] = _Stream(n.highres_imu, 0.0)
-            self._streams[q.ALTITUDE] = _Stream(q.altitude, rates.altitude)
-            self._streams[q.ESTIMATOR_STATUS] = _Stream(q.estimator_status, rates.estimator_status)
+            self._streams[mavlink.MAVLINK_MSG_ID_HIGHRES_IMU] = _Stream(n.highres_imu, 0.0)
+            self._streams[mavlink.MAVLINK_MSG_ID_ALTITUDE] = _Stream(q.altitude, rates.altitude)
+            self._streams[mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS] = _Stream(
+                q.estimator_status, rates.estimator_status
+            )
         # Active streams; most are inactive, and a step should not have to check them.
         self._flowing: list[_Stream] = []
         self._requested: list[int] = []

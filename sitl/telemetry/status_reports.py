@@ -5,40 +5,46 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import (
     Altitude,
     AttitudeQuaternion,
+    AutopilotVersion,
     BatteryStatus,
     EstimatorStatus,
     GpsRaw,
     Message,
+    Source,
     SystemTime,
     VfrHud,
 )
 from sitl.telemetry.reports import Snapshot, estimator_flags
 from sitl.values.attitudes import quaternion
 
-SYSTEM_TIME: Final = 2
-GPS_RAW: Final = 24
-ATTITUDE_QUATERNION: Final = 31
-MISSION_CURRENT: Final = 42
-VFR_HUD: Final = 74
-ALTITUDE: Final = 141
-BATTERY_STATUS: Final = 147
-AUTOPILOT_VERSION: Final = 148
-FENCE_STATUS: Final = 162
-ESTIMATOR_STATUS: Final = 230
-HOME: Final = 242
-
-# GPS_FIX_TYPE: none, 2D and 3D
-_NO_FIX, _FIX_2D, _FIX_3D = 1, 2, 3
 _SATELLITES: Final = 12
-# MAV_BATTERY_TYPE lithium polymer, MAV_BATTERY_FUNCTION_ALL; MAV_BATTERY_CHARGE_STATE ok, low, critical
-_LIPO, _ALL, _OK, _LOW, _CRITICAL = 1, 1, 1, 2, 3
 _LOW_AT, _CRITICAL_AT = 0.15, 0.07
 # Limit of the speed field of GPS_RAW_INT (m/s).
 _FASTEST: Final = 655.0
 _NAN: Final = math.nan
+# Capabilities of both firmwares. Files, terrain and compass calibration are not supported.
+_CAPABILITIES: Final = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+)
+
+# Four bytes: major, minor, patch, and 255 for an official release. ArduCopter 4.6.3, PX4 1.16.1.
+_VERSIONS: Final = {"ardupilot": 0x040603FF, "px4": 0x011001FF}
+_NAME: Final = b"outrider"
 
 
 def system_time(s: Snapshot) -> Message:
@@ -51,16 +57,18 @@ def gps_raw(s: Snapshot) -> Message:
 
     The receiver is ready before the filter: a 2D fix at one third of the start-up, a 3D fix at two thirds.
     """
-    fix = _FIX_3D if s.waking >= 2 / 3 else _FIX_2D if s.waking >= 1 / 3 else _NO_FIX
-    if not s.fixed or fix == _NO_FIX:
+    if not s.fixed or s.waking < 1 / 3:
         nowhere = (0.0, 0.0, 0.0, None, None, None, None, 0)
-        return GpsRaw(s.source, s.time, _NO_FIX, *nowhere, 0.0, 0.0, 0.0, 0.0)
+        return GpsRaw(s.source, s.time, mavlink.GPS_FIX_TYPE_NO_FIX, *nowhere, 0.0, 0.0, 0.0, 0.0)
+    if s.waking < 2 / 3:
+        fix, satellites = mavlink.GPS_FIX_TYPE_2D_FIX, _SATELLITES // 2
+    else:
+        fix, satellites = mavlink.GPS_FIX_TYPE_3D_FIX, _SATELLITES
     e = s.estimate
     latitude, longitude, altitude = s.origin.geodetic(e.position)
     north, east, _ = e.velocity
     speed = min(math.hypot(north, east), _FASTEST)
     course = math.atan2(east, north) if speed > 0.1 else None
-    satellites = _SATELLITES if fix == _FIX_3D else _SATELLITES // 2
     place = latitude, longitude, altitude
     return GpsRaw(s.source, s.time, fix, *place, 0.7, 1.1, speed, course, satellites, altitude, 0.3, 0.4, 0.1)
 
@@ -99,16 +107,34 @@ def battery_status(s: Snapshot) -> Message | None:
     c = s.charge
     if c is None:
         return None
-    state = _CRITICAL if c.remaining < _CRITICAL_AT else _LOW if c.remaining < _LOW_AT else _OK
+    state = mavlink.MAV_BATTERY_CHARGE_STATE_OK
+    if c.remaining < _CRITICAL_AT:
+        state = mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
+    elif c.remaining < _LOW_AT:
+        state = mavlink.MAV_BATTERY_CHARGE_STATE_LOW
+    kind = mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_TYPE_LIPO
     lasts = min(round(c.lasts), 1_000_000)
-    return BatteryStatus(
-        s.source, 0, _ALL, _LIPO, (c.voltage,), c.current, c.consumed, c.remaining, lasts, state
-    )
+    return BatteryStatus(s.source, 0, *kind, (c.voltage,), c.current, c.consumed, c.remaining, lasts, state)
 
 
 def autopilot_version(s: Snapshot) -> Message:
     """Return AUTOPILOT_VERSION (148)."""
     return s.version
+
+
+def version(source: Source, flavour: str) -> AutopilotVersion:
+    """Return AUTOPILOT_VERSION (148) of ``flavour``.
+
+    The version is the one recorded of the emulated firmware. The uid contains the system id, so that each
+    vehicle has its own; the eight bytes of the version control hash are our name.
+    """
+    capabilities = _CAPABILITIES
+    if flavour == "px4":
+        capabilities |= mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    uid = int.from_bytes(_NAME[:7] + bytes((source.system,)), "big")
+    uid2 = (_NAME + bytes((source.system,))).ljust(18, b"\0")
+    number = _VERSIONS[flavour]
+    return AutopilotVersion(source, capabilities, uid, number, 0, 0, 0, 0, 0, _NAME, bytes(8), bytes(8), uid2)
 
 
 def fence_status(s: Snapshot) -> Message:
@@ -121,7 +147,9 @@ def estimator_status(s: Snapshot) -> Message:
     good = 0.05 if s.located else _NAN
     # The ratios of this message are squares.
     ratios = good, max(good, s.strain**2), 0.05, 0.05, _NAN, _NAN
-    return EstimatorStatus(s.source, s.time, *ratios, 0.3 + s.spread, 0.3, estimator_flags(s))
+    # The bit that means "not initialised" in EKF_STATUS_REPORT means a GPS glitch here.
+    flags = estimator_flags(s) & ~mavlink.EKF_UNINITIALIZED
+    return EstimatorStatus(s.source, s.time, *ratios, 0.3 + s.spread, 0.3, flags)
 
 
 def home(s: Snapshot) -> Message | None:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from mavlink_bridge.messages import Message, Source, StatusText
+from pymavlink.dialects.v20 import all as mavlink
 
-# MAV_SEVERITY
-_WARNING: Final = 4
-_INFO: Final = 6
+from mavlink_bridge.messages import Message, Source, StatusText
 
 _SECOND: Final = 1_000_000
 # Limit of complaints per second, against senders that make thousands of mistakes.
@@ -25,11 +23,11 @@ class StatusReporter:
 
     def inform(self, text: str) -> None:
         """Report normal events."""
-        self._outbox.append(StatusText(self._source, _INFO, text))
+        self._outbox.append(StatusText(self._source, mavlink.MAV_SEVERITY_INFO, text))
 
     def warn(self, text: str) -> None:
         """Report a refusal or a failure."""
-        self._outbox.append(StatusText(self._source, _WARNING, text))
+        self._outbox.append(StatusText(self._source, mavlink.MAV_SEVERITY_WARNING, text))
 
     def complain(self, text: str, now: int) -> None:
         """Warn, at most once a second for the same text (``now`` in µs), and 32 times a second in all."""

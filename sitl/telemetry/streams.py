@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from sitl.config.autopilot import AutopilotConfig, TelemetryRates
-from sitl.telemetry import inertial_reports as n
-from sitl.telemetry import reports as r
-from sitl.telemetry import status_reports as q
 
 # A real ArduCopter sends only HEARTBEAT until requested, usually at 4 Hz; but not every script requests.
 _ARDUPILOT: Final = TelemetryRates(
@@ -47,14 +46,24 @@ _PX4: Final = TelemetryRates(
     estimator_status=1.0,
 )
 
-ALL: Final = 0
 GROUPS: Final[dict[int, tuple[int, ...]]] = {
-    1: (n.RAW_IMU,),
-    2: (r.SYS_STATUS, q.MISSION_CURRENT, q.GPS_RAW),
-    6: (r.GLOBAL_POSITION, r.LOCAL_POSITION),
-    10: (r.ATTITUDE,),
-    11: (q.VFR_HUD,),
-    12: (q.SYSTEM_TIME, q.BATTERY_STATUS, r.EKF_STATUS),
+    mavlink.MAV_DATA_STREAM_RAW_SENSORS: (mavlink.MAVLINK_MSG_ID_RAW_IMU,),
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+        mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+    ),
+    mavlink.MAV_DATA_STREAM_POSITION: (
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    ),
+    mavlink.MAV_DATA_STREAM_EXTRA1: (mavlink.MAVLINK_MSG_ID_ATTITUDE,),
+    mavlink.MAV_DATA_STREAM_EXTRA2: (mavlink.MAVLINK_MSG_ID_VFR_HUD,),
+    mavlink.MAV_DATA_STREAM_EXTRA3: (
+        mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
+        mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
+        mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+    ),
 }
 """Message ids of ArduCopter's groups by MAV_DATA_STREAM, as far as they are supported."""
 
@@ -68,6 +77,6 @@ def usual_rates(config: AutopilotConfig) -> TelemetryRates:
 
 def members(stream: int) -> tuple[int, ...]:
     """Return the message ids of a data stream: those of all streams for 0, none if it is unknown."""
-    if stream == ALL:
+    if stream == mavlink.MAV_DATA_STREAM_ALL:
         return tuple(message_id for group in GROUPS.values() for message_id in group)
     return GROUPS.get(stream, ())

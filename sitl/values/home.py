@@ -1,10 +1,20 @@
-"""Home, the place to which the vehicle returns: HOME_POSITION (242)."""
+"""Home, the place to which the vehicle returns: HOME_POSITION (242), and the frames of altitudes."""
 
 from __future__ import annotations
+
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import HomePosition, Source, Vector
 from sitl.values.origin import Origin
 
+ABOVE_SEA: Final = frozenset((mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT))
+"""Frames whose altitude counts from mean sea level."""
+ABOVE_HOME: Final = frozenset(
+    (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+)
+"""Frames whose altitude counts from home."""
 _NAN = float("nan")
 
 

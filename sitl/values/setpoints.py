@@ -11,20 +11,25 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import SetpointLocal, Vector
 
-IGNORE_POSITION: Final = 0x007
-IGNORE_VELOCITY: Final = 0x038
-IGNORE_ACCELERATION: Final = 0x1C0
-FORCE: Final = 0x200
-IGNORE_YAW: Final = 0x400
-IGNORE_YAW_RATE: Final = 0x800
-
-# MAV_FRAME
-LOCAL_NED: Final = 1
-LOCAL_OFFSET_NED: Final = 7
-BODY_NED: Final = 8
-BODY_OFFSET_NED: Final = 9
+IGNORE_POSITION: Final[int] = (
+    mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Y_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Z_IGNORE
+)
+IGNORE_VELOCITY: Final[int] = (
+    mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VZ_IGNORE
+)
+IGNORE_ACCELERATION: Final[int] = (
+    mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AZ_IGNORE
+)
 
 # The lowest derivative that is given for an axis: the level at which its loop closes.
 POSITION: Final = 0
@@ -148,7 +153,13 @@ def unusable(message: SetpointLocal, mask: int) -> str | None:
     if _usable(message):
         return None
     fields = (message.position, message.velocity, message.acceleration, (message.yaw,), (message.yaw_rate,))
-    bits = (1, 8, 64, IGNORE_YAW, IGNORE_YAW_RATE)
+    bits = (
+        mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE,
+        mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE,
+        mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE,
+        mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE,
+        mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE,
+    )
     for values, bit, (name, bound) in zip(fields, bits, _RANGES, strict=True):
         for axis, value in enumerate(values):
             if not mask & bit << axis and not abs(value) <= bound:
@@ -179,9 +190,16 @@ def mask_of(setpoint: Setpoint) -> int:
     """Return the type mask of the followed set-point, for POSITION_TARGET_LOCAL_NED (85)."""
     mask = 0
     for axis, level in enumerate(setpoint.levels):
-        mask |= (1 << axis) * (level > POSITION) | (8 << axis) * (level > VELOCITY)
+        if level > POSITION:
+            mask |= mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE << axis
+        if level > VELOCITY:
+            mask |= mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE << axis
     if not setpoint.complete and POSITION in setpoint.levels and setpoint.velocity == ZERO:
         mask |= IGNORE_VELOCITY
     if setpoint.acceleration == ZERO and ACCELERATION not in setpoint.levels:
         mask |= IGNORE_ACCELERATION
-    return mask | IGNORE_YAW * (setpoint.yaw is None) | IGNORE_YAW_RATE * (setpoint.yaw_rate is None)
+    if setpoint.yaw is None:
+        mask |= mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+    if setpoint.yaw_rate is None:
+        mask |= mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
+    return mask

@@ -9,6 +9,7 @@ from itertools import count
 from typing import Any, TypeVar
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.flight.autopilots import Profile
@@ -47,8 +48,7 @@ START = 1_767_225_600_000_000
 TICK = 10_000
 LINKS = ("autopilot", "swarm", "target", "ground")
 
-TAKEOFF, LAND, REPOSITION, MODE, ARM, INTERVAL, REQUEST = 22, 21, 192, 176, 400, 511, 512
-ARMED, PREARM_OK = 0x80, 0x10000000
+ORIGIN_REQUEST = (mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 NAN = math.nan
 
 M = TypeVar("M", bound=Message)
@@ -91,9 +91,10 @@ class PerfectAutopilot:
         self._move()
         boot = now - START
         if now % 100_000 == 0:
-            mode = ARMED * self.armed
+            mode = mavlink.MAV_MODE_FLAG_SAFETY_ARMED * self.armed
             answers.append(Heartbeat(AUTOPILOT, 2, self.profile.autopilot, mode, self.mode, 4))
-            answers.append(SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, 12.0, self.battery))
+            checks = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+            answers.append(SysStatus(AUTOPILOT, checks, checks, checks, 12.0, self.battery))
             answers.append(ExtendedSysState(AUTOPILOT, 0, 2 if self.position[2] > self.home[2] + 0.1 else 1))
         if now % 20_000 == 0 and not self.mute:
             answers += [self.local(boot), self.attitude(boot)]
@@ -120,18 +121,18 @@ class PerfectAutopilot:
         answers: list[Message] = [
             CommandAck(AUTOPILOT, message.command, 0, 0, 0, message.source.system, message.source.component)
         ]
-        if message.command == MODE:
+        if message.command == mavlink.MAV_CMD_DO_SET_MODE:
             held = p == self.profile.hold_call
             self.mode = self.profile.hold_mode if held else self.profile.guided_custom_mode
-        elif message.command == ARM:
+        elif message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             self.armed = p[0] == 1.0
-        elif message.command == TAKEOFF:
+        elif message.command == mavlink.MAV_CMD_NAV_TAKEOFF:
             height = p[6] - FLEET.altitude if self.profile.takeoff_absolute else self.home[2] + p[6]
             self._climb = height
             self.mode = min(self.profile.takeoff_modes, default=self.mode)
-        elif message.command == LAND:
+        elif message.command == mavlink.MAV_CMD_NAV_LAND:
             self.landing, self.mode = True, min(self.profile.land_modes)
-        elif message.command == REQUEST and p[0] == 49:
+        elif (message.command, p[0]) == ORIGIN_REQUEST:
             answers.append(GpsGlobalOrigin(AUTOPILOT, FLEET.latitude, FLEET.longitude, FLEET.altitude, 0))
         return answers
 
@@ -223,12 +224,16 @@ class Bench:
 
     def reposition(self, x: int, y: int, z: float, frame: int = 0) -> list[CommandAck]:
         """Send a DO_REPOSITION of raw numbers."""
-        message = CommandInt(GROUND, SYSTEM, COMPONENT, frame, REPOSITION, (-1.0, 0.0, 0.0, NAN), x, y, z)
+        message = CommandInt(
+            GROUND, SYSTEM, COMPONENT, frame, mavlink.MAV_CMD_DO_REPOSITION, (-1.0, 0.0, 0.0, NAN), x, y, z
+        )
         return only(CommandAck, self.step(self.datagram("ground", message)), "ground")
 
     def take_off(self, height: float = 5.0) -> Bench:
         """Into the air and under the companion's control."""
-        assert [ack.result for ack in self.order(TAKEOFF, 0, 0, 0, NAN, NAN, NAN, height)] == [0]
+        assert [
+            ack.result for ack in self.order(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, NAN, NAN, NAN, height)
+        ] == [0]
         return self.until(Phase.ESCORT)
 
     def datagram(self, link: str, *messages: Message) -> Datagram:

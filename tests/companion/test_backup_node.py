@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.committed import committed, horizon_of
 from companion.backup_node import BackupNode
@@ -36,7 +37,6 @@ CONFIG = CompanionConfig.model_validate({"task": "goto", "avoidance": "certified
 DT, STEPS, TICK = 200_000, 16, 10_000
 BEGIN = 1_767_225_600_000_000
 AUTOPILOT, COMPANION = Source(SYSTEM, 1), Source(SYSTEM, COMPONENT)
-GUIDED, LOITER = 4, 5
 YAW = 0.7
 
 
@@ -51,7 +51,7 @@ class Bench:
         self.codec, self.reader = Codec(None, signing), Codec()
         self.now = BEGIN
         self.speaks = self.beats = True
-        self.mode, self.armed = GUIDED, True
+        self.mode, self.armed = mavlink.COPTER_MODE_GUIDED, True
         self.origin = np.zeros(3)
         """Of the vehicle's local frame, as the backup node hears it; the companion's is the fleet's."""
         self.ahead = 0
@@ -83,7 +83,8 @@ class Bench:
             origin = GpsGlobalOrigin(AUTOPILOT, latitude, longitude, altitude, 0)
             inbox.append(self.tell("autopilot", origin))
         if self.beats and since % 1_000_000 == 0:
-            base = 0x81 if self.armed else 0x01
+            custom = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+            base = custom | mavlink.MAV_MODE_FLAG_SAFETY_ARMED * self.armed
             inbox.append(self.tell("autopilot", Heartbeat(AUTOPILOT, 13, 3, base, self.mode, 4)))
         if self.speaks and since % 20_000 == 0:
             inbox.append(self.tell("autopilot", self._spoken()))
@@ -166,14 +167,14 @@ def test_when_the_companion_is_back_it_is_silent_again() -> None:
 def test_a_vehicle_that_somebody_else_has_is_left_alone(how: str) -> None:
     bench = silent(Bench())
     assert bench.run(0.5)
-    bench.mode = LOITER if how == "another mode" else GUIDED
+    bench.mode = mavlink.COPTER_MODE_LOITER if how == "another mode" else mavlink.COPTER_MODE_GUIDED
     bench.armed = how != "disarmed"
     bench.beats = how != "no heartbeat"
     # A heartbeat is a second old at most; without any it counts for three.
     bench.run(3.1)
     assert bench.run(2.0) == []
     # Given back, it is at nobody's plan: the old one would be somewhere else.
-    bench.mode, bench.armed, bench.beats = GUIDED, True, True
+    bench.mode, bench.armed, bench.beats = mavlink.COPTER_MODE_GUIDED, True, True
     assert bench.run(3.0) == []
 
 
@@ -202,7 +203,7 @@ def test_after_an_order_to_land_it_is_silent() -> None:
     """It goes out before the farewell, and before the autopilot says that it has left the mode."""
     bench = Bench()
     bench.run(1.0)
-    land = CommandLong(COMPANION, SYSTEM, 1, 21, 0, (0.0,) * 7)
+    land = CommandLong(COMPANION, SYSTEM, 1, mavlink.MAV_CMD_NAV_LAND, 0, (0.0,) * 7)
     bench.node.step(bench.now, [bench.tell("autopilot", land)])
     bench.speaks = False
     assert bench.run(3.0) == []

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.errors import SolverError
 from companion.flight.guard import Holding
-from companion.flight.orders import NAV_LOITER_UNLIM, NAV_RETURN
 from companion.values.phase import Phase
 from mavlink_bridge.messages import (
     Attitude,
@@ -26,21 +26,14 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 from tests.companion.bench import (
-    ARM,
     AUTOPILOT,
     FLEET,
     GROUND,
-    INTERVAL,
-    LAND,
     LINKS,
-    MODE,
     NAN,
     PROFILES,
-    REPOSITION,
-    REQUEST,
     START,
     SYSTEM,
-    TAKEOFF,
     TARGET,
     Bench,
     field_of,
@@ -50,7 +43,6 @@ from tests.companion.bench import (
 )
 
 FLAVOURS = tuple(PROFILES)
-ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 HOLDING = np.array([0.0, 0.0, 5.0])
 
 
@@ -60,7 +52,11 @@ def setpoints(sent):
 
 def commands(sent):
     """What is asked of the autopilot beside messages."""
-    return [m.command for m in only(CommandLong, sent) if m.command not in (INTERVAL, REQUEST)]
+    return [
+        m.command
+        for m in only(CommandLong, sent)
+        if m.command not in (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)
+    ]
 
 
 def place(message):
@@ -88,20 +84,31 @@ def test_a_flight_from_the_go_to_the_ground(flavour):
     assert setpoints(before) == []
     bench.take_off(5.0)
     goal = np.array([4.0, -3.0, 6.0])
-    assert [ack.result for ack in bench.go_to(goal)] == [ACCEPTED]
+    assert [ack.result for ack in bench.go_to(goal)] == [mavlink.MAV_RESULT_ACCEPTED]
     flown = bench.fly(6.0)
     np.testing.assert_allclose(bench.autopilot.position, goal, atol=0.1)
     assert commands(flown) == []
     assert len(setpoints(flown)) == 300
-    assert [ack.result for ack in bench.order(LAND)] == [ACCEPTED]
+    assert [ack.result for ack in bench.order(mavlink.MAV_CMD_NAV_LAND)] == [mavlink.MAV_RESULT_ACCEPTED]
     assert bench.phase is Phase.SETTLE
     bench.until(Phase.LAND)
     landing = bench.until(Phase.DONE).fly(1.0)
     assert setpoints(landing) == []
-    steps = {"ardupilot": [MODE, ARM, TAKEOFF], "px4": [ARM, TAKEOFF, MODE]}[flavour]
+    steps = {
+        "ardupilot": [
+            mavlink.MAV_CMD_DO_SET_MODE,
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+            mavlink.MAV_CMD_NAV_TAKEOFF,
+        ],
+        "px4": [
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+            mavlink.MAV_CMD_NAV_TAKEOFF,
+            mavlink.MAV_CMD_DO_SET_MODE,
+        ],
+    }[flavour]
     # PX4 would come back to OFFBOARD, where it cannot be armed.
-    leaves = [MODE] if flavour == "px4" else []
-    assert commands((link, m) for _, link, m in bench.sent) == [*steps, LAND, *leaves]
+    leaves = [mavlink.MAV_CMD_DO_SET_MODE] if flavour == "px4" else []
+    assert commands((link, m) for _, link, m in bench.sent) == [*steps, mavlink.MAV_CMD_NAV_LAND, *leaves]
     assert bench.autopilot.mode != bench.autopilot.profile.guided_custom_mode
 
 
@@ -112,7 +119,7 @@ def test_a_set_point_is_finite_and_continuous_all_the_way(flavour):
     bench.fly(3.0)
     bench.go_to([-6.0, 2.0, 4.0])
     bench.fly(3.0)
-    bench.order(LAND)
+    bench.order(mavlink.MAV_CMD_NAV_LAND)
     bench.until(Phase.LAND)
     found = setpoints((link, m) for _, link, m in bench.sent)
     assert np.isfinite([numbers_of(m) for m in found]).all()
@@ -168,7 +175,7 @@ class Stranger:
 
 
 @pytest.mark.parametrize("link", Stranger.links)
-@pytest.mark.parametrize("command", [TAKEOFF, LAND])
+@pytest.mark.parametrize("command", [mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND])
 def test_a_command_by_another_link_is_not_obeyed(flying, link, command):
     sent = flying.fly(
         1.0, flying.datagram(link, CommandLong(GROUND, SYSTEM, 195, command, 0, (0, 0, 0, 0, 0, 0, 9.0)))
@@ -180,7 +187,7 @@ def test_a_command_by_another_link_is_not_obeyed(flying, link, command):
 
 @pytest.mark.parametrize(("system", "component"), [(12, 195), (SYSTEM, 1), (0, 0), (255, 195), (SYSTEM, 0)])
 def test_a_command_to_somebody_else_is_not_obeyed_nor_answered(flying, system, component):
-    order = CommandLong(GROUND, system, component, LAND, 0, (0.0,) * 7)
+    order = CommandLong(GROUND, system, component, mavlink.MAV_CMD_NAV_LAND, 0, (0.0,) * 7)
     sent = flying.step(flying.datagram("ground", order))
     assert only(CommandAck, sent, "ground") == []
     assert flying.phase is Phase.ESCORT
@@ -198,7 +205,7 @@ def test_other_components_of_the_vehicle_have_no_say(flying, component):
 def test_no_go_by_another_link_starts_anything():
     for link in Stranger.links:
         bench = Bench()
-        order = CommandLong(GROUND, SYSTEM, 195, TAKEOFF, 0, (0, 0, 0, 0, 0, 0, 5.0))
+        order = CommandLong(GROUND, SYSTEM, 195, mavlink.MAV_CMD_NAV_TAKEOFF, 0, (0, 0, 0, 0, 0, 0, 5.0))
         assert commands(bench.fly(3.0, bench.datagram(link, order))) == []
         assert bench.phase is Phase.CONNECT
 
@@ -206,14 +213,14 @@ def test_no_go_by_another_link_starts_anything():
 def test_every_command_is_acknowledged_to_its_sender():
     bench = Bench()
     table = [
-        (LAND, (), ACCEPTED),
-        (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, NAN), DENIED),
-        (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, 0.1), DENIED),
-        (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, math.inf), DENIED),
-        (ARM, (1,), UNSUPPORTED),
-        (MODE, (1, 4), UNSUPPORTED),
-        (REPOSITION, (), UNSUPPORTED),
-        (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, 5.0), ACCEPTED),
+        (mavlink.MAV_CMD_NAV_LAND, (), mavlink.MAV_RESULT_ACCEPTED),
+        (mavlink.MAV_CMD_NAV_TAKEOFF, (0, 0, 0, NAN, NAN, NAN, NAN), mavlink.MAV_RESULT_DENIED),
+        (mavlink.MAV_CMD_NAV_TAKEOFF, (0, 0, 0, NAN, NAN, NAN, 0.1), mavlink.MAV_RESULT_DENIED),
+        (mavlink.MAV_CMD_NAV_TAKEOFF, (0, 0, 0, NAN, NAN, NAN, math.inf), mavlink.MAV_RESULT_DENIED),
+        (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1,), mavlink.MAV_RESULT_UNSUPPORTED),
+        (mavlink.MAV_CMD_DO_SET_MODE, (1, 4), mavlink.MAV_RESULT_UNSUPPORTED),
+        (mavlink.MAV_CMD_DO_REPOSITION, (), mavlink.MAV_RESULT_UNSUPPORTED),
+        (mavlink.MAV_CMD_NAV_TAKEOFF, (0, 0, 0, NAN, NAN, NAN, 5.0), mavlink.MAV_RESULT_ACCEPTED),
     ]
     for command, params, result in table:
         (ack,) = bench.order(command, *params)
@@ -239,7 +246,7 @@ def test_every_command_is_acknowledged_to_its_sender():
     ids=["NaN", "inf", "-inf", "huge", "lat", "lon", "both", "relative", "relative int", "local"],
 )
 def test_a_goal_that_is_no_place_is_denied_and_moves_nothing(flying, x, y, z, frame):
-    assert [ack.result for ack in flying.reposition(x, y, z, frame)] == [DENIED]
+    assert [ack.result for ack in flying.reposition(x, y, z, frame)] == [mavlink.MAV_RESULT_DENIED]
     found = setpoints(flying.fly(2.0))
     assert np.isfinite([numbers_of(m) for m in found]).all()
     np.testing.assert_allclose(flying.autopilot.position, HOLDING, atol=0.1)
@@ -385,7 +392,7 @@ def test_taken_over_by_its_mode_switch_it_is_silent_and_then_starts_where_it_is(
     here = autopilot.position.copy()
     autopilot.mode = profile.guided_custom_mode
     assert setpoints(flying.fly(1.0)) == []
-    flying.order(TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
+    flying.order(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
     first = setpoints(flying.fly(2.0))[0]
     np.testing.assert_allclose(place(first), here, atol=0.02)
     assert math.remainder(math.pi / 2 - first.yaw - 2.5, math.tau) == pytest.approx(0.0, abs=0.02)
@@ -397,10 +404,10 @@ def test_nobody_is_landed_upon(below):
     bench = Bench().take_off(5.0)
     neighbour = bench.datagram("swarm", seen_at(12, below))
     bench.fly(1.0, neighbour)
-    bench.order(LAND)
+    bench.order(mavlink.MAV_CMD_NAV_LAND)
     for _ in range(1000):
         before = bench.autopilot.position.copy()
-        if commands(bench.step(neighbour)) == [LAND]:
+        if commands(bench.step(neighbour)) == [mavlink.MAV_CMD_NAV_LAND]:
             break
     assert bench.phase is Phase.LAND
     assert np.linalg.norm(before[:2] - below[:2]) > bench.config.guard.landing_clearance
@@ -489,13 +496,17 @@ def test_it_holds_where_it_is_told_and_comes_back_to_where_it_started(flying):
     start = flying.autopilot.position.copy()
     flying.go_to([6.0, 3.0, 6.0])
     flying.fly(6.0)
-    assert [ack.result for ack in flying.order(NAV_LOITER_UNLIM)] == [ACCEPTED]
+    assert [ack.result for ack in flying.order(mavlink.MAV_CMD_NAV_LOITER_UNLIM)] == [
+        mavlink.MAV_RESULT_ACCEPTED
+    ]
     flying.fly(3.0)
     held = flying.autopilot.position.copy()
     flying.go_to([-6.0, 0.0, 6.0])
     flying.fly(3.0)
     np.testing.assert_allclose(flying.autopilot.position, held, atol=0.1)
-    assert [ack.result for ack in flying.order(NAV_RETURN)] == [ACCEPTED]
+    assert [ack.result for ack in flying.order(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)] == [
+        mavlink.MAV_RESULT_ACCEPTED
+    ]
     flying.fly(8.0)
     assert flying.phase in (Phase.SETTLE, Phase.LAND, Phase.DONE)
     assert np.linalg.norm(flying.autopilot.position[:2] - start[:2]) < 0.6
@@ -505,7 +516,7 @@ def test_it_holds_where_it_is_told_and_comes_back_to_where_it_started(flying):
 def test_those_that_share_a_surface_tell_their_way_from_the_take_off_on(kind):
     """So that the others' places count with them; the rest tell no way that they do not plan."""
     bench = Bench(task="escort", formation={"kind": kind})
-    bench.order(TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5.0)
+    bench.order(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5.0)
     told = []
     for _ in range(2000):
         if bench.phase is Phase.ESCORT:

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
-from companion.flight.command_protocol import DO_SET_MODE
-from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
-from companion.flight.takeoff import ARM_DISARM
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandInt, CommandLong
@@ -72,9 +70,13 @@ def test_it_begins_and_ends_in_the_air(flavour: str, world: dict[str, Any], tmp_
         assert companion.pilot.refusals == [] or flavour == "px4"
     for system, path in zip(flight.systems, flown.logs, strict=True):
         orders = set(ordered(flown, system))
-        assert not orders & {NAV_TAKEOFF, ARM_DISARM, NAV_LAND}
+        assert not orders & {
+            mavlink.MAV_CMD_NAV_TAKEOFF,
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+            mavlink.MAV_CMD_NAV_LAND,
+        }
         # ArduPilot hovers in GUIDED; PX4 holds, and must be asked for OFFBOARD.
-        assert (DO_SET_MODE in orders) is (flavour == "px4")
+        assert (mavlink.MAV_CMD_DO_SET_MODE in orders) is (flavour == "px4")
         assert len(setpoints(path)) > 100
 
 
@@ -86,7 +88,12 @@ def test_from_the_ground_all_of_that_is_ordered(flavour: str, tmp_path: Path) ->
     )
     check(flown)
     for system in flown.flight.systems:
-        assert {NAV_TAKEOFF, ARM_DISARM, NAV_LAND, DO_SET_MODE} <= set(ordered(flown, system))
+        assert {
+            mavlink.MAV_CMD_NAV_TAKEOFF,
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+            mavlink.MAV_CMD_NAV_LAND,
+            mavlink.MAV_CMD_DO_SET_MODE,
+        } <= set(ordered(flown, system))
 
 
 def test_in_the_air_without_a_goal_it_ends_with_the_cap(tmp_path: Path) -> None:

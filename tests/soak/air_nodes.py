@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
-from companion.flight.state_machine import NAV_TAKEOFF
 from companion.node import Companion
 from companion.values.components import COMPONENT
 from mavlink_bridge.frames import FleetFrame
@@ -178,7 +178,7 @@ class Tower:
 
     def go(self, system: int) -> None:
         """Up, or on."""
-        self.order(system, NAV_TAKEOFF, 0.0, 0.0, 0.0, NAN, NAN, NAN, HEIGHT)
+        self.order(system, mavlink.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, NAN, NAN, NAN, HEIGHT)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         for datagram in inbox:

@@ -9,8 +9,10 @@ from math import inf, nan
 from random import Random
 from struct import Struct
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import BY_ID, Converter
-from mavlink_bridge.wire.framing import SIGNED_FLAG, START_V1, Frame, frame_v1, frame_v2, leading_frames
+from mavlink_bridge.wire.framing import Frame, frame_v1, frame_v2, leading_frames
 
 MOST = 1 << 16
 """Bytes; edits never make more."""
@@ -140,7 +142,7 @@ def extreme_payload(random: Random, row: Converter, payload: bytes) -> bytes:
 def framed(random: Random, row: Converter, frame: Frame, source: tuple[int, int], payload: bytes) -> bytes:
     """The frame around ``payload``: in its version, or in MAVLink 2 as if it were signed."""
     sequence = random.randrange(256)
-    if frame.data[0] == START_V1:
+    if frame.data[0] == mavlink.PROTOCOL_MARKER_V1:
         return frame_v1(row.id, row.crc_extra, source, sequence, payload[: row.size_v1])
     data = frame_v2(row.id, row.crc_extra, source, sequence, payload)
     return signed(random, row, data) if random.random() < 0.1 else data
@@ -150,7 +152,7 @@ def signed(random: Random, row: Converter, data: bytes) -> bytes:
     """A version 2 frame with the flag and thirteen bytes of a signature that nobody made."""
     from fastcrc.crc16 import mcrf4xx
 
-    body = data[:2] + bytes([SIGNED_FLAG]) + data[3:-2]
+    body = data[:2] + bytes([mavlink.MAVLINK_IFLAG_SIGNED]) + data[3:-2]
     return body + mcrf4xx(body[1:] + row.crc_extra).to_bytes(2, "little") + random.randbytes(13)
 
 

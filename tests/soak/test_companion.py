@@ -6,8 +6,8 @@ from __future__ import annotations
 from random import Random
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
-from companion.flight.orders import UNSUPPORTED
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
 from mavlink_bridge.messages import CommandAck, CommandLong, GpsGlobalOrigin, Message, SetpointLocal
@@ -97,7 +97,7 @@ def check_recovered(bench: Bench) -> None:
     order = CommandLong(GROUND, SYSTEM, COMPONENT, UNHEARD_OF, 0, (0.0,) * 7)
     # The first may be lost in what still waits of a broken frame.
     sent = [answer for _ in range(20) for answer in bench.step(bench.datagram("ground", order))]
-    assert only(CommandAck, sent, "ground")[-1].result == UNSUPPORTED
+    assert only(CommandAck, sent, "ground")[-1].result == mavlink.MAV_RESULT_UNSUPPORTED
 
 
 def test_strangers_steer_nobody_beyond_the_limits(mutants: Mutants) -> None:

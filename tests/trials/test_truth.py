@@ -6,6 +6,7 @@ import socket
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.frames import FleetFrame
@@ -17,7 +18,6 @@ from trials.ears import PortEar
 from trials.truth import TruthObserver
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
-ARMED = 0x80
 
 
 class Wire:
@@ -57,7 +57,9 @@ def rig():
 
 
 def beat(system, armed):
-    return Codec().encode(Heartbeat(Source(system, 1), 2, 3, ARMED if armed else 0, 0, 4))
+    return Codec().encode(
+        Heartbeat(Source(system, 1), 2, 3, mavlink.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0, 0, 4)
+    )
 
 
 def state(system, east, armed=True):
@@ -112,7 +114,7 @@ def test_what_others_say_counts_nowhere(rig) -> None:
     observer, wires, _ = rig
     wires[1].coming += [
         beat(9, True),
-        Codec().encode(Heartbeat(Source(1, 195), 18, 8, ARMED, 0, 4)),
+        Codec().encode(Heartbeat(Source(1, 195), 18, 8, mavlink.MAV_MODE_FLAG_SAFETY_ARMED, 0, 4)),
         b"noise",
     ]
     observer.turn()

@@ -20,8 +20,9 @@ from typing import Final
 
 import numpy as np
 import yaml
+from pymavlink.dialects.v20 import all as mavlink
 
-from benchmarks.recorded_swarms import Array, FlavourName, SwarmVehicle, write_swarm
+from benchmarks.recorded_swarms import FLAVOURS, Array, FlavourName, SwarmVehicle, write_swarm
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.frames import FleetFrame, LocalFrame, enu_to_ned
 from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, LocalPosition, SetpointLocal, Source
@@ -29,12 +30,14 @@ from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError, OutriderError
 
-_AUTOPILOT: Final = 1
-"""MAV_COMP_ID_AUTOPILOT1."""
-_FLAVOURS: Final[dict[int, FlavourName]] = {3: "ardupilot", 12: "px4"}
-"""MAV_AUTOPILOT."""
-_HEARD: Final = frozenset((0, 32, 49, 84))
-"""HEARTBEAT, LOCAL_POSITION_NED, GPS_GLOBAL_ORIGIN, SET_POSITION_TARGET_LOCAL_NED."""
+_HEARD: Final = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+    )
+)
 _EITHER_SIDE: Final = 50
 """Number of messages before and after each among which the least delayed one is searched."""
 _EVERY: Final = 2
@@ -113,7 +116,7 @@ def _truth(rows: Array, begin: float) -> Array:
 
 
 def _vehicle(log: Path, system: int, frame: FleetFrame, begin: float, truth: Array) -> SwarmVehicle:
-    own = Source(system, _AUTOPILOT)
+    own = Source(system, mavlink.MAV_COMP_ID_AUTOPILOT1)
     codec = Codec(lambda number, _system, _component: number in _HEARD)
     flavour: FlavourName | None = None
     local: LocalFrame | None = None
@@ -124,7 +127,7 @@ def _vehicle(log: Path, system: int, frame: FleetFrame, begin: float, truth: Arr
         for message in codec.feed(record.frame):
             match message:
                 case Heartbeat() if message.source == own:
-                    flavour = _FLAVOURS.get(message.autopilot)
+                    flavour = FLAVOURS.get(message.autopilot)
                 case GpsGlobalOrigin() if message.source == own:
                     local = frame.local(message.latitude, message.longitude, message.altitude)
                 case LocalPosition() if message.source == own:

@@ -5,11 +5,19 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from benchmarks.recorded_flights import Array, RecordedFlight, Told
 from mavlink_bridge.messages import SetpointLocal
 
-_TRAJECTORY: Final = 0x03F
+_TRAJECTORY: Final[int] = (
+    mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Y_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Z_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VZ_IGNORE
+)
 """Ignore bits of position and velocity: if none is set, the set-points are a trajectory."""
 _AS_RECORDED: Final[dict[str, dict[str, Any]]] = {
     "ardupilot": {"land_speed": 0.5, "takeoff_speed": 2.5},

@@ -16,7 +16,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from pymavlink.dialects.v20 import all as mavlink
 
+from benchmarks.recorded_swarms import FLAVOURS
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import (
     Attitude,
@@ -37,10 +39,8 @@ from sitl.vehicle.config import VehicleConfig
 
 Array = npt.NDArray[np.float64]
 
-_AUTOPILOT: Final = 1
-"""MAV_COMP_ID_AUTOPILOT1, the vehicle. Messages of all other sources in a log are sent to it."""
-_FLAVOURS: Final = {3: "ardupilot", 12: "px4"}
-"""MAV_AUTOPILOT."""
+_AUTOPILOT: Final[int] = mavlink.MAV_COMP_ID_AUTOPILOT1
+"""The vehicle. Messages of all other sources in a log are sent to it."""
 _SITE: Final = FleetFrame(47.397742, 8.545594, 488.0)
 _TICK: Final = 5_000
 """Time (µs) between two steps of the emulated autopilot."""
@@ -105,7 +105,7 @@ def read_flight(path: Path) -> RecordedFlight:
     received = [(record.time, message) for record in read_tlog(path) for message in codec.feed(record.frame)]
     beats = [m for _, m in received if isinstance(m, Heartbeat) and m.source.component == _AUTOPILOT]
     places = [(time, m.time_boot) for time, m in received if isinstance(m, LocalPosition)]
-    if not beats or not places or beats[0].autopilot not in _FLAVOURS:
+    if not beats or not places or beats[0].autopilot not in FLAVOURS:
         raise InputError(f"{path}: holds no ArduPilot or PX4 that tells where it is")
     stamps, boot = np.array(places, dtype=np.float64).T
     # Beyond its ends the time continues at the clock's own rate.
@@ -117,7 +117,7 @@ def read_flight(path: Path) -> RecordedFlight:
     rows = list(zip(times.tolist(), (message for _, message in received), strict=True))
     sent = [Sent(time, message) for time, message in rows if message.source != own]
     told = tell((row for row in rows if row[1].source == own), begin)
-    return RecordedFlight(own.system, _FLAVOURS[beats[0].autopilot], sent, told)
+    return RecordedFlight(own.system, FLAVOURS[beats[0].autopilot], sent, told)
 
 
 def tell(received: Iterable[tuple[float, Message]], begin: float = 0.0) -> Told:

@@ -13,6 +13,7 @@ from typing import Final, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
+from pymavlink.dialects.v20 import all as mavlink
 
 from outrider.errors import InputError
 
@@ -21,6 +22,11 @@ Array = npt.NDArray[np.float64]
 SETPOINT_COLUMNS: Final = 10
 MOTION_COLUMNS: Final = 7
 FlavourName = Literal["ardupilot", "px4"]
+FLAVOURS: Final[dict[int, FlavourName]] = {
+    mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",
+    mavlink.MAV_AUTOPILOT_PX4: "px4",
+}
+"""Flavours by MAV_AUTOPILOT."""
 
 
 class SwarmVehicle(NamedTuple):

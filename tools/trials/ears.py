@@ -5,6 +5,8 @@ from __future__ import annotations
 import socket
 from typing import Final, Protocol
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.links.endpoints import UdpIn, parse_endpoint
@@ -14,8 +16,6 @@ from outrider.errors import InputError
 
 _LONGEST: Final = 65536
 _BUFFER: Final = 1 << 20
-_AUTOPILOT: Final = 1
-"""Value of MAV_COMP_ID."""
 
 
 class Ear(Protocol):
@@ -92,7 +92,7 @@ class PortEar:
                 return found
             frame = frame_at(data, 0)
             # A PX4 forwards messages of other components, too.
-            if not isinstance(frame, Flaw) and frame.component == _AUTOPILOT:
+            if not isinstance(frame, Flaw) and frame.component == mavlink.MAV_COMP_ID_AUTOPILOT1:
                 self._there[frame.system] = place
             found.append(data)
 

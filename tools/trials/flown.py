@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, LocalPosition, SetpointLocal
@@ -18,8 +19,14 @@ from trials.plan import TARGET
 from trials.separation import Track
 
 Array = NDArray[np.float64]
-_READ = frozenset((32, 33, 49, 84))
-"""LOCAL_POSITION_NED, GLOBAL_POSITION_INT, GPS_GLOBAL_ORIGIN, SET_POSITION_TARGET_LOCAL_NED."""
+_READ = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+    )
+)
 
 
 class Flown(NamedTuple):

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.clocks.clock import Clock, WallClock
 from mavlink_bridge.clocks.followed_clock import FollowedClock
@@ -27,10 +28,15 @@ from mavlink_bridge.wire.codec import Codec
 from trials.separation import Track
 
 Array = NDArray[np.float64]
-OWN = Source(254, 190)
-ARMED = 0x80
-_HEARTBEAT, _TIME, _LOCAL, _ORIGIN = 0, 2, 32, 49
-_REQUEST = 512
+OWN = Source(254, mavlink.MAV_COMP_ID_MISSIONPLANNER)
+_READ = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+    )
+)
 AGAIN = 500_000
 """Wall time between two requests for missing messages (µs)."""
 
@@ -130,7 +136,7 @@ class SitlObserver:
         """Clock reading at the arrival of a message, and the message's stamp (µs)."""
         self._codec = Codec(
             lambda identifier, system, component: (
-                identifier in (_HEARTBEAT, _TIME, _LOCAL, _ORIGIN) and system in self.seen and component == 1
+                identifier in _READ and system in self.seen and component == mavlink.MAV_COMP_ID_AUTOPILOT1
             )
         )
 
@@ -194,7 +200,7 @@ class SitlObserver:
                         self._clock.observe(self._wall.now(), message.time_boot)
                         self._ties.append((self._clock.now(), message.time_boot))
                 elif isinstance(message, Heartbeat):
-                    one.armed = bool(message.base_mode & ARMED)
+                    one.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
                 elif isinstance(message, SystemTime):
                     one.boot = message.unix_time - message.time_boot
                 elif isinstance(message, GpsGlobalOrigin):
@@ -207,7 +213,12 @@ class SitlObserver:
             return
         self._next = now + AGAIN
         for system, one in self.seen.items():
-            for wanted, missing in ((_ORIGIN, one.frame is None), (_TIME, one.boot is None)):
-                if missing:
-                    params = (float(wanted), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-                    self.link.send(self._codec.encode(CommandLong(OWN, system, 1, _REQUEST, 0, params)))
+            missing = {
+                mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: one.frame is None,
+                mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: one.boot is None,
+            }
+            for wanted in (number for number, absent in missing.items() if absent):
+                params = (float(wanted), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+                whom = system, mavlink.MAV_COMP_ID_AUTOPILOT1
+                request = CommandLong(OWN, *whom, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, params)
+                self.link.send(self._codec.encode(request))

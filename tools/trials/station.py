@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.links.endpoints import UdpIn
 from mavlink_bridge.links.link import Link
@@ -11,8 +13,6 @@ from mavlink_bridge.links.udp import UdpListener
 from mavlink_bridge.messages import StatusText
 from mavlink_bridge.wire.codec import Codec
 from trials.plan import HOST
-
-_TEXT = 253
 
 
 class Station:
@@ -22,7 +22,9 @@ class Station:
         self.link, self.endpoint = listener()
         self.texts: dict[int, list[str]] = {system: [] for system in systems}
         self._codec = Codec(
-            lambda identifier, system, _component: identifier == _TEXT and system in self.texts
+            lambda identifier, system, _component: (
+                identifier == mavlink.MAVLINK_MSG_ID_STATUSTEXT and system in self.texts
+            )
         )
 
     def turn(self) -> None:

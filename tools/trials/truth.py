@@ -11,25 +11,32 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.clocks.clock import Clock, WallClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandLong, Heartbeat, HilState, SimulationState
 from mavlink_bridge.wire.codec import Codec
 from trials.ears import Ear
-from trials.observer import AGAIN, ARMED, OWN
+from trials.observer import AGAIN, OWN
 from trials.separation import Track
 
 Array = NDArray[np.float64]
-_HEARTBEAT, _SIM_STATE, _HIL_STATE = 0, 108, 115
-_SET_INTERVAL: Final = 511
 _PERIOD: Final = 20_000
 """Requested period of a vehicle's true state (µs)."""
 _SILENT: Final = 1_000_000
 """Wall time without a true state after which it is requested again (µs)."""
 _ARDUPILOT: Final = "ardupilot"
-_GROUND_STATION: Final = (6, 8, 0, 0, 4)
-"""MAV_TYPE, MAV_AUTOPILOT (none), modes, MAV_STATE."""
+_GROUND_STATION: Final = Heartbeat(
+    OWN, mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE
+)
+_READ: Final = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_SIM_STATE,
+        mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION,
+    )
+)
 
 
 class TrueSeen:
@@ -62,11 +69,12 @@ class TruthObserver:
         self._clock = WallClock() if clock is None else clock
         self._begin = self._clock.now()
         self._next = 0
-        wanted = (_HEARTBEAT, _SIM_STATE, _HIL_STATE)
         self._codecs = {
             id(ear): Codec(
                 lambda identifier, system, component: (
-                    identifier in wanted and system in self.seen and component == 1
+                    identifier in _READ
+                    and system in self.seen
+                    and component == mavlink.MAV_COMP_ID_AUTOPILOT1
                 )
             )
             for ear in ears.values()
@@ -124,7 +132,7 @@ class TruthObserver:
                         one.rows.append((now, (east, north, up), bool(one.armed)))
                         one.received = now
                     elif isinstance(message, Heartbeat):
-                        one.armed = bool(message.base_mode & ARMED)
+                        one.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         if now >= self._next:
             self._next = now + AGAIN
             self._ask(now)
@@ -133,8 +141,12 @@ class TruthObserver:
         for system, one in self.seen.items():
             ear = self._ears[system]
             codec = self._codecs[id(ear)]
-            ear.tell(system, codec.encode(Heartbeat(OWN, *_GROUND_STATION)))
+            ear.tell(system, codec.encode(_GROUND_STATION))
             if now - one.received > _SILENT:
-                wanted = _SIM_STATE if self._flavours[system] == _ARDUPILOT else _HIL_STATE
+                wanted = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
+                if self._flavours[system] == _ARDUPILOT:
+                    wanted = mavlink.MAVLINK_MSG_ID_SIM_STATE
                 params = (float(wanted), float(_PERIOD), 0.0, 0.0, 0.0, 0.0, 0.0)
-                ear.tell(system, codec.encode(CommandLong(OWN, system, 1, _SET_INTERVAL, 0, params)))
+                whom = system, mavlink.MAV_COMP_ID_AUTOPILOT1
+                request = CommandLong(OWN, *whom, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, params)
+                ear.tell(system, codec.encode(request))

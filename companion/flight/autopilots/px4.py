@@ -5,22 +5,24 @@ The altitude of the take-off is above mean sea level.
 
 from __future__ import annotations
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.flight.autopilots import Loop, Profile, Step
 
 _HOLD = 4 << 16 | 3 << 24
 
 PX4 = Profile(
     name="PX4",
-    autopilot=12,
-    estimator_message=230,
+    autopilot=mavlink.MAV_AUTOPILOT_PX4,
+    estimator_message=mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
     steps=(Step.ARM, Step.TAKEOFF, Step.MODE),
-    mode_params=(1.0, 6.0, 0.0),
+    mode_params=(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, 6.0, 0.0),
     guided_custom_mode=6 << 16,
     guided_name="OFFBOARD",
     setpoint_mask=0,
     streams_first=True,
     takeoff_absolute=True,
-    hold_params=(1.0, 4.0, 3.0),
+    hold_params=(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, 4.0, 3.0),
     hold_mode=_HOLD,
     hold_name="HOLD",
     # Auto land, and precision landing.

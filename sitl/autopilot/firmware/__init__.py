@@ -17,21 +17,6 @@ from sitl.config.autopilot import AutopilotConfig
 from sitl.values.setpoints import Pose, Reading, Setpoint
 from sitl.vehicle.battery import Charge
 
-# MAV_RESULT
-ACCEPTED: Final = 0
-TEMPORARILY_REJECTED: Final = 1
-DENIED: Final = 2
-UNSUPPORTED: Final = 3
-FAILED: Final = 4
-
-# MAV_MODE_FLAG
-CUSTOM: Final = 0x01
-AUTO: Final = 0x04
-GUIDED_FLAG: Final = 0x08
-STABILIZED: Final = 0x10
-MANUAL: Final = 0x40
-ARMED: Final = 0x80
-
 
 class Mode(Enum):
     """Meaning of a mode; a flavour gives it its number."""

@@ -5,18 +5,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import SetpointAttitude, SetpointLocal, Vector
 from sitl.autopilot.attitude_setpoints import climbing
 from sitl.autopilot.fences import Rules
 from sitl.autopilot.firmware import (
     ACTIONS,
-    CUSTOM,
-    DENIED,
-    FAILED,
-    GUIDED_FLAG,
-    MANUAL,
-    STABILIZED,
-    TEMPORARILY_REJECTED,
     Denial,
     Mode,
     Status,
@@ -27,15 +22,9 @@ from sitl.autopilot.firmware import (
 from sitl.config.autopilot import AutopilotConfig
 from sitl.values.setpoints import (
     ACCELERATION,
-    BODY_NED,
-    BODY_OFFSET_NED,
     IGNORE_ACCELERATION,
     IGNORE_POSITION,
     IGNORE_VELOCITY,
-    IGNORE_YAW,
-    IGNORE_YAW_RATE,
-    LOCAL_NED,
-    LOCAL_OFFSET_NED,
     POSITION,
     VELOCITY,
     ZERO,
@@ -49,41 +38,36 @@ from sitl.values.setpoints import (
 )
 from sitl.vehicle.battery import Charge
 
-_NUMBERS: Final = {
-    Mode.STANDBY: 0,
-    Mode.GUIDED: 4,
-    Mode.TAKEOFF: 4,
-    Mode.POSITION: 5,
-    Mode.MISSION: 3,
-    Mode.RETURN: 6,
-    Mode.LAND: 9,
-    Mode.HOLD: 17,
-    Mode.FOLLOW: 23,
+_NUMBERS: Final[dict[Mode, int]] = {
+    Mode.STANDBY: mavlink.COPTER_MODE_STABILIZE,
+    Mode.MISSION: mavlink.COPTER_MODE_AUTO,
+    Mode.GUIDED: mavlink.COPTER_MODE_GUIDED,
+    Mode.TAKEOFF: mavlink.COPTER_MODE_GUIDED,
+    Mode.POSITION: mavlink.COPTER_MODE_LOITER,
+    Mode.RETURN: mavlink.COPTER_MODE_RTL,
+    Mode.LAND: mavlink.COPTER_MODE_LAND,
+    Mode.HOLD: mavlink.COPTER_MODE_BRAKE,
+    Mode.FOLLOW: mavlink.COPTER_MODE_FOLLOW,
 }
-_MODES: Final = {
-    0: Mode.STANDBY,
-    3: Mode.MISSION,
-    4: Mode.GUIDED,
-    5: Mode.POSITION,
-    6: Mode.RETURN,
-    9: Mode.LAND,
-    17: Mode.HOLD,
-    23: Mode.FOLLOW,
-}
+_MODES: Final = {number: mode for mode, number in _NUMBERS.items() if mode is not Mode.TAKEOFF}
 _NAMES: Final = {Mode.MISSION: "AUTO", Mode.RETURN: "RTL", Mode.HOLD: "BRAKE"}
 _NOT_ARMABLE: Final = (Mode.LAND, Mode.HOLD, Mode.MISSION, Mode.RETURN, Mode.FOLLOW)
-_FRAMES: Final = (LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED)
+_FRAMES: Final = (
+    mavlink.MAV_FRAME_LOCAL_NED,
+    mavlink.MAV_FRAME_LOCAL_OFFSET_NED,
+    mavlink.MAV_FRAME_BODY_NED,
+    mavlink.MAV_FRAME_BODY_OFFSET_NED,
+)
 _TRIPLES: Final = (IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION)
 
 
 class ArduPilot:
     """Dialect and rules of ArduCopter.
 
-    Modes: STABILIZE 0, AUTO 3, GUIDED 4, LOITER 5, RTL 6, LAND 9, BRAKE 17, FOLLOW 23. The force bit of a
-    set-point has no effect, because MAVProxy's velocity command sets it.
+    The force bit of a set-point has no effect, because MAVProxy's velocity command sets it.
     """
 
-    autopilot = 3
+    autopilot = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     boot_mode = Mode.STANDBY
     stream_first = False
     stops = True
@@ -99,7 +83,7 @@ class ArduPilot:
     after_return = Mode.RETURN
     after_mission = Mode.MISSION
     # The acknowledgement names the id of the message as if it were a command's.
-    set_mode_ack = 11
+    set_mode_ack = mavlink.MAVLINK_MSG_ID_SET_MODE
     first_item = 1
     start_arms = False
     after_loss = Mode.GUIDED
@@ -129,11 +113,11 @@ class ArduPilot:
         self.fence_rules = Rules(
             fence.enabled == "on",
             False,
-            limit(fence.height, 100.0) if kinds & 1 else math.inf,
-            limit(fence.radius, 300.0) if kinds & 2 else math.inf,
+            limit(fence.height, 100.0) if kinds & mavlink.FENCE_TYPE_ALT_MAX else math.inf,
+            limit(fence.radius, 300.0) if kinds & mavlink.FENCE_TYPE_CIRCLE else math.inf,
             fence.action or "return",
-            areas=bool(kinds & 4),
-            floor=fence.floor if kinds & 8 else -math.inf,
+            areas=bool(kinds & mavlink.FENCE_TYPE_POLYGON),
+            floor=fence.floor if kinds & mavlink.FENCE_TYPE_ALT_MIN else -math.inf,
         )
 
     def custom_mode(self, mode: Mode) -> int:
@@ -142,8 +126,14 @@ class ArduPilot:
 
     def base_mode(self, mode: Mode) -> int:
         """Return HEARTBEAT.base_mode without the armed bit."""
-        guided = GUIDED_FLAG if mode not in (Mode.STANDBY, Mode.POSITION) else 0
-        return CUSTOM | STABILIZED | MANUAL | guided
+        flags: int = (
+            mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+            | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
+            | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+        )
+        if mode not in (Mode.STANDBY, Mode.POSITION):
+            flags |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
+        return flags
 
     def split(self, custom_mode: int, /) -> tuple[int, int]:
         """Return ``custom_mode`` as the two parameters of DO_SET_MODE."""
@@ -165,15 +155,15 @@ class ArduPilot:
     def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
         """Return the reason against entering ``mode`` now, or None."""
         if mode is Mode.STANDBY and status.armed and not status.landed:
-            return Denial(FAILED, "STABILIZE in flight needs a pilot")
+            return Denial(mavlink.MAV_RESULT_FAILED, "STABILIZE in flight needs a pilot")
         if mode not in (Mode.STANDBY, Mode.LAND) and not status.ready:
-            return Denial(FAILED, "Mode change failed: requires position")
+            return Denial(mavlink.MAV_RESULT_FAILED, "Mode change failed: requires position")
         if mode is Mode.FOLLOW and not self._follows:
-            return Denial(FAILED, "Mode change to FOLLOW failed: FOLL_ENABLE is 0")
+            return Denial(mavlink.MAV_RESULT_FAILED, "Mode change to FOLLOW failed: FOLL_ENABLE is 0")
         if mode is Mode.MISSION and not status.items:
-            return Denial(FAILED, "Mode change to AUTO failed: no mission")
+            return Denial(mavlink.MAV_RESULT_FAILED, "Mode change to AUTO failed: no mission")
         if mode is Mode.MISSION and status.armed and status.landed and not status.takes_off:
-            return Denial(FAILED, "Auto: Missing Takeoff Cmd")
+            return Denial(mavlink.MAV_RESULT_FAILED, "Auto: Missing Takeoff Cmd")
         return None
 
     def worry(self, charge: Charge, /) -> Worry:
@@ -190,15 +180,15 @@ class ArduPilot:
     ) -> Takeoff | Denial:
         """Decide on NAV_TAKEOFF (22) to ``altitude`` (m above home)."""
         if relative is False:
-            return Denial(DENIED, "Takeoff needs an altitude above home")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Takeoff needs an altitude above home")
         if not math.isfinite(altitude) or altitude <= 0.0:
-            return Denial(FAILED, "Takeoff needs a positive altitude")
+            return Denial(mavlink.MAV_RESULT_FAILED, "Takeoff needs a positive altitude")
         if status.mode is not Mode.GUIDED:
-            return Denial(FAILED, "Takeoff needs GUIDED mode")
+            return Denial(mavlink.MAV_RESULT_FAILED, "Takeoff needs GUIDED mode")
         if not status.armed:
-            return Denial(FAILED, "Takeoff needs armed motors")
+            return Denial(mavlink.MAV_RESULT_FAILED, "Takeoff needs armed motors")
         if not status.landed and not status.taking_off:
-            return Denial(TEMPORARILY_REJECTED, "Takeoff refused: already flying")
+            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Takeoff refused: already flying")
         return Takeoff(altitude, Mode.GUIDED)
 
     def read(self, message: SetpointLocal, here: Pose) -> Reading:
@@ -215,16 +205,16 @@ class ArduPilot:
             return Stop(f"Set-point stops: mask 0x{message.type_mask:X}")
 
         level = POSITION if position else VELOCITY if velocity else ACCELERATION
-        body = message.frame in (BODY_NED, BODY_OFFSET_NED)
+        body = message.frame in (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED)
         turn = here.yaw if body else 0.0
-        yaw = None if mask & IGNORE_YAW else message.yaw + turn
+        yaw = None if mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE else message.yaw + turn
         return Setpoint(
             (level, level, level),
             _placed(message, here) if position else ZERO,
             _turned(message.velocity, turn) if velocity else ZERO,
             _turned(message.acceleration, turn) if acceleration else ZERO,
             yaw,
-            None if mask & IGNORE_YAW_RATE else message.yaw_rate,
+            None if mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE else message.yaw_rate,
             complete=position and velocity,
         )
 
@@ -257,9 +247,9 @@ def _placed(message: SetpointLocal, here: Pose) -> Vector:
     Frame 1 counts from the origin; frame 7 from here, along north and east; frames 8 and 9 from here, along
     the body's axes.
     """
-    if message.frame == LOCAL_NED:
+    if message.frame == mavlink.MAV_FRAME_LOCAL_NED:
         return message.position
-    turn = 0.0 if message.frame == LOCAL_OFFSET_NED else here.yaw
+    turn = 0.0 if message.frame == mavlink.MAV_FRAME_LOCAL_OFFSET_NED else here.yaw
     dx, dy, dz = _turned(message.position, turn)
     x, y, z = here.position
     return x + dx, y + dy, z + dz

@@ -5,18 +5,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import SetpointAttitude, SetpointLocal, Vector
 from sitl.autopilot.attitude_setpoints import thrusting
 from sitl.autopilot.fences import Rules
 from sitl.autopilot.firmware import (
     ACTIONS,
-    AUTO,
-    CUSTOM,
-    DENIED,
-    GUIDED_FLAG,
-    MANUAL,
-    STABILIZED,
-    TEMPORARILY_REJECTED,
     Denial,
     Mode,
     Status,
@@ -27,12 +22,7 @@ from sitl.autopilot.firmware import (
 from sitl.config.autopilot import AutopilotConfig
 from sitl.values.setpoints import (
     ACCELERATION,
-    BODY_NED,
-    FORCE,
     IGNORE_POSITION,
-    IGNORE_YAW,
-    IGNORE_YAW_RATE,
-    LOCAL_NED,
     POSITION,
     VELOCITY,
     Pose,
@@ -68,7 +58,7 @@ class Px4:
     is main << 16 | sub << 24.
     """
 
-    autopilot = 12
+    autopilot = mavlink.MAV_AUTOPILOT_PX4
     boot_mode = Mode.HOLD
     stream_first = True
     stops = False
@@ -83,7 +73,7 @@ class Px4:
     after_return = Mode.HOLD
     after_mission = Mode.HOLD
     # PX4 turns SET_MODE into a DO_SET_MODE.
-    set_mode_ack = 176
+    set_mode_ack = mavlink.MAV_CMD_DO_SET_MODE
     first_item = 0
     start_arms = True
     # EKF2_NOAID_TOUT.
@@ -118,9 +108,12 @@ class Px4:
 
     def base_mode(self, mode: Mode) -> int:
         """Return HEARTBEAT.base_mode without the armed bit."""
+        flags: int = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
         if mode in (Mode.STANDBY, Mode.POSITION):
-            return CUSTOM | STABILIZED | MANUAL
-        return CUSTOM | STABILIZED | (0 if mode is Mode.GUIDED else GUIDED_FLAG | AUTO)
+            flags |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+        elif mode is not Mode.GUIDED:
+            flags |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED | mavlink.MAV_MODE_FLAG_AUTO_ENABLED
+        return flags
 
     def split(self, custom_mode: int, /) -> tuple[int, int]:
         """Return ``custom_mode`` as the two parameters of DO_SET_MODE."""
@@ -144,11 +137,15 @@ class Px4:
         """Return the reason against entering ``mode`` now, or None."""
         # Any mode can be chosen while disarmed; the stream is then checked at arming.
         if mode is Mode.GUIDED and status.armed and not _streaming(status):
-            return Denial(TEMPORARILY_REJECTED, "OFFBOARD needs set-points at more than 2 Hz")
+            return Denial(
+                mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "OFFBOARD needs set-points at more than 2 Hz"
+            )
         if not status.ready and (status.landed or mode is not Mode.LAND):
-            return Denial(TEMPORARILY_REJECTED, "Mode change refused: no position estimate")
+            return Denial(
+                mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Mode change refused: no position estimate"
+            )
         if mode is Mode.MISSION and not status.items:
-            return Denial(TEMPORARILY_REJECTED, "Mode change refused: no valid mission")
+            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Mode change refused: no valid mission")
         return None
 
     def worry(self, charge: Charge, /) -> Worry:
@@ -165,9 +162,9 @@ class Px4:
     ) -> Takeoff | Denial:
         """Decide on NAV_TAKEOFF (22) to ``altitude`` (m above home if ``relative``, else above sea level)."""
         if not status.ready:
-            return Denial(TEMPORARILY_REJECTED, "Takeoff refused: no position estimate")
+            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Takeoff refused: no position estimate")
         if math.isinf(altitude):
-            return Denial(DENIED, "Takeoff altitude is not finite")
+            return Denial(mavlink.MAV_RESULT_DENIED, "Takeoff altitude is not finite")
         height = altitude if relative else altitude - ground
         if not status.landed and not status.taking_off:
             height = height if height > status.height else status.height
@@ -179,11 +176,11 @@ class Px4:
         mask = message.type_mask
         if fault := unusable(message, mask):
             return Refusal(fault)
-        if mask & FORCE:
+        if mask & mavlink.POSITION_TARGET_TYPEMASK_FORCE_SET:
             return Refusal("Set-point refused: force is not supported")
-        if message.frame not in (LOCAL_NED, BODY_NED):
+        if message.frame not in (mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_BODY_NED):
             return Refusal(f"Set-point refused: frame {message.frame}")
-        if message.frame == BODY_NED and mask & IGNORE_POSITION != IGNORE_POSITION:
+        if message.frame == mavlink.MAV_FRAME_BODY_NED and mask & IGNORE_POSITION != IGNORE_POSITION:
             return Refusal("Set-point refused: position in a body frame")
         positions, velocities, accelerations = (_used(mask, shift) for shift in (0, 3, 6))
         if any(used[0] != used[1] for used in (positions, velocities, accelerations)):
@@ -192,14 +189,14 @@ class Px4:
         if None in levels:
             return Refusal(f"Set-point refused: an axis is free, mask 0x{mask:X}")
 
-        turn = here.yaw if message.frame == BODY_NED else 0.0
+        turn = here.yaw if message.frame == mavlink.MAV_FRAME_BODY_NED else 0.0
         return Setpoint(
             levels,  # type: ignore[arg-type]
             _where(positions, message.position),
             rotated(_where(velocities, message.velocity), turn),
             rotated(_where(accelerations, message.acceleration), turn),
-            None if mask & IGNORE_YAW else message.yaw,
-            None if mask & IGNORE_YAW_RATE else message.yaw_rate,
+            None if mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE else message.yaw,
+            None if mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE else message.yaw_rate,
             complete=all(positions) and all(velocities),
         )
 

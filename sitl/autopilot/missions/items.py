@@ -6,53 +6,68 @@ import math
 from enum import IntEnum
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
+from sitl.values.home import ABOVE_HOME, ABOVE_SEA
+
 
 class Type(IntEnum):
     """Values of MAV_MISSION_TYPE."""
 
-    MISSION = 0
-    FENCE = 1
-    RALLY = 2
+    MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+    FENCE = mavlink.MAV_MISSION_TYPE_FENCE
+    RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 
 
-ALL: Final = 255
-
-# MAV_MISSION_RESULT
-ACCEPTED: Final = 0
-ERROR: Final = 1
-UNSUPPORTED_FRAME: Final = 2
-UNSUPPORTED: Final = 3
-NO_SPACE: Final = 4
-INVALID: Final = 5
-INVALID_PARAM: Final = (6, 7, 8, 9, 10, 11, 12)
-"""Results for parameters 1 to 7."""
-INVALID_SEQUENCE: Final = 13
-DENIED: Final = 14
-CANCELLED: Final = 15
-
-# MAV_CMD
-WAYPOINT: Final = 16
-LOITER_UNLIMITED: Final = 17
-LOITER_TIME: Final = 19
-RETURN: Final = 20
-LAND: Final = 21
-TAKEOFF: Final = 22
-DELAY: Final = 93
-JUMP: Final = 177
-CHANGE_SPEED: Final = 178
-FLOWN: Final = frozenset((WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, RETURN, LAND, TAKEOFF, DELAY))
+FLOWN: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_WAYPOINT,
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+        mavlink.MAV_CMD_NAV_LOITER_TIME,
+        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_NAV_DELAY,
+    )
+)
 """NAV commands: items that take time."""
 # Commands for cameras and gimbals, which do not exist: accepted as by real firmwares, and skipped.
-_PAYLOAD: Final = frozenset((203, 205, 206, 530, 1000, 1001, 2000, 2001, 2500, 2501))
-_PLACED: Final = FLOWN - {RETURN, DELAY}
-# Fence: return point, inclusion and exclusion polygons, inclusion and exclusion circles
-_FENCE_RETURN, _POLYGONS, _CIRCLES = 5000, (5001, 5002), (5003, 5004)
-_RALLY: Final = 5100
+_PAYLOAD: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+        mavlink.MAV_CMD_SET_CAMERA_MODE,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
+    )
+)
+_IMMEDIATE: Final = _PAYLOAD | {mavlink.MAV_CMD_DO_JUMP, mavlink.MAV_CMD_DO_CHANGE_SPEED}
+_PLACED: Final = FLOWN - {mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, mavlink.MAV_CMD_NAV_DELAY}
+PAUSING: Final = (
+    mavlink.MAV_CMD_NAV_WAYPOINT,
+    mavlink.MAV_CMD_NAV_LOITER_TIME,
+    mavlink.MAV_CMD_NAV_DELAY,
+)
+"""Items whose parameter 1 is a time to wait (s)."""
+POLYGONS: Final = (
+    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+)
+CIRCLES: Final = (
+    mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION,
+    mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
+)
+_KNOWN: Final = {
+    Type.FENCE: (mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT, *POLYGONS, *CIRCLES),
+    Type.RALLY: (mavlink.MAV_CMD_NAV_RALLY_POINT,),
+}
 
-# MAV_FRAME: above mean sea level, above home; with float and integer coordinates
-ABOVE_SEA: Final = frozenset((0, 5))
-ABOVE_HOME: Final = frozenset((3, 6))
-
+# INT32_MAX as a coordinate: the vehicle's position.
 NOWHERE: Final = 0x7FFFFFFF
 _LAST: Final = 900_000_000, 1_800_000_000
 _HIGHEST: Final = 10_000.0
@@ -79,60 +94,71 @@ class Item(NamedTuple):
 
 def fault(item: Item, of: Type) -> int:
     """Return the MAV_MISSION_RESULT that refuses ``item`` in a plan of type ``of``, or ACCEPTED."""
-    if of is Type.MISSION:
-        return _mission_fault(item)
-    known = (_RALLY,) if of is Type.RALLY else (_FENCE_RETURN, *_POLYGONS, *_CIRCLES)
-    if item.command not in known:
-        return UNSUPPORTED
-    first = item.params[0]
-    if item.command in _POLYGONS and not _FEWEST <= first <= 0xFFFF:
-        return INVALID_PARAM[0]
-    if item.command in _CIRCLES and not 0.0 < first < math.inf:
-        return INVALID_PARAM[0]
-    return _place_fault(item)
+    return _mission_fault(item) if of is Type.MISSION else _area_fault(item, of)
 
 
 def whole_fault(items: tuple[Item, ...], of: Type) -> int:
     """Return the MAV_MISSION_RESULT of the checks that need all items of a plan, or ACCEPTED."""
     at = 0
-    while at < len(items):
-        item = items[at]
-        if of is Type.MISSION and item.command == JUMP and not 0 <= item.params[0] < len(items):
-            return INVALID_PARAM[0]
-        if of is Type.FENCE and item.command in _POLYGONS:
-            corners = items[at : at + int(item.params[0])]
+    result: int = mavlink.MAV_MISSION_ACCEPTED
+    while at < len(items) and result == mavlink.MAV_MISSION_ACCEPTED:
+        item, count = items[at], 1
+        jumps = of is Type.MISSION and item.command == mavlink.MAV_CMD_DO_JUMP
+        if jumps and not 0 <= item.params[0] < len(items):
+            result = mavlink.MAV_MISSION_INVALID_PARAM1
+        if of is Type.FENCE and item.command in POLYGONS:
+            count = int(item.params[0])
+            corners = items[at : at + count]
             if len(corners) < item.params[0] or any(
                 (corner.command, corner.params[0]) != (item.command, item.params[0]) for corner in corners
             ):
-                return INVALID_PARAM[0]
-            at += len(corners)
-            continue
-        at += 1
-    return ACCEPTED
+                result = mavlink.MAV_MISSION_INVALID_PARAM1
+        at += count
+    return result
 
 
 def _mission_fault(item: Item) -> int:
     command, first, second = item.command, *item.params[:2]
-    if command not in FLOWN and command not in (JUMP, CHANGE_SPEED) and command not in _PAYLOAD:
-        return UNSUPPORTED
-    if command in (WAYPOINT, LOITER_TIME, DELAY) and not (math.isnan(first) or 0.0 <= first <= _LONGEST):
-        return INVALID_PARAM[0]
-    if command == JUMP and not abs(second) <= 0x7FFF:
-        return INVALID_PARAM[1]
-    if command == CHANGE_SPEED and not (math.isnan(second) or abs(second) <= 1000.0):
-        return INVALID_PARAM[1]
-    return _place_fault(item) if command in _PLACED else ACCEPTED
+    result: int = mavlink.MAV_MISSION_ACCEPTED
+    if command not in FLOWN | _IMMEDIATE:
+        result = mavlink.MAV_MISSION_UNSUPPORTED
+    elif command in PAUSING and not (math.isnan(first) or 0.0 <= first <= _LONGEST):
+        result = mavlink.MAV_MISSION_INVALID_PARAM1
+    elif (command == mavlink.MAV_CMD_DO_JUMP and not abs(second) <= 0x7FFF) or (
+        command == mavlink.MAV_CMD_DO_CHANGE_SPEED and not (math.isnan(second) or abs(second) <= 1000.0)
+    ):
+        result = mavlink.MAV_MISSION_INVALID_PARAM2
+    elif command in _PLACED:
+        result = _place_fault(item)
+    return result
+
+
+def _area_fault(item: Item, of: Type) -> int:
+    """Return the fault of an item of a fence, or of a rally point."""
+    first = item.params[0]
+    result: int
+    if item.command not in _KNOWN[of]:
+        result = mavlink.MAV_MISSION_UNSUPPORTED
+    elif (item.command in POLYGONS and not _FEWEST <= first <= 0xFFFF) or (
+        item.command in CIRCLES and not 0.0 < first < math.inf
+    ):
+        result = mavlink.MAV_MISSION_INVALID_PARAM1
+    else:
+        result = _place_fault(item)
+    return result
 
 
 def _place_fault(item: Item) -> int:
+    lands = item.command == mavlink.MAV_CMD_NAV_LAND
+    placed = not (lands or item.command == mavlink.MAV_CMD_NAV_TAKEOFF) or not item.here
+    result: int = mavlink.MAV_MISSION_ACCEPTED
     if item.frame not in ABOVE_SEA | ABOVE_HOME:
-        return UNSUPPORTED_FRAME
-    if item.command not in (TAKEOFF, LAND) or not item.here:
-        if abs(item.x) > _LAST[0]:
-            return INVALID_PARAM[4]
-        if abs(item.y) > _LAST[1]:
-            return INVALID_PARAM[5]
+        result = mavlink.MAV_MISSION_UNSUPPORTED_FRAME
+    elif placed and abs(item.x) > _LAST[0]:
+        result = mavlink.MAV_MISSION_INVALID_PARAM5_X
+    elif placed and abs(item.y) > _LAST[1]:
+        result = mavlink.MAV_MISSION_INVALID_PARAM6_Y
     # The height may be NaN only for a landing, which does not use it.
-    if not abs(item.z) <= _HIGHEST and not (item.command == LAND and math.isnan(item.z)):
-        return INVALID_PARAM[6]
-    return ACCEPTED
+    elif not abs(item.z) <= _HIGHEST and not (lands and math.isnan(item.z)):
+        result = mavlink.MAV_MISSION_INVALID_PARAM7
+    return result

@@ -11,27 +11,20 @@ import math
 from enum import Enum
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import Vector
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.missions.items import (
-    ABOVE_HOME,
-    CHANGE_SPEED,
-    DELAY,
     FLOWN,
-    JUMP,
-    LAND,
-    LOITER_TIME,
-    LOITER_UNLIMITED,
-    RETURN,
-    TAKEOFF,
-    WAYPOINT,
+    PAUSING,
     Item,
     Type,
 )
 from sitl.autopilot.missions.plans import Plans
 from sitl.config.autopilot import AutopilotConfig
 from sitl.estimation.sensors import Estimate
-from sitl.values.home import Home
+from sitl.values.home import ABOVE_HOME, Home
 from sitl.values.origin import Origin
 
 # Distance (m) at which a height counts as reached.
@@ -39,8 +32,8 @@ _LEVEL: Final = 0.3
 # Distance (m) below which there is no bearing to turn to.
 _NEAR: Final = 1.0
 _FOR_EVER: Final = -1
-# SPEED_TYPE of air and ground speed, which are equal because plans ignore wind.
-_SPEEDS: Final = (0.0, 1.0)
+# Air and ground speed are equal, because plans ignore wind.
+_SPEEDS: Final = (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED)
 
 
 class Phase(Enum):
@@ -122,7 +115,7 @@ class Itinerary:
     def takes_off(self) -> bool:
         """Whether the first item to fly is a takeoff."""
         flown = [item.command for item in self._items[self._first :] if item.command in FLOWN]
-        return flown[:1] == [TAKEOFF]
+        return flown[:1] == [mavlink.MAV_CMD_NAV_TAKEOFF]
 
     def rewind(self) -> None:
         """Return to the beginning, at rest."""
@@ -194,9 +187,9 @@ class Itinerary:
 
     def _do(self, item: Item) -> None:
         first, second = item.params[:2]
-        if item.command == CHANGE_SPEED and first in _SPEEDS and second > 0.0:
+        if item.command == mavlink.MAV_CMD_DO_CHANGE_SPEED and first in _SPEEDS and second > 0.0:
             self._speed = second
-        if item.command == JUMP:
+        if item.command == mavlink.MAV_CMD_DO_JUMP:
             done = self._jumps.get(self.current, 0)
             if second == _FOR_EVER or done < second:
                 self._jumps[self.current] = done + 1
@@ -206,9 +199,9 @@ class Itinerary:
 
     def _depart(self, item: Item, here: Estimate) -> Event | None:
         guidance = self._guidance
-        if guidance.activity is Activity.IDLE and (self._px4 or item.command == TAKEOFF):
+        if guidance.activity is Activity.IDLE and (self._px4 or item.command == mavlink.MAV_CMD_NAV_TAKEOFF):
             height = self._config.takeoff_height + self._home.height
-            if item.command == TAKEOFF:
+            if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
                 height = max(self._height(item), 0.1)
             self._target = (here.position[0], here.position[1], -height)
             guidance.takeoff(height, here.pose)
@@ -220,11 +213,11 @@ class Itinerary:
         """Start flying to the current item, in the air."""
         item = self._items[self.current]
         match item.command:
-            case command if command == RETURN:
+            case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
                 self.reached.append(self.current)
                 self.phase = Phase.DONE
                 return Event.RETURNS
-            case command if command == DELAY:
+            case mavlink.MAV_CMD_NAV_DELAY:
                 self._guidance.hold()
                 self._target = here.position
             case _:
@@ -236,11 +229,11 @@ class Itinerary:
 
     def _arrive(self, now: int) -> Event | None:
         item = self._items[self.current]
-        pause = item.params[0] if item.command in (WAYPOINT, LOITER_TIME, DELAY) else 0.0
-        if item.command == LAND:
+        pause = item.params[0] if item.command in PAUSING else 0.0
+        if item.command == mavlink.MAV_CMD_NAV_LAND:
             self._guidance.land(self._config.land_speed)
             self.phase = Phase.LANDING
-        elif item.command != LOITER_UNLIMITED:
+        elif item.command != mavlink.MAV_CMD_NAV_LOITER_UNLIM:
             self._until = now + (round(pause * 1e6) if pause > 0.0 else 0)
             self.phase = Phase.WAITING
         return None
@@ -258,15 +251,15 @@ class Itinerary:
 
     def _is_there(self, here: Estimate) -> bool:
         item = self._items[self.current]
-        if item.command == TAKEOFF:
+        if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
             return self._is_high(here)
-        if item.command == LAND:
+        if item.command == mavlink.MAV_CMD_NAV_LAND:
             # The descent may begin at any height.
             return math.dist(here.position[:2], self._target[:2]) <= min(0.3, self._config.acceptance_radius)
         return math.dist(here.position, self._target) <= self._radius(item)
 
     def _radius(self, item: Item) -> float:
-        own = item.params[1] if self._px4 and item.command == WAYPOINT else 0.0
+        own = item.params[1] if self._px4 and item.command == mavlink.MAV_CMD_NAV_WAYPOINT else 0.0
         return own if 0.0 < own < math.inf else self._config.acceptance_radius
 
     def _height(self, item: Item) -> float:
@@ -277,10 +270,12 @@ class Itinerary:
     def _place(self, item: Item, here: Estimate) -> Vector:
         """Return the destination of an item (m, local NED)."""
         north, east, down = here.position
-        if item.command == LAND or item.command == TAKEOFF:
-            if item.here or item.command == TAKEOFF:
+        if item.command == mavlink.MAV_CMD_NAV_LAND or item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
+            if item.here or item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
                 # A takeoff in the air climbs or stays.
-                return north, east, down if item.command == LAND else min(down, -self._height(item))
+                if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
+                    down = min(down, -self._height(item))
+                return north, east, down
             x, y, _ = self._origin.local(item.x / 1e7, item.y / 1e7, self._origin.altitude)
             return x, y, down
         if item.here:
@@ -300,7 +295,7 @@ class Itinerary:
 
     def _yaw(self, item: Item, here: Estimate) -> float | None:
         """Return the yaw (rad): along the leg, or PX4's parameter 4 (degrees)."""
-        if self._px4 and math.isfinite(item.params[3]) and item.command != LAND:
+        if self._px4 and math.isfinite(item.params[3]) and item.command != mavlink.MAV_CMD_NAV_LAND:
             return math.radians(item.params[3])
         north, east = self._target[0] - here.position[0], self._target[1] - here.position[1]
         return math.atan2(east, north) if math.hypot(north, east) > _NEAR else None

@@ -7,7 +7,9 @@ from collections.abc import Callable
 from struct import Struct
 from typing import Final
 
-from sitl.autopilot.missions.items import ACCEPTED, Item, Type, fault, whole_fault
+from pymavlink.dialects.v20 import all as mavlink
+
+from sitl.autopilot.missions.items import Item, Type, fault, whole_fault
 
 _ITEM: Final = Struct("<BHB4fiif")
 
@@ -21,8 +23,8 @@ class Plans:
         self._items: dict[Type, tuple[Item, ...]] = dict.fromkeys(Type, ())
         self._identities: dict[Type, int] = {}
         for of, items in zip(Type, saved, strict=False):
-            sound = all(fault(item, of) == ACCEPTED for item in items)
-            if sound and whole_fault(items, of) == ACCEPTED:
+            sound = all(fault(item, of) == mavlink.MAV_MISSION_ACCEPTED for item in items)
+            if sound and whole_fault(items, of) == mavlink.MAV_MISSION_ACCEPTED:
                 self._items[of] = items
 
     def items(self, of: Type) -> tuple[Item, ...]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
+
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import (
     Message,
@@ -24,22 +26,15 @@ from mavlink_bridge.messages import (
 )
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.commander import Commander
-from sitl.autopilot.firmware import DENIED, Denial, Mode
+from sitl.autopilot.firmware import Denial, Mode
 from sitl.autopilot.missions.items import Type
 from sitl.autopilot.missions.itinerary import Itinerary, Phase
 from sitl.autopilot.missions.plans import Plans
 from sitl.autopilot.missions.transfer import Transfer
-from sitl.telemetry import status_reports as q
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
 
-# MAV_CMD
-RETURN: Final = 20
-SET_CURRENT: Final = 224
-START: Final = 300
-
-# MISSION_STATE: no mission, not started, active, paused, complete; MISSION_CURRENT.mission_mode
-_NONE, _NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
+# MISSION_CURRENT.mission_mode
 _IN_MODE, _SUSPENDED = 1, 2
 
 
@@ -81,9 +76,9 @@ class MissionService:
             MissionSetCurrent: self._set_current,
         }
         self.commands: dict[int, Handler] = {
-            RETURN: self._return,
-            SET_CURRENT: self._order_current,
-            START: self._start,
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,
+            mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self._order_current,
+            mavlink.MAV_CMD_MISSION_START: self._start,
         }
 
     def tell(self) -> None:
@@ -92,20 +87,20 @@ class MissionService:
         if reached:
             self._outbox += [MissionItemReached(self._source, seq) for seq in reached]
             reached.clear()
-            self._telemetry.request(q.MISSION_CURRENT)
+            self._telemetry.request(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
 
     def current(self) -> MissionCurrent:
         """Return MISSION_CURRENT (42)."""
         itinerary, plans = self._itinerary, self._plans
         flying = self._commander.mode is Mode.MISSION
         if not itinerary.total:
-            state = _NONE
+            state = mavlink.MISSION_STATE_NO_MISSION
         elif itinerary.phase is Phase.DONE:
-            state = _COMPLETE
+            state = mavlink.MISSION_STATE_COMPLETE
         elif flying and self._commander.armed:
-            state = _ACTIVE
+            state = mavlink.MISSION_STATE_ACTIVE
         else:
-            state = _PAUSED if itinerary.begun else _NOT_STARTED
+            state = mavlink.MISSION_STATE_PAUSED if itinerary.begun else mavlink.MISSION_STATE_NOT_STARTED
         ids = (plans.identity(of) for of in Type)
         mode = _IN_MODE if flying else _SUSPENDED
         return MissionCurrent(self._source, itinerary.current, itinerary.total, state, mode, *ids)
@@ -116,7 +111,7 @@ class MissionService:
     def _set_current(self, message: MissionSetCurrent, now: int) -> None:
         if not self._itinerary.select(message.seq):
             self._voice.complain(f"No mission item {message.seq}", now)
-        self._telemetry.request(q.MISSION_CURRENT)
+        self._telemetry.request(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
 
     def _order_current(self, order: Order) -> Denial | None:
         """Execute DO_SET_MISSION_CURRENT.
@@ -127,8 +122,8 @@ class MissionService:
         if anew == 1.0:
             self._itinerary.rewind()
         if seq != -1.0 and not (math.isfinite(seq) and self._itinerary.select(int(seq))):
-            return Denial(DENIED, f"No mission item {seq:.0f}")
-        self._telemetry.request(q.MISSION_CURRENT)
+            return Denial(mavlink.MAV_RESULT_DENIED, f"No mission item {seq:.0f}")
+        self._telemetry.request(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
         return None
 
     def _start(self, order: Order) -> Denial | None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import (
     Message,
     MissionAck,
@@ -19,17 +21,6 @@ from mavlink_bridge.messages import (
     Source,
 )
 from sitl.autopilot.missions.items import (
-    ABOVE_HOME,
-    ABOVE_SEA,
-    ACCEPTED,
-    ALL,
-    CANCELLED,
-    DENIED,
-    ERROR,
-    INVALID_PARAM,
-    INVALID_SEQUENCE,
-    NO_SPACE,
-    UNSUPPORTED,
     Item,
     Type,
     fault,
@@ -37,6 +28,7 @@ from sitl.autopilot.missions.items import (
 )
 from sitl.autopilot.missions.plans import Plans
 from sitl.telemetry.status_text import StatusReporter
+from sitl.values.home import ABOVE_HOME, ABOVE_SEA
 
 CAPACITY: Final = 724
 """Greatest number of items of a plan, the capacity of ArduCopter's mission."""
@@ -86,7 +78,7 @@ class Transfer:
         if of is None or self._is_busy(message.source, of):
             return
         if message.total > CAPACITY:
-            self._acknowledge(message.source, of, NO_SPACE)
+            self._acknowledge(message.source, of, mavlink.MAV_MISSION_NO_SPACE)
             return
         self._begin(_Upload(message.source, of, 0, message.total, []), now)
 
@@ -96,9 +88,9 @@ class Transfer:
         if of is None or self._is_busy(message.source, of):
             return
         if self._asks_int:
-            self._acknowledge(message.source, of, UNSUPPORTED)
+            self._acknowledge(message.source, of, mavlink.MAV_MISSION_UNSUPPORTED)
         elif not 0 <= message.start <= message.end < len(self._plans.items(of)):
-            self._acknowledge(message.source, of, ERROR)
+            self._acknowledge(message.source, of, mavlink.MAV_MISSION_ERROR)
         else:
             total = message.end - message.start + 1
             self._begin(_Upload(message.source, of, message.start, total, [], partial=True), now)
@@ -107,13 +99,13 @@ class Transfer:
         """Handle MISSION_ITEM_INT (73) or MISSION_ITEM (39): the requested item or a repeated one."""
         upload = self._upload
         if upload is None or (message.source, message.mission_type) != (upload.partner, upload.of):
-            self._acknowledge(message.source, message.mission_type, DENIED)
+            self._acknowledge(message.source, message.mission_type, mavlink.MAV_MISSION_DENIED)
             return
         if message.seq != upload.first + len(upload.items):
             return
         item = _integer(message)
-        result = INVALID_PARAM[4] if item is None else fault(item, upload.of)
-        if item is None or result != ACCEPTED:
+        result = mavlink.MAV_MISSION_INVALID_PARAM5_X if item is None else fault(item, upload.of)
+        if item is None or result != mavlink.MAV_MISSION_ACCEPTED:
             self._end(result)
             return
         upload.items.append(item)
@@ -127,20 +119,20 @@ class Transfer:
         """Handle MISSION_ACK (47): the end of a download, or the abort of an upload by its sender."""
         upload = self._upload
         is_mine = upload and (message.source, message.mission_type) == (upload.partner, upload.of)
-        if is_mine and message.result != ACCEPTED:
+        if is_mine and message.result != mavlink.MAV_MISSION_ACCEPTED:
             self._upload, self.next_due = None, _NEVER
 
     def clear(self, message: MissionClearAll, _now: int) -> None:
         """Handle MISSION_CLEAR_ALL (45)."""
-        if message.mission_type == ALL:
+        if message.mission_type == mavlink.MAV_MISSION_TYPE_ALL:
             for each in Type:
                 self._plans.replace(each, ())
-            self._acknowledge(message.source, ALL, ACCEPTED)
+            self._acknowledge(message.source, mavlink.MAV_MISSION_TYPE_ALL, mavlink.MAV_MISSION_ACCEPTED)
             return
         of = self._known(message.source, message.mission_type)
         if of is not None:
             self._plans.replace(of, ())
-            self._acknowledge(message.source, of, ACCEPTED)
+            self._acknowledge(message.source, of, mavlink.MAV_MISSION_ACCEPTED)
 
     def work(self, now: int) -> None:
         """Request the missing item again, or give up."""
@@ -149,7 +141,7 @@ class Transfer:
             self.next_due = _NEVER
         elif upload.tries >= _TRIES:
             self._voice.warn("Mission upload timed out")
-            self._end(CANCELLED)
+            self._end(mavlink.MAV_MISSION_OPERATION_CANCELLED)
         else:
             self._ask(now)
 
@@ -169,7 +161,7 @@ class Transfer:
             return
         items = self._plans.items(of)
         if message.seq >= len(items):
-            self._acknowledge(message.source, of, INVALID_SEQUENCE)
+            self._acknowledge(message.source, of, mavlink.MAV_MISSION_INVALID_SEQUENCE)
             return
         item, seq = items[message.seq], message.seq
         now_flown = int(of is Type.MISSION and seq == current)
@@ -185,13 +177,13 @@ class Transfer:
     def _known(self, partner: Source, mission_type: int) -> Type | None:
         if mission_type in _KNOWN:
             return Type(mission_type)
-        self._acknowledge(partner, mission_type, UNSUPPORTED)
+        self._acknowledge(partner, mission_type, mavlink.MAV_MISSION_UNSUPPORTED)
         return None
 
     def _is_busy(self, partner: Source, of: Type) -> bool:
         if self._upload is None or self._upload.partner == partner:
             return False
-        self._acknowledge(partner, of, DENIED)
+        self._acknowledge(partner, of, mavlink.MAV_MISSION_DENIED)
         return True
 
     def _begin(self, upload: _Upload, now: int) -> None:
@@ -220,7 +212,7 @@ class Transfer:
             old = self._plans.items(upload.of)
             items = (*old[: upload.first], *items, *old[upload.first + len(items) :])
         result = whole_fault(items, upload.of)
-        if result == ACCEPTED:
+        if result == mavlink.MAV_MISSION_ACCEPTED:
             self._plans.replace(upload.of, items)
         self._end(result)
 

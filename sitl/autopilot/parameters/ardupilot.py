@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from sitl.autopilot.parameters.parameter import Bound, Kind, Parameter
 
 _I8, _I16, _I32, _F32 = Kind.INT8, Kind.INT16, Kind.INT32, Kind.REAL32
@@ -23,14 +25,14 @@ _MOTOR_1: Final = 33
 _CLASSES: Final = {4: 1, 6: 2, 8: 3}
 
 STREAMS: Final = {
-    "RAW_SENS": 1,
-    "EXT_STAT": 2,
-    "RC_CHAN": 3,
-    "RAW_CTRL": 4,
-    "POSITION": 6,
-    "EXTRA1": 10,
-    "EXTRA2": 11,
-    "EXTRA3": 12,
+    "RAW_SENS": mavlink.MAV_DATA_STREAM_RAW_SENSORS,
+    "EXT_STAT": mavlink.MAV_DATA_STREAM_EXTENDED_STATUS,
+    "RC_CHAN": mavlink.MAV_DATA_STREAM_RC_CHANNELS,
+    "RAW_CTRL": mavlink.MAV_DATA_STREAM_RAW_CONTROLLER,
+    "POSITION": mavlink.MAV_DATA_STREAM_POSITION,
+    "EXTRA1": mavlink.MAV_DATA_STREAM_EXTRA1,
+    "EXTRA2": mavlink.MAV_DATA_STREAM_EXTRA2,
+    "EXTRA3": mavlink.MAV_DATA_STREAM_EXTRA3,
 }
 """MAV_DATA_STREAM of the SR0_ parameters, which set the rates of its messages."""
 

@@ -1,4 +1,4 @@
-"""Parameter: its name, type, range and effect in the simulation."""
+"""Parameter: its name, type, range, effect in the simulation and encoding in PARAM_VALUE (22)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from enum import Enum
 from struct import Struct
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 _FLOAT: Final = Struct("<f")
+_INT: Final = Struct("<i")
 # Messages to people show the value, so an absurd number must stay short.
 _SHOWN: Final = "{:.6g}"
 
@@ -15,10 +18,10 @@ _SHOWN: Final = "{:.6g}"
 class Kind(Enum):
     """MAV_PARAM_TYPE values in use by the firmwares."""
 
-    INT8 = 2
-    INT16 = 4
-    INT32 = 6
-    REAL32 = 9
+    INT8 = mavlink.MAV_PARAM_TYPE_INT8
+    INT16 = mavlink.MAV_PARAM_TYPE_INT16
+    INT32 = mavlink.MAV_PARAM_TYPE_INT32
+    REAL32 = mavlink.MAV_PARAM_TYPE_REAL32
 
 
 _BITS: Final = {Kind.INT8: 8, Kind.INT16: 16, Kind.INT32: 32}
@@ -71,3 +74,20 @@ class Parameter(NamedTuple):
     def _held(self, end: float) -> float:
         """Return an end of the range as the type stores it: 0.03 is slightly less in float32."""
         return self.fitted(end) if math.isfinite(end) else end
+
+
+def encoded(value: float, kind: Kind, *, bytewise: bool) -> bytes:
+    """Return the four bytes of PARAM_VALUE (22) and PARAM_SET (23) for ``value``, which must fit ``kind``.
+
+    ArduPilot casts every number to float32. PX4 is ``bytewise``: it stores the bytes of an int32
+    (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE).
+    """
+    if bytewise and kind is not Kind.REAL32:
+        return _INT.pack(int(value))
+    return _FLOAT.pack(value)
+
+
+def decoded(raw: bytes, kind: Kind, *, bytewise: bool) -> float:
+    """Return the value of four bytes; it may be infinite or NaN."""
+    layout = _INT if bytewise and kind is not Kind.REAL32 else _FLOAT
+    return float(layout.unpack(raw)[0])

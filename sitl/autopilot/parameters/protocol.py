@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import (
     Message,
     ParamRequestList,
@@ -13,13 +15,12 @@ from mavlink_bridge.messages import (
     ParamValue,
     Source,
 )
-from sitl.autopilot.parameters.encoding import decoded, encoded
+from sitl.autopilot.parameters.parameter import decoded, encoded
 from sitl.autopilot.parameters.values import Values
 from sitl.telemetry.status_text import StatusReporter
 
 HASH: Final = "_HASH_CHECK"
 """PX4's name for the hash of all names and values, which lets a client reuse a list that it has."""
-_UINT32: Final = 5
 _NO_NUMBER: Final = 0xFFFF
 # A list is sent as ten messages (0.4 kB) every 10 ms: real links are slower, and no buffer overflows.
 _BURST, _PAUSE = 10, 10_000
@@ -133,4 +134,5 @@ class ParameterProtocol:
 
     def _hash(self) -> ParamValue:
         raw = self._values.digest().to_bytes(4, "little")
-        return ParamValue(self._source, raw, len(self._values), _NO_NUMBER, HASH, _UINT32)
+        kind = mavlink.MAV_PARAM_TYPE_UINT32
+        return ParamValue(self._source, raw, len(self._values), _NO_NUMBER, HASH, kind)

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from sitl.autopilot.parameters.parameter import Bound, Kind, Parameter
 
 _I, _F = Kind.INT32, Kind.REAL32
@@ -18,7 +20,11 @@ _Row = (
     | tuple[str, Kind, float, float, float, str]
 )
 # MAV_TYPE and SYS_AUTOSTART (the generic airframes) by the number of rotors.
-_VEHICLES: Final = {4: (2, 4001), 6: (13, 6001), 8: (14, 8001)}
+_VEHICLES: Final = {
+    4: (mavlink.MAV_TYPE_QUADROTOR, 4001),
+    6: (mavlink.MAV_TYPE_HEXAROTOR, 6001),
+    8: (mavlink.MAV_TYPE_OCTOROTOR, 8001),
+}
 
 BOUND: Final = {
     "MAV_SYS_ID": Bound("system_id"),

@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from operator import attrgetter
 from typing import Final
 
-from sitl.autopilot.parameters.encoding import encoded
-from sitl.autopilot.parameters.parameter import Bound, Parameter
+from sitl.autopilot.parameters.parameter import Bound, Parameter, encoded
 from sitl.config.autopilot import AutopilotConfig
 
 _ALL_ONES: Final = 0xFFFFFFFF

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.config.estimation import TrackConfig
@@ -23,6 +24,11 @@ CAMERA = Source(SYSTEM, 100)
 PHONE = Source(TARGET, 1)
 PERIOD = 100_000
 KINDS = ("global_position", "follow_target", "camera")
+MESSAGES = {
+    "global_position": mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    "follow_target": mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET,
+    "camera": mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS,
+}
 
 
 def target(kind="global_position", **more):
@@ -206,14 +212,14 @@ def test_a_header_that_is_let_through_is_one_that_may_count(kind, anyone, link, 
     settings |= {"at": (0.0, 0.0, 0.0)} if kind == "fixed" else {}
     config = CompanionConfig.model_validate({"target_source": settings})
     passes = accepts(link, SYSTEM, TARGET, config)(message, system, component)
-    of_kind = message == {"global_position": 33, "follow_target": 144, "camera": 276}.get(kind)
+    of_kind = message == MESSAGES.get(kind)
     if link == "target":
         right = system == (SYSTEM if kind == "camera" else TARGET)
         assert passes == (of_kind and (right or (anyone and kind != "camera")))
     elif link == "autopilot":
         assert passes == (of_kind and kind == "camera" and system == SYSTEM)
     elif link == "swarm":
-        assert passes == (message == 33 and system != SYSTEM)
+        assert passes == (message == mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT and system != SYSTEM)
     else:
         assert not passes
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.estimation.tracks import State
@@ -10,15 +11,7 @@ from companion.flight.state_machine import Pilot
 from companion.values.phase import Phase
 from companion.world import View
 from mavlink_bridge.messages import CommandAck, ExtendedSysState, Heartbeat, Message, Source, SysStatus
-from tests.companion.bench import (
-    ARMED,
-    AUTOPILOT,
-    FLEET,
-    PREARM_OK,
-    PROFILES,
-    START,
-    TICK,
-)
+from tests.companion.bench import AUTOPILOT, FLEET, PROFILES, START, TICK
 
 OWN = Source(11, 195)
 HEIGHT, GROUND = 6.0, 2.5
@@ -26,8 +19,9 @@ HALF = 500_000
 LOCAL = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
 FLAVOURS = tuple(PROFILES)
 IN_FLIGHT = ExtendedSysState(AUTOPILOT, 0, 2)
-HEALTHY = SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, None, None)
-ILL = SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, 0, None, None)
+_CHECKS = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+HEALTHY = SysStatus(AUTOPILOT, _CHECKS, _CHECKS, _CHECKS, None, None)
+ILL = SysStatus(AUTOPILOT, _CHECKS, _CHECKS, 0, None, None)
 
 
 def state(height=0.0, speed=0.0, age=5_000):
@@ -38,7 +32,7 @@ def beat(flavour, armed=False, guided=False, autopilot=None, mode=0):
     profile = PROFILES[flavour]
     mode = profile.guided_custom_mode if guided else mode
     kind = profile.autopilot if autopilot is None else autopilot
-    return Heartbeat(AUTOPILOT, 2, kind, ARMED * armed, mode, 4)
+    return Heartbeat(AUTOPILOT, 2, kind, mavlink.MAV_MODE_FLAG_SAFETY_ARMED * armed, mode, 4)
 
 
 def ack(command, result=0):

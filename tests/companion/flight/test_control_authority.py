@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.values.phase import Phase
-from tests.companion.bench import (
-    ARM,
-    INTERVAL,
-    MODE,
-    PROFILES,
-    REQUEST,
-    TAKEOFF,
-)
+from tests.companion.bench import PROFILES
 from tests.companion.flight.rig import (
     FLAVOURS,
     HEALTHY,
@@ -82,7 +76,7 @@ def test_a_pause_on_the_way_up_is_somebodys_will_and_the_end_of_it_is_not(flavou
     rig = climbing("px4", 0.95 * HEIGHT)
     held = beat("px4", armed=True, mode=HOLD["px4"])
     rig.view = READY._replace(own=state(HEIGHT))
-    assert MODE in {command for command, _ in rig.run(5.0, held, landed(2))}
+    assert mavlink.MAV_CMD_DO_SET_MODE in {command for command, _ in rig.run(5.0, held, landed(2))}
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -103,7 +97,11 @@ def test_a_mode_switched_away_on_the_ground_takes_the_go_back():
     rig.run(0.2, beat("ardupilot", guided=True), HEALTHY, acks=True)
     rig.run(0.2, beat("ardupilot"), HEALTHY, acks=True)
     sent = rig.run(30.0, beat("ardupilot", guided=True), HEALTHY, acks=True)
-    assert not {command for command, _ in sent} & {ARM, MODE, TAKEOFF}
+    assert not {command for command, _ in sent} & {
+        mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+        mavlink.MAV_CMD_DO_SET_MODE,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+    }
     assert rig.pilot.waiting_for == "the operator's go"
 
 
@@ -123,7 +121,11 @@ def test_a_new_go_takes_the_vehicle_back_in_flight_and_asks_for_the_mode_alone(f
     assert rig.pilot.phase is Phase.YIELDED
     assert rig.pilot.go(HEIGHT)
     sent = rig.run(3.0, beat(flavour, armed=True), HEALTHY, IN_FLIGHT, acks=True)
-    assert {command for command, _ in sent} == {INTERVAL, REQUEST, MODE}
+    assert {command for command, _ in sent} == {
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+        mavlink.MAV_CMD_REQUEST_MESSAGE,
+        mavlink.MAV_CMD_DO_SET_MODE,
+    }
     rig.run(0.2, beat(flavour, armed=True, guided=True))
     assert rig.pilot.phase is Phase.ESCORT
 
@@ -136,7 +138,10 @@ def test_who_disarms_it_ends_the_flight(flavour, guided):
     rig.run(0.1, beat(flavour, guided=guided))
     assert rig.pilot.phase is Phase.CONNECT
     sent = rig.run(3.0, beat(flavour, armed=True, guided=True), HEALTHY, IN_FLIGHT, acks=True)
-    assert {command for command, _ in sent} == {INTERVAL, REQUEST}
+    assert {command for command, _ in sent} == {
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+        mavlink.MAV_CMD_REQUEST_MESSAGE,
+    }
     assert rig.pilot.waiting_for == "the operator's go"
     assert not rig.pilot.streaming
 
@@ -158,7 +163,7 @@ def test_px4_is_asked_for_offboard_again_only_where_missing_set_points_ended_it(
     if not gap:
         assert rig.pilot.phase is Phase.YIELDED
         return
-    assert [command for command, _ in sent] == [MODE]
+    assert [command for command, _ in sent] == [mavlink.MAV_CMD_DO_SET_MODE]
     assert rig.pilot.streaming
     rig.pilot.streamed(rig.now)
     rig.tick(flying)
@@ -182,7 +187,7 @@ def test_asking_for_offboard_again_ends():
     for _ in range(1000):
         rig.pilot.streamed(rig.now)
         sent += rig.tick(lost)
-    assert {command for command, _ in sent} == {MODE}
+    assert {command for command, _ in sent} == {mavlink.MAV_CMD_DO_SET_MODE}
     assert rig.pilot.phase is Phase.YIELDED
 
 

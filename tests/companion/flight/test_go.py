@@ -6,18 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.estimation.tracks import State
 from companion.values.phase import Phase
-from tests.companion.bench import (
-    ARM,
-    INTERVAL,
-    LAND,
-    MODE,
-    PROFILES,
-    REQUEST,
-    TAKEOFF,
-)
+from tests.companion.bench import PROFILES
 from tests.companion.flight.rig import (
     FLAVOURS,
     HEALTHY,
@@ -37,7 +30,10 @@ from tests.companion.flight.rig import (
 def test_nothing_is_armed_without_a_go(flavour):
     rig = Rig(flavour)
     sent = rig.run(20.0, beat(flavour), HEALTHY, acks=True)
-    assert {command for command, _ in sent} == {INTERVAL, REQUEST}
+    assert {command for command, _ in sent} == {
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+        mavlink.MAV_CMD_REQUEST_MESSAGE,
+    }
     assert rig.pilot.phase is Phase.CONNECT
 
 
@@ -47,8 +43,8 @@ def test_an_order_to_land_takes_an_earlier_go_back():
     assert rig.pilot.land()
     rig.view = READY
     assert {command for command, _ in rig.run(5.0, beat("ardupilot"), HEALTHY, acks=True)} == {
-        INTERVAL,
-        REQUEST,
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+        mavlink.MAV_CMD_REQUEST_MESSAGE,
     }
     assert rig.pilot.phase is Phase.CONNECT
 
@@ -59,7 +55,11 @@ def test_a_go_that_came_too_early_is_forgotten(flavour):
     assert rig.pilot.go(HEIGHT)
     rig.run(30.5, beat(flavour), ILL, acks=True)
     sent = rig.run(30.0, beat(flavour), HEALTHY, acks=True)
-    assert not {command for command, _ in sent} & {ARM, MODE, TAKEOFF}
+    assert not {command for command, _ in sent} & {
+        mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+        mavlink.MAV_CMD_DO_SET_MODE,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+    }
     assert rig.pilot.waiting_for == "the operator's go"
 
 
@@ -67,10 +67,14 @@ def test_a_go_that_came_too_early_is_forgotten(flavour):
 def test_a_vehicle_that_does_not_arm_is_not_told_to_for_ever(flavour):
     rig = Rig(flavour).prepared()
     guided = beat(flavour, guided=flavour == "ardupilot")
-    rig.run(31.0, guided, HEALTHY, ack(ARM, result=4))
+    rig.run(31.0, guided, HEALTHY, ack(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, result=4))
     rig.sent.clear()
-    rig.run(60.0, guided, HEALTHY, ack(ARM, result=4))
-    assert not {command for _, command, _ in rig.sent} & {ARM, MODE, TAKEOFF}
+    rig.run(60.0, guided, HEALTHY, ack(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, result=4))
+    assert not {command for _, command, _ in rig.sent} & {
+        mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+        mavlink.MAV_CMD_DO_SET_MODE,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+    }
 
 
 @pytest.mark.parametrize(
@@ -91,7 +95,7 @@ def test_a_vehicle_far_from_the_box_does_not_start(place, allowed):
     rig.run(0.2, beat("px4"), HEALTHY, acks=True)
     assert rig.pilot.go(HEIGHT)
     sent = rig.run(5.0, beat("px4"), HEALTHY, acks=True)
-    assert (ARM in {command for command, _ in sent}) == allowed
+    assert (mavlink.MAV_CMD_COMPONENT_ARM_DISARM in {command for command, _ in sent}) == allowed
     assert allowed or "a start near the box" in rig.pilot.waiting_for
 
 
@@ -101,7 +105,7 @@ def test_with_a_low_battery_nothing_starts(left):
     low = HEALTHY._replace(battery_remaining=left)
     assert rig.pilot.go(HEIGHT)
     sent = rig.run(5.0, beat("px4"), low, acks=True)
-    assert ARM not in {command for command, _ in sent}
+    assert mavlink.MAV_CMD_COMPONENT_ARM_DISARM not in {command for command, _ in sent}
     assert rig.pilot.waiting_for == "a battery above 20 %"
 
 
@@ -122,7 +126,7 @@ def test_disarmed_on_the_way_up_it_does_not_arm_again_without_a_new_go(flavour):
     rig.run(1.0, beat(flavour, armed=True, guided=True), acks=True)
     assert rig.pilot.phase is Phase.PREPARE
     sent = rig.run(20.0, beat(flavour), HEALTHY, acks=True)
-    assert ARM not in {command for command, _ in sent}
+    assert mavlink.MAV_CMD_COMPONENT_ARM_DISARM not in {command for command, _ in sent}
     assert rig.pilot.phase is Phase.CONNECT
     assert rig.pilot.waiting_for == "the operator's go"
 
@@ -135,7 +139,10 @@ def test_who_may_be_flying_is_never_told_to_take_off(flavour, airborne):
     every = beat(flavour, armed=True, guided=True), HEALTHY, landed(airborne)
     sent = rig.run(4.0, *every, acks=True)
     assert rig.pilot.phase is Phase.ESCORT
-    assert not {command for command, _ in sent} & {TAKEOFF, ARM}
+    assert not {command for command, _ in sent} & {
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+    }
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -146,7 +153,10 @@ def test_an_armed_vehicle_of_which_nobody_says_where_it_is_is_left_alone(flavour
     sent = rig.run(4.0, beat(flavour, armed=True, guided=True), HEALTHY, *received, acks=True)
     assert rig.pilot.phase is Phase.CONNECT
     assert "EXTENDED_SYS_STATE" in rig.pilot.waiting_for
-    assert not {command for command, _ in sent} & {TAKEOFF, ARM}
+    assert not {command for command, _ in sent} & {
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+    }
 
 
 def test_what_was_said_of_landing_long_ago_is_forgotten():
@@ -190,7 +200,7 @@ def test_a_go_that_waits_can_be_taken_back_and_one_that_has_begun_goes_on():
     rig.prepared()
     rig.pilot.take_back()
     sent = rig.run(1.0, beat("ardupilot", guided=True), HEALTHY, acks=True)
-    assert ARM in {command for command, _ in sent}
+    assert mavlink.MAV_CMD_COMPONENT_ARM_DISARM in {command for command, _ in sent}
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -210,7 +220,7 @@ def test_who_stands_on_the_ground_is_not_up_however_low_it_is_to_rise():
     rig.view = READY._replace(own=state(0.25))
     sent = rig.run(1.0, beat("ardupilot", armed=True, guided=True), landed(1), acks=True)
     assert rig.pilot.phase is Phase.PREPARE
-    assert TAKEOFF in {command for command, _ in sent}
+    assert mavlink.MAV_CMD_NAV_TAKEOFF in {command for command, _ in sent}
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -218,14 +228,14 @@ def test_landing_before_it_is_known_to_be_armed_ends_when_it_is_known_not_to_be(
     rig = Rig(flavour)
     rig.prepared()
     waiting, armed = beat(flavour, guided=flavour == "ardupilot"), beat(flavour, armed=True)
-    while ARM not in {command for _, command, _ in rig.sent}:
+    while mavlink.MAV_CMD_COMPONENT_ARM_DISARM not in {command for _, command, _ in rig.sent}:
         rig.run(0.01, waiting, HEALTHY, landed(1), acks=True)
     assert rig.pilot.land()
     # The heartbeats of a whole second may have left before.
     rig.run(1.0, waiting, HEALTHY, landed(1), acks=True)
     assert rig.pilot.phase is Phase.LAND
     sent = rig.run(1.0, armed, HEALTHY, landed(1), acks=True)
-    assert LAND in {command for command, _ in sent}
+    assert mavlink.MAV_CMD_NAV_LAND in {command for command, _ in sent}
     rig.run(3.0, beat(flavour), HEALTHY, landed(1))
     assert rig.pilot.phase is Phase.DONE
 
@@ -240,4 +250,4 @@ def test_whose_place_is_lost_for_long_on_the_way_up_lands(flavour):
     rig.view = READY._replace(own=state(0.3 * HEIGHT, age=5_100_000))
     sent = rig.run(1.0, armed, HEALTHY, landed(2), acks=True)
     assert rig.pilot.phase is Phase.LAND
-    assert LAND in {command for command, _ in sent}
+    assert mavlink.MAV_CMD_NAV_LAND in {command for command, _ in sent}

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.estimation.tracks import State
@@ -22,19 +23,7 @@ from mavlink_bridge.messages import (
     StatusText,
     SysStatus,
 )
-from tests.companion.bench import (
-    AUTOPILOT,
-    FLEET,
-    LAND,
-    MODE,
-    NAN,
-    PREARM_OK,
-    PROFILES,
-    TAKEOFF,
-    Bench,
-    only,
-    seen_at,
-)
+from tests.companion.bench import AUTOPILOT, FLEET, NAN, PROFILES, Bench, only, seen_at
 
 SECOND = 1_000_000
 LOCAL = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
@@ -47,8 +36,10 @@ GUARD = CONFIG.guard
 def vehicle(*, battery=None, state=4, now=SECOND):
     found = Vehicle()
     profile = PROFILES["ardupilot"]
-    found.receive(Heartbeat(AUTOPILOT, 2, profile.autopilot, 0x80, profile.guided_custom_mode, state))
-    found.receive(SysStatus(AUTOPILOT, PREARM_OK, PREARM_OK, PREARM_OK, 12.0, battery))
+    armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    found.receive(Heartbeat(AUTOPILOT, 2, profile.autopilot, armed, profile.guided_custom_mode, state))
+    checks = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    found.receive(SysStatus(AUTOPILOT, checks, checks, checks, 12.0, battery))
     found.tick(now)
     return found
 
@@ -205,7 +196,7 @@ def test_with_a_critical_battery_it_lands_where_it_is(flying):
     here = flying.autopilot.position.copy()
     flying.autopilot.battery = 0.05
     sent = flying.fly(6.0)
-    assert LAND in commands(sent)
+    assert mavlink.MAV_CMD_NAV_LAND in commands(sent)
     assert np.linalg.norm(flying.autopilot.position[:2] - here[:2]) < 1.0
 
 
@@ -214,12 +205,12 @@ def test_with_a_critical_battery_it_lands_where_it_is(flying):
 def test_what_begins_on_the_way_up_is_not_forgotten_at_the_top(flavour, left):
     bench = Bench(flavour)
     bench.fly(1.0)
-    bench.order(TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
+    bench.order(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
     while bench.phase is not Phase.PREPARE or not bench.autopilot.armed:
         bench.step()
     bench.autopilot.battery = left
     sent = bench.fly(15.0)
-    assert LAND in commands(sent)
+    assert mavlink.MAV_CMD_NAV_LAND in commands(sent)
 
 
 def test_an_operator_may_go_on_in_spite_of_a_low_battery(flying):
@@ -228,7 +219,7 @@ def test_an_operator_may_go_on_in_spite_of_a_low_battery(flying):
     flying.autopilot.battery = 0.15
     flying.fly(0.5)
     assert flying.phase is Phase.RETURN
-    flying.order(TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
+    flying.order(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 5.0)
     flying.fly(5.0)
     assert flying.phase is Phase.ESCORT
 
@@ -236,9 +227,9 @@ def test_an_operator_may_go_on_in_spite_of_a_low_battery(flying):
 def test_blind_for_long_it_is_told_to_land(flying):
     flying.autopilot.mute = True
     sent = flying.fly(GUARD.own_lost_us * 1e-6 - 0.5)
-    assert LAND not in commands(sent)
+    assert mavlink.MAV_CMD_NAV_LAND not in commands(sent)
     sent = flying.fly(1.5)
-    assert LAND in commands(sent)
+    assert mavlink.MAV_CMD_NAV_LAND in commands(sent)
 
 
 def test_blind_and_thrown_out_of_its_mode_it_is_told_to_land_all_the_same():
@@ -252,9 +243,9 @@ def test_blind_and_thrown_out_of_its_mode_it_is_told_to_land_all_the_same():
     for _ in range(500):
         flying.autopilot.mode = 4 << 16 | 3 << 24
         sent += commands(flying.step())
-    assert MODE in sent
-    assert LAND in sent
-    assert MODE not in sent[sent.index(LAND) :]
+    assert mavlink.MAV_CMD_DO_SET_MODE in sent
+    assert mavlink.MAV_CMD_NAV_LAND in sent
+    assert mavlink.MAV_CMD_DO_SET_MODE not in sent[sent.index(mavlink.MAV_CMD_NAV_LAND) :]
 
 
 def test_a_neighbour_that_is_silent_is_said_and_still_kept_away_from(flying):
@@ -300,7 +291,7 @@ def test_whose_place_is_lost_lands_though_its_origin_has_moved_as_well(climbing,
     """An estimator that begins anew and finds no place."""
     bench = Bench()
     if climbing:
-        bench.order(TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 20.0)
+        bench.order(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 20.0)
         while bench.autopilot.position[2] < 3.0:
             bench.step()
     else:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.flight.autopilots import Profile
 from companion.flight.autopilots.ardupilot import ARDUPILOT
@@ -23,7 +24,7 @@ PROFILES = [ARDUPILOT, PX4]
 
 def beat(profile: Profile, mode: int | None = None, *, armed: bool = True) -> Heartbeat:
     custom = profile.guided_custom_mode if mode is None else mode
-    return Heartbeat(VEHICLE, 2, profile.autopilot, 0x80 if armed else 0, custom, 4)
+    return Heartbeat(VEHICLE, 2, profile.autopilot, mavlink.MAV_MODE_FLAG_SAFETY_ARMED * armed, custom, 4)
 
 
 class Talk:
@@ -50,7 +51,7 @@ def test_it_holds_when_the_heartbeat_says_so_whatever_was_acknowledged(profile):
     talk = Talk(beat(profile))
     assert talk.step()
     # Somebody else's, or of a mode that is not there yet.
-    orders = talk.step(CommandAck(VEHICLE, 176, 0, 0, 0, 4, 195), count=50)
+    orders = talk.step(CommandAck(VEHICLE, mavlink.MAV_CMD_DO_SET_MODE, 0, 0, 0, 4, 195), count=50)
     assert not talk.node.over
     assert not orders
     assert talk.step(beat(profile, HELD[profile.name])) == []
@@ -66,7 +67,7 @@ def test_who_goes_on_along_the_set_points_is_a_failure(profile, answer):
     for second in range(4):
         said = [beat(profile)]
         if answer is not None:
-            said.append(CommandAck(VEHICLE, 176, answer, 0, 0, 4, 195))
+            said.append(CommandAck(VEHICLE, mavlink.MAV_CMD_DO_SET_MODE, answer, 0, 0, 4, 195))
         asked += len(talk.step(*said, count=100))
         assert talk.node.over == (second == 3)
     assert asked >= 2

@@ -8,23 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.flight.command_protocol import Commands
 from companion.values.phase import Phase
 from companion.world import View
 from mavlink_bridge.messages import Message
-from tests.companion.bench import (
-    ARM,
-    FLEET,
-    INTERVAL,
-    LAND,
-    MODE,
-    PROFILES,
-    REQUEST,
-    TAKEOFF,
-    TICK,
-)
+from tests.companion.bench import FLEET, ORIGIN_REQUEST, PROFILES, TICK
 from tests.companion.flight.rig import (
     FLAVOURS,
     GROUND,
@@ -41,6 +32,13 @@ from tests.companion.flight.rig import (
     landed,
     state,
 )
+
+NEEDED = {
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+}
 
 
 class Want(NamedTuple):
@@ -83,7 +81,10 @@ def test_connecting_waits_and_names_what_is_missing(name):
     if want.missing:
         assert rig.pilot.phase is Phase.CONNECT
         assert want.missing in rig.pilot.waiting_for
-        assert {command for command, _ in sent} <= {INTERVAL, REQUEST}
+        assert {command for command, _ in sent} <= {
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+            mavlink.MAV_CMD_REQUEST_MESSAGE,
+        }
         assert not rig.pilot.streaming
     else:
         assert rig.pilot.phase is Phase.PREPARE
@@ -92,15 +93,15 @@ def test_connecting_waits_and_names_what_is_missing(name):
 ORDER = {
     # Command, parameters, what it waits for, whether set-points flow once it is done.
     "ardupilot": (
-        (MODE, (1.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0), "guided mode", False),
-        (ARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "arm", False),
-        (TAKEOFF, (0.0, 0.0, 0.0, HEIGHT), "take-off", True),
+        (mavlink.MAV_CMD_DO_SET_MODE, (1.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0), "guided mode", False),
+        (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "arm", False),
+        (mavlink.MAV_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, HEIGHT), "take-off", True),
     ),
     "px4": (
-        (ARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "arm", False),
+        (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "arm", False),
         # PX4 wants its take-off altitude above mean sea level.
-        (TAKEOFF, (0.0, 0.0, 0.0, FLEET.altitude + GROUND + HEIGHT), "take-off", True),
-        (MODE, (1.0, 6.0, 0.0, 0.0, 0.0, 0.0, 0.0), "guided mode", True),
+        (mavlink.MAV_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, FLEET.altitude + GROUND + HEIGHT), "take-off", True),
+        (mavlink.MAV_CMD_DO_SET_MODE, (1.0, 6.0, 0.0, 0.0, 0.0, 0.0, 0.0), "guided mode", True),
     ),
 }
 
@@ -116,13 +117,14 @@ def test_the_steps_into_the_air_come_in_the_autopilots_order_each_when_the_last_
         assert rig.pilot.waiting_for == name
         assert rig.pilot.phase is Phase.PREPARE
         # Set-points flow before the mode is granted where the autopilot wants that, else not.
-        assert rig.pilot.streaming == (flavour == "px4" and command == MODE)
-        if command == TAKEOFF:
+        assert rig.pilot.streaming == (flavour == "px4" and command == mavlink.MAV_CMD_DO_SET_MODE)
+        if command == mavlink.MAV_CMD_NAV_TAKEOFF:
             for height, speed in ((0.5 * HEIGHT, 1.0), (HEIGHT, 1.0), (0.5 * HEIGHT, 0.0)):
                 rig.view = READY._replace(own=state(height, speed))
                 assert rig.run(0.5, beat(flavour, armed, guided)) == []
             rig.view = READY._replace(own=state(HEIGHT))
-        armed, guided = armed or command == ARM, guided or command == MODE
+        armed |= command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+        guided |= command == mavlink.MAV_CMD_DO_SET_MODE
         assert rig.tick(beat(flavour, armed, guided)) == []
         # Between two steps, too, this can be asked.
         assert rig.pilot.streaming == streams
@@ -146,16 +148,20 @@ def test_a_refused_command_is_noted_and_tried_again():
     rig = Rig().prepared()
     rig.sent.clear()
     for _ in range(200):
-        rig.tick(beat("ardupilot"), *[ack(MODE, 4)] * (rig.now % HALF == 0))
+        rig.tick(beat("ardupilot"), *[ack(mavlink.MAV_CMD_DO_SET_MODE, 4)] * (rig.now % HALF == 0))
     assert rig.pilot.refusals
-    assert set(rig.pilot.refusals) == {f"command {MODE}: result 4"}
-    assert len([1 for _, command, _ in rig.sent if command == MODE]) >= 3
+    assert set(rig.pilot.refusals) == {f"command {mavlink.MAV_CMD_DO_SET_MODE}: result 4"}
+    assert len([1 for _, command, _ in rig.sent if command == mavlink.MAV_CMD_DO_SET_MODE]) >= 3
 
 
 def test_an_acknowledgement_of_something_else_settles_nothing():
     rig = Rig().prepared()
     rig.run(0.6, beat("ardupilot"))
-    rig.tick(ack(ARM), ack(TAKEOFF), ack(INTERVAL))
+    rig.tick(
+        ack(mavlink.MAV_CMD_COMPONENT_ARM_DISARM),
+        ack(mavlink.MAV_CMD_NAV_TAKEOFF),
+        ack(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL),
+    )
     assert rig.run(1.0, beat("ardupilot"))
     assert rig.pilot.refusals == []
 
@@ -169,17 +175,23 @@ def test_every_stream_is_asked_for_until_the_autopilot_has_heard_it(seed):
     for _ in range(3000):
         new = rig.tick(beat("ardupilot"), *answers)
         arrived = [call for call in new if lossy.random() > 0.5]
-        received |= {params[0] for command, params in arrived if command == INTERVAL}
+        received |= {
+            params[0] for command, params in arrived if command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+        }
         answers = [ack(command) for command, _ in arrived if lossy.random() > 0.33]
     # And then for what tells how well it knows its place.
-    assert received == {32.0, 30.0, 1.0, 245.0, 24.0, 193.0}
+    assert received == NEEDED | {
+        mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+        mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+    }
 
 
 def test_an_autopilot_that_answers_no_request_is_asked_for_every_stream():
     rig = Rig(view=NOTHING)
     sent = rig.run(4.0, beat("ardupilot"))
-    assert {params[0] for command, params in sent if command == INTERVAL} == {32.0, 30.0, 1.0, 245.0}
-    assert any(command == REQUEST and params[0] == 49.0 for command, params in sent)
+    asked = {params[0] for command, params in sent if command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}
+    assert asked == NEEDED
+    assert ORIGIN_REQUEST in {(command, params[0]) for command, params in sent}
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -189,7 +201,7 @@ def test_a_command_without_effect_is_asked_again_though_acknowledged(flavour):
     rig.pilot.settled()
     rig.sent.clear()
     rig.run(40.0, beat(flavour, armed=True, guided=True), acks=True)
-    times = [now for now, command, _ in rig.sent if command == LAND]
+    times = [now for now, command, _ in rig.sent if command == mavlink.MAV_CMD_NAV_LAND]
     assert len(times) == 3
     assert min(np.diff(times)) > 10_000_000
 
@@ -263,7 +275,7 @@ def down(flavour):
 def test_a_px4_that_has_landed_is_asked_to_hold_until_it_says_so_for_five_seconds_at_most(mode, acks):
     rig = down("px4")
     sent = rig.run(1.0, beat("px4", mode=mode), landed(1), acks=acks)
-    assert set(sent) == {(MODE, (1.0, 4.0, 3.0, 0.0, 0.0, 0.0, 0.0))}
+    assert set(sent) == {(mavlink.MAV_CMD_DO_SET_MODE, (1.0, 4.0, 3.0, 0.0, 0.0, 0.0, 0.0))}
     assert rig.pilot.phase is Phase.LAND
     assert rig.run(1.0, beat("px4", mode=HOLD), landed(1)) == []
     assert rig.pilot.phase is Phase.DONE
@@ -293,15 +305,19 @@ def test_a_px4_that_falls_silent_when_it_has_landed_is_not_waited_for():
 def test_before_a_go_the_mode_is_touched_only_where_a_disarmed_px4_fails_its_checks_by_it(health, armed):
     rig = Rig("px4")
     sent = rig.run(2.0, beat("px4", armed=armed, mode=OFFBOARD), health, landed(1), acks=True)
-    asked = {call for call in sent if call[0] == MODE}
-    assert asked == ({(MODE, (1.0, 4.0, 3.0, 0.0, 0.0, 0.0, 0.0))} if health is ILL and not armed else set())
+    asked = {call for call in sent if call[0] == mavlink.MAV_CMD_DO_SET_MODE}
+    assert asked == (
+        {(mavlink.MAV_CMD_DO_SET_MODE, (1.0, 4.0, 3.0, 0.0, 0.0, 0.0, 0.0))}
+        if health is ILL and not armed
+        else set()
+    )
     assert ("OFFBOARD" in rig.pilot.waiting_for) == bool(asked)
     assert not rig.pilot.streaming
     # Nor in another mode.
     for flavour, mode in (("px4", HOLD), ("px4", 3 << 16), ("ardupilot", 4), ("ardupilot", 9)):
         rig = Rig(flavour)
         sent = rig.run(2.0, beat(flavour, mode=mode), ILL, landed(1))
-        assert MODE not in {command for command, _ in sent}
+        assert mavlink.MAV_CMD_DO_SET_MODE not in {command for command, _ in sent}
         assert rig.pilot.waiting_for == "the autopilot's pre-arm checks"
 
 
@@ -311,7 +327,7 @@ def test_who_is_blind_lands_without_settling(blind):
     rig.pilot.land()
     rig.view = READY._replace(own=blind)
     sent = rig.run(0.1, beat("ardupilot", armed=True, guided=True))
-    assert [command for command, _ in sent] == [LAND]
+    assert [command for command, _ in sent] == [mavlink.MAV_CMD_NAV_LAND]
 
 
 def test_settling_ends():
@@ -320,7 +336,7 @@ def test_settling_ends():
     longest = CompanionConfig().guard.settle_us * 1e-6
     flying = beat("ardupilot", armed=True, guided=True)
     assert rig.run(longest - 0.1, flying) == []
-    assert [command for command, _ in rig.run(0.2, flying)] == [LAND]
+    assert [command for command, _ in rig.run(0.2, flying)] == [mavlink.MAV_CMD_NAV_LAND]
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -335,7 +351,7 @@ def test_landing_goes_through_settling_and_ends_disarmed(flavour):
     rig.pilot.settled()
     assert not rig.pilot.streaming
     sent = rig.run(1.0, flying)
-    assert [command for command, _ in sent] == [LAND, LAND]
+    assert [command for command, _ in sent] == [mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_LAND]
     landing = beat(flavour, armed=True, mode=min(PROFILES[flavour].land_modes))
     assert rig.run(40.0, landing, acks=True) == []
     assert rig.pilot.phase is Phase.LAND
@@ -390,7 +406,7 @@ def test_a_height_that_drifts_does_not_hold_up_the_take_off(flavour):
     rig.run(2.0, armed, landed(2), acks=True)
     rig.run(1.0, beat(flavour, armed=True, guided=True), landed(2), acks=True)
     assert rig.pilot.phase is Phase.ESCORT
-    assert TAKEOFF not in {command for _, command, _ in rig.sent[before:]}
+    assert mavlink.MAV_CMD_NAV_TAKEOFF not in {command for _, command, _ in rig.sent[before:]}
 
 
 def test_a_refusal_that_is_but_repeated_counts_once():
@@ -399,12 +415,12 @@ def test_a_refusal_that_is_but_repeated_counts_once():
     def refused(result):
         nonlocal now
         now += 1_000_000
-        assert calls.call(now, MODE, (1.0,) * 7)
-        calls.receive(ack(MODE, result))
+        assert calls.call(now, mavlink.MAV_CMD_DO_SET_MODE, (1.0,) * 7)
+        calls.receive(ack(mavlink.MAV_CMD_DO_SET_MODE, result))
         return calls.refused
 
     assert {refused(4) for _ in range(100)} == {1}
-    assert list(calls.refusals) == [f"command {MODE}: result 4"]
+    assert list(calls.refusals) == [f"command {mavlink.MAV_CMD_DO_SET_MODE}: result 4"]
     assert refused(2) == 2
     calls.forget()
     assert refused(2) == 3
@@ -418,11 +434,13 @@ def test_an_answer_to_somebody_else_settles_nothing(system, component):
     rig = Rig("ardupilot")
     rig.prepared()
     rig.run(0.1, beat("ardupilot"), HEALTHY)
-    rig.tick(ack(MODE)._replace(target_system=system, target_component=component))
-    assert MODE in {command for command, _ in rig.run(2.0, beat("ardupilot"), HEALTHY)}
+    rig.tick(ack(mavlink.MAV_CMD_DO_SET_MODE)._replace(target_system=system, target_component=component))
+    assert mavlink.MAV_CMD_DO_SET_MODE in {command for command, _ in rig.run(2.0, beat("ardupilot"), HEALTHY)}
     # MAVLink 1 does not say whom it answers.
-    rig.tick(ack(MODE)._replace(target_system=0, target_component=0))
-    assert MODE not in {command for command, _ in rig.run(2.0, beat("ardupilot"), HEALTHY)}
+    rig.tick(ack(mavlink.MAV_CMD_DO_SET_MODE)._replace(target_system=0, target_component=0))
+    assert mavlink.MAV_CMD_DO_SET_MODE not in {
+        command for command, _ in rig.run(2.0, beat("ardupilot"), HEALTHY)
+    }
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.errors import SolverError
 from companion.values.phase import Phase
@@ -11,11 +12,9 @@ from mavlink_bridge.messages import CommandLong
 from outrider.resources import find
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.yaml_files.yaml_file import load
-from tests.companion.bench import LAND, NAN, SYSTEM, TAKEOFF, TARGET, Bench, field_of, only, seen_at
+from tests.companion.bench import NAN, SYSTEM, TARGET, Bench, field_of, only, seen_at
 
-RETURN, HOLD = 20, 17
-GO = (TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5)
-LOITER = 5
+GO = (mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5)
 BESIDE = 12
 """A neighbour's system id."""
 
@@ -27,7 +26,7 @@ def off(bench: Bench, place) -> float:
 
 def carried_away(bench: Bench, place) -> Bench:
     """A pilot takes it over, flies it there, and the operator gives a new go."""
-    bench.autopilot.mode, bench.autopilot.landing = LOITER, False
+    bench.autopilot.mode, bench.autopilot.landing = mavlink.COPTER_MODE_LOITER, False
     bench.fly(0.5)
     assert bench.phase is Phase.YIELDED
     bench.autopilot.position, bench.autopilot.velocity = np.array(place, dtype=float), np.zeros(3)
@@ -54,10 +53,10 @@ def test_told_to_stay_on_the_way_back_it_stays_there(task: str) -> None:
     bench.take_off()
     bench.go_to((15, 0, 5))
     bench.fly(10.0)
-    bench.order(RETURN)
+    bench.order(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     bench.fly(2.5)
     half_way = bench.autopilot.position
-    bench.order(HOLD)
+    bench.order(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
     bench.fly(8.0)
     assert off(bench, half_way) < 3.0
 
@@ -66,13 +65,13 @@ def test_told_to_stay_again_it_stays_where_it_is_then() -> None:
     bench = Bench().take_off()
     bench.go_to((8, 0, 5))
     bench.fly(1.5)
-    bench.order(HOLD)
+    bench.order(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
     bench.fly(4.0)
     bench.order(*GO)
     bench.go_to((15, 10, 5))
     bench.fly(8.0)
     there = bench.autopilot.position
-    bench.order(HOLD)
+    bench.order(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
     bench.fly(8.0)
     assert off(bench, there) < 0.5
 
@@ -101,14 +100,14 @@ def test_an_ordered_goal_outlasts_a_takeover() -> None:
 
 def test_it_settles_anew_each_time_it_is_to_land() -> None:
     bench = Bench().take_off()
-    bench.order(LAND)
+    bench.order(mavlink.MAV_CMD_NAV_LAND)
     bench.until(Phase.LAND).fly(0.3)
     carried_away(bench, (0.0, 0.0, 6.0))
     bench.go_to((15, 0, 6))
     bench.fly(2.0)
     assert np.linalg.norm(bench.autopilot.velocity) > 2.0
     began = bench.autopilot.position
-    bench.order(LAND)
+    bench.order(mavlink.MAV_CMD_NAV_LAND)
     assert bench.phase is Phase.SETTLE
     bench.until(Phase.LAND)
     assert np.linalg.norm(bench.autopilot.velocity) < 0.5
@@ -120,7 +119,7 @@ def test_who_is_to_land_as_it_begins_to_steer_looks_who_is_near(offset: int) -> 
     """Whichever look finds the battery empty on the way up, with somebody 0.6 m beside the way down."""
     bench = Bench()
     # It is up a tick later each time, and looks ten times a second.
-    bench.order(TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5.0 + 0.02 * offset)
+    bench.order(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 5.0 + 0.02 * offset)
     place = (0.6, 0.0, 3.5)
     while bench.autopilot.position[2] < 1.0:
         beside(bench, 0.01, place)
@@ -136,7 +135,7 @@ def test_who_started_beside_its_box_comes_back_to_the_edge_and_lands(start: floa
     assert bench.config.limits.box_min[0] == -20.0
     bench.go_to((0, 0, 5))
     bench.fly(12.0)
-    bench.order(RETURN)
+    bench.order(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     bench.until(Phase.LAND, 40.0)
     assert off(bench, (-20.0, 0.0)) < 1.0
 
@@ -149,7 +148,7 @@ def test_who_finds_its_start_taken_lands_beside_it(distance: float) -> None:
     bench.fly(8.0)
     place = (0.0, -distance, 5.0)
     beside(bench, 1.0, place)
-    bench.order(RETURN)
+    bench.order(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     beside(bench, 60.0, place)
     assert bench.phase is Phase.LAND
     assert off(bench, (0.0, 0.0)) < 6.0
@@ -167,7 +166,7 @@ def test_what_failed_is_over_when_somebody_takes_the_vehicle_over() -> None:
     planner.plan = fails
     bench.fly(0.2)
     assert bench.companion.avoidance.failing is not None
-    bench.autopilot.mode, bench.autopilot.velocity = LOITER, np.zeros(3)
+    bench.autopilot.mode, bench.autopilot.velocity = mavlink.COPTER_MODE_LOITER, np.zeros(3)
     bench.fly(0.5)
     planner.plan = plan
     sent = bench.fly(10.0)
@@ -185,7 +184,7 @@ def test_a_vehicle_with_a_lane_climbs_to_it_before_it_sets_off() -> None:
     bench.go_to((15, 0, 5))
     bench.fly(12.0)
     assert off(bench, (15.0, 0.0)) < 0.5
-    bench.order(RETURN)
+    bench.order(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     while off(bench, (15.0, 0.0)) < 1.0:
         bench.step(*([received] if bench.now % 100_000 == 0 else []))
         assert bench.phase is Phase.RETURN
@@ -204,7 +203,7 @@ def test_the_target_pushes_no_vehicle_into_the_lane_above(east: float) -> None:
     assert off(bench, (15.0, 0.0)) < 0.5
     bench.target = seen_at(TARGET, (east, 0.5, 1.5))
     bench.fly(0.8)
-    bench.order(RETURN)
+    bench.order(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     above = 0.0
     while bench.phase is Phase.RETURN:
         bench.step()

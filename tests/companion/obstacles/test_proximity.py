@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.config.obstacles import Post, ProximityConfig
-from companion.obstacles.proximity import BODY, Proximity, returns
+from companion.obstacles.proximity import Proximity, returns
 from companion.obstacles.sensed import Sensed, Stance
 from companion.obstacles.static import FixedObstacles
 from companion.telemetry.reception import accepts
@@ -34,11 +35,11 @@ NOBODY = np.zeros((0, 3))
 HEIGHT = 5.0
 HERE = np.tile([0.0, 0.0, HEIGHT], (16, 1))
 angles = numbers(-math.pi, math.pi)
-frames = st.sampled_from((0, 1, BODY))
+frames = st.sampled_from((0, 1, mavlink.MAV_FRAME_BODY_FRD))
 ranges = st.floats(0.5, CONFIG.reach)
 
 
-def scan(distances, frame=BODY, increment=STEP, offset=0.0, source=SENSOR, time=0):
+def scan(distances, frame=mavlink.MAV_FRAME_BODY_FRD, increment=STEP, offset=0.0, source=SENSOR, time=0):
     """``distances`` by sector; all others see nothing."""
     told = tuple(distances.get(k, NOTHING) for k in range(72))
     return ObstacleDistance(source, time, 0, told, increment, 0.2, 20.0, offset, frame)
@@ -62,7 +63,7 @@ def test_a_return_stands_at_its_bearing_and_range_whatever_the_frame_and_the_nos
 ):
     place = np.array([x, -x, HEIGHT])
     seen = posts(sensed(scan({sector: far}, frame, offset=offset), place, yaw), place)
-    bearing = offset + sector * STEP + (math.pi / 2 - yaw if frame == BODY else 0.0)
+    bearing = offset + sector * STEP + (math.pi / 2 - yaw if frame == mavlink.MAV_FRAME_BODY_FRD else 0.0)
     expected = place + far * np.array([math.sin(bearing), math.cos(bearing), 0.0])
     assert len(seen.ids) == 1
     np.testing.assert_allclose(seen.positions[0, 0], expected, atol=1e-9)
@@ -76,7 +77,7 @@ def test_a_world_that_is_turned_is_seen_turned(seen, yaw, turn, body):
     place = np.array([3.0, 1.0, HEIGHT])
     c, s = math.cos(turn), math.sin(turn)
     matrix = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    message = scan(seen, BODY if body else 0)
+    message = scan(seen, mavlink.MAV_FRAME_BODY_FRD if body else 0)
     here = posts(sensed(message, place, yaw), place)
     there = posts(sensed(message, matrix @ place, yaw + turn, math.pi / 2 + turn), matrix @ place)
     # Which of two that are equally far comes first is chance.
@@ -133,7 +134,10 @@ def test_what_makes_no_sense_is_refused(nonsense):
 
 
 def test_without_a_heading_only_north_counts():
-    assert posts(sensed(scan({0: 3.0}, BODY), (0, 0, HEIGHT), None), (0, 0, HEIGHT)).ids == ()
+    assert (
+        posts(sensed(scan({0: 3.0}, mavlink.MAV_FRAME_BODY_FRD), (0, 0, HEIGHT), None), (0, 0, HEIGHT)).ids
+        == ()
+    )
     assert len(posts(sensed(scan({0: 3.0}, 0), (0, 0, HEIGHT), None), (0, 0, HEIGHT)).ids) == 1
 
 
@@ -165,7 +169,7 @@ def test_a_neighbour_that_is_seen_is_that_neighbour():
     assert len(posts(sensed(message, (0, 0, HEIGHT), None, known=above), (0, 0, HEIGHT)).ids) == 2
 
 
-TOGETHER = st.tuples(st.sampled_from((0, BODY)), angles, st.sampled_from((STEP, -STEP)))
+TOGETHER = st.tuples(st.sampled_from((0, mavlink.MAV_FRAME_BODY_FRD)), angles, st.sampled_from((STEP, -STEP)))
 
 
 @LAWS
@@ -263,11 +267,11 @@ def test_only_own_sensors_count_and_only_if_wanted():
     assert where(told(scan({0: 4.0}, 0), config=CompanionConfig())).ids == ()
     off, on = CompanionConfig(), CompanionConfig(proximity=CONFIG)
     for link in ("autopilot", "swarm"):
-        assert not accepts(link, SYSTEM, 1, off)(330, SYSTEM, 196)
-        assert accepts(link, SYSTEM, 1, on)(330, SYSTEM, 196)
-        assert not accepts(link, SYSTEM, 1, on)(330, 12, 196)
+        assert not accepts(link, SYSTEM, 1, off)(mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE, SYSTEM, 196)
+        assert accepts(link, SYSTEM, 1, on)(mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE, SYSTEM, 196)
+        assert not accepts(link, SYSTEM, 1, on)(mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE, 12, 196)
     for link in ("target", "ground"):
-        assert not accepts(link, SYSTEM, 1, on)(330, SYSTEM, 196)
+        assert not accepts(link, SYSTEM, 1, on)(mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE, SYSTEM, 196)
 
 
 WALL = np.array([[8.0, y] for y in np.arange(-2.0, 2.01, 0.02)])
@@ -283,7 +287,7 @@ def looked(place, yaw, points=WALL):
 
 
 @pytest.mark.parametrize("avoidance", ["field", "certified"])
-@pytest.mark.parametrize("frame", [0, BODY])
+@pytest.mark.parametrize("frame", [0, mavlink.MAV_FRAME_BODY_FRD])
 def test_a_companion_goes_round_a_wall_that_only_its_sensor_sees(frame, avoidance):
     """4 m wide, across the way to a goal 16 m off."""
     bench = Bench(
@@ -297,7 +301,7 @@ def test_a_companion_goes_round_a_wall_that_only_its_sensor_sees(frame, avoidanc
     nearest = math.inf
     for _ in range(300):
         pilot = bench.autopilot
-        nose = pilot.yaw if frame == BODY else math.pi / 2
+        nose = pilot.yaw if frame == mavlink.MAV_FRAME_BODY_FRD else math.pi / 2
         message = scan(looked(pilot.position, nose), frame, source=AUTOPILOT, time=bench.now - START)
         bench.step(bench.datagram("autopilot", message))
         bench.fly(0.09)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.field.forces import repulsion
 from companion.config import CompanionConfig
@@ -148,8 +149,8 @@ def test_who_is_right_before_it_goes_to_its_right():
 @pytest.mark.parametrize(("link", "sender"), [("autopilot", 11), ("swarm", 11), ("swarm", 12)])
 def test_it_is_heard_where_a_receiver_may_be(link, sender):
     off, on = CompanionConfig(), CompanionConfig(traffic=CONFIG)
-    assert accepts(link, SYSTEM, 1, on)(246, sender, 156)
-    assert not accepts(link, SYSTEM, 1, off)(246, sender, 156)
+    assert accepts(link, SYSTEM, 1, on)(mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE, sender, 156)
+    assert not accepts(link, SYSTEM, 1, off)(mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE, sender, 156)
     world = World(on, SYSTEM, 1, FLEET)
     world.receive(START, link, message(place=(34.0, 0.0, 5.0))._replace(source=Source(sender, 156)))
     seen = world.obstacles(START, world.at(START), HERE)
@@ -162,9 +163,9 @@ def test_it_is_heard_where_a_receiver_may_be(link, sender):
 
 def test_others_have_no_say_on_the_autopilots_link():
     on = CompanionConfig(traffic=CONFIG)
-    assert not accepts("autopilot", SYSTEM, 1, on)(246, 12, 156)
+    assert not accepts("autopilot", SYSTEM, 1, on)(mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE, 12, 156)
     for link in ("target", "ground"):
-        assert not accepts(link, SYSTEM, 1, on)(246, SYSTEM, 156)
+        assert not accepts(link, SYSTEM, 1, on)(mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE, SYSTEM, 156)
 
 
 def flown(avoidance, told):

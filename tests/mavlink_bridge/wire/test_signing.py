@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as dialect
 from mavlink_bridge import messages as m
 from mavlink_bridge.key import Key
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.framing import SIGNATURE_LENGTH, without_signature
+from mavlink_bridge.wire.framing import without_signature
 from mavlink_bridge.wire.signing import LATEST, MINUTE, RADIOS, STREAMS, Refusal, Signing
 from tests.mavlink_bridge.signers import KEY, ME, NOW, SECOND, beat, frame_of, peer, signed, signing, stamp_at
 from tests.mavlink_bridge.wire.test_codec import UNKNOWN_TO_PEER, any_message
@@ -31,7 +31,7 @@ def test_what_is_signed_is_read_again_and_only_that_is_longer(message: m.Message
     assert reader.counters == (1, 0, 0, 0, 0, 0)
     assert data[-13] == link
     assert without_signature(data) == Codec().encode(message)
-    assert len(data) == len(without_signature(data)) + SIGNATURE_LENGTH
+    assert len(data) == len(without_signature(data)) + dialect.MAVLINK_SIGNATURE_BLOCK_LEN
 
 
 @given(any_message, st.integers(0, 255))

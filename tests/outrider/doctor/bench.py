@@ -19,7 +19,6 @@ from tests.sitl.autopilot_rig import FIREFLY, SITE
 
 TICK = 20_000
 GCS = Source(255, 190)
-INJECT, GPS, BATTERY, OFF = 420, 4, 100, 1
 
 
 def autopilot(

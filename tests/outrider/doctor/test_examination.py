@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
-from companion.flight.vehicle import PREARM_OK
 from mavlink_bridge.messages import (
     BY_ID,
     Attitude,
@@ -154,7 +154,7 @@ POOR = GpsRaw(ME, 0, 3, *PLACE, 4.0, 1.0, 0.0, 0.0, 6, 0.0, 0.0, 0.0, 0.0)
 
 def status(present: int, remaining: float | None) -> SysStatus:
     """Of which nothing but the pre-arm check is healthy."""
-    return SysStatus(ME, present, present, PREARM_OK, 12.0, remaining)
+    return SysStatus(ME, present, present, mavlink.MAV_SYS_STATUS_PREARM_CHECK, 12.0, remaining)
 
 
 def positions(north: float, vz_up: bool = False) -> list[tuple[int, Message]]:
@@ -235,8 +235,8 @@ def test_a_parameter_is_what_its_firmware_means(kind: int, value: float, raw: by
         (Heartbeat(ME, 2, 3, 0x80, 4, 5), "its state is critical", Severity.BLOCKING),
         (status(0x10000001, 0.9), "unhealthy: 3d gyro", Severity.WARNING),
         (status(0x10010000, 0.9), "unhealthy: rc receiver", Severity.NOTE),
-        (status(PREARM_OK, 0.25), "battery: 25%", Severity.WARNING),
-        (status(PREARM_OK, None), "charge is not told, 12.0 V", Severity.NOTE),
+        (status(mavlink.MAV_SYS_STATUS_PREARM_CHECK, 0.25), "battery: 25%", Severity.WARNING),
+        (status(mavlink.MAV_SYS_STATUS_PREARM_CHECK, None), "charge is not told, 12.0 V", Severity.NOTE),
         (POOR, "GPS: 3D fix, 6 satellites, poor", Severity.WARNING),
         (Heartbeat(Source(0, 1), 2, 3, 0, 0, 3), "the vehicle's system id is 0", Severity.BLOCKING),
         (GpsGlobalOrigin(ME, 0.0, 0.0, 0.0, 0), "the origin is at 0°, 0°", Severity.BLOCKING),

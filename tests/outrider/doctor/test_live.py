@@ -7,6 +7,7 @@ from struct import pack
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
@@ -24,11 +25,7 @@ from outrider.doctor.questions import COMPONENT, STRANGER
 from outrider.doctor.settings import rules
 from sitl.config.autopilot import TelemetryRates
 from tests.outrider.doctor.bench import (
-    BATTERY,
     GCS,
-    GPS,
-    INJECT,
-    OFF,
     Bench,
     autopilot,
     blocking,
@@ -110,7 +107,7 @@ def test_streams_are_as_they_were_afterwards() -> None:
 def test_without_gps(flavour: str) -> None:
     bench = Bench(autopilot(flavour, failures="obeyed"))
     bench.run(3.0)
-    bench.order(INJECT, GPS, OFF, 0)
+    bench.order(mavlink.MAV_CMD_INJECT_FAILURE, mavlink.FAILURE_UNIT_SENSOR_GPS, mavlink.FAILURE_TYPE_OFF, 0)
     bench.run(15.0)
     verdict = bench.consult()
     assert not verdict.ready
@@ -123,7 +120,9 @@ def test_without_gps(flavour: str) -> None:
 def test_an_empty_battery(flavour: str) -> None:
     bench = Bench(autopilot(flavour, failures="obeyed"))
     bench.run(3.0)
-    bench.order(INJECT, BATTERY, OFF, 0)
+    bench.order(
+        mavlink.MAV_CMD_INJECT_FAILURE, mavlink.FAILURE_UNIT_SYSTEM_BATTERY, mavlink.FAILURE_TYPE_OFF, 0
+    )
     bench.run(3.0)
     verdict = bench.consult()
     assert found(verdict, "battery: ").severity is Severity.BLOCKING

@@ -7,16 +7,17 @@ from collections.abc import Callable
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import CommandLong, Heartbeat, Message, Source, StatusText, SysStatus
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Frame, Framer, frame_at, frame_v2, leading_frames
 from outrider.doctor.consultation import Consultation
 from outrider.doctor.finding import Severity, Verdict
-from outrider.doctor.objections import RUN_CHECKS, Objections
+from outrider.doctor.objections import Objections
 from outrider.doctor.px4_events import CRC_EXTRA, EVENT, LAYOUT, event_id, reason
 from outrider.doctor.speaker import Speaker
-from tests.outrider.doctor.bench import BATTERY, GPS, INJECT, OFF, TICK, Bench, autopilot, found
+from tests.outrider.doctor.bench import TICK, Bench, autopilot, found
 from tests.sitl.autopilot_rig import FLAVOURS, SET_MODE
 
 ME, DOCTOR = Source(11, 1), Source(11, 193)
@@ -24,7 +25,6 @@ FAILING = SysStatus(ME, 0x10000000, 0x10000000, 0, 12.0, 0.9)
 PASSING = FAILING._replace(health=0x10000000)
 HOLD, OFFBOARD = 4 << 16 | 3 << 24, 6 << 16
 ALL_MODES, MANUAL_ONLY = 0xFFFFFFFF, 0b111
-TEXT = 253
 FAILS = "the pre-arm check fails"
 
 
@@ -32,13 +32,18 @@ def empty(flavour: str, passes: Callable[[Frame], bool] = lambda _frame: True) -
     """A vehicle whose battery is empty."""
     bench = Bench(autopilot(flavour, failures="obeyed"), passes=passes)
     bench.run(3.0)
-    bench.order(INJECT, BATTERY, OFF, 0)
+    bench.order(
+        mavlink.MAV_CMD_INJECT_FAILURE, mavlink.FAILURE_UNIT_SYSTEM_BATTERY, mavlink.FAILURE_TYPE_OFF, 0
+    )
     bench.run(3.0)
     return bench
 
 
 def asked(bench: Bench) -> int:
-    return sum(isinstance(one, CommandLong) and one.command == RUN_CHECKS for one in bench.received)
+    return sum(
+        isinstance(one, CommandLong) and one.command == mavlink.MAV_CMD_RUN_PREARM_CHECKS
+        for one in bench.received
+    )
 
 
 def event(name: str, *, modes: int = ALL_MODES, level: int = 3, extra: bytes = CRC_EXTRA) -> bytes:
@@ -56,7 +61,7 @@ def framed(data: bytes) -> Frame:
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_the_reasons_are_asked_for_and_named(flavour: str) -> None:
     bench = empty(flavour)
-    bench.order(INJECT, GPS, OFF, 0)
+    bench.order(mavlink.MAV_CMD_INJECT_FAILURE, mavlink.FAILURE_UNIT_SENSOR_GPS, mavlink.FAILURE_TYPE_OFF, 0)
     bench.run(15.0)
     # What it said by itself is gone by now: only who asks hears it.
     start = bench.now
@@ -70,7 +75,10 @@ def test_the_reasons_are_asked_for_and_named(flavour: str) -> None:
 
 
 def test_it_listens_longer_than_its_limit_for_texts_that_come_every_30_s() -> None:
-    bench = empty("ardupilot", lambda frame: frame.message_id != TEXT or bench.now > 24_000_000)
+    bench = empty(
+        "ardupilot",
+        lambda frame: frame.message_id != mavlink.MAVLINK_MSG_ID_STATUSTEXT or bench.now > 24_000_000,
+    )
     verdict = bench.consult(seconds=10.0)
     assert "It said: PreArm: battery empty." in found(verdict, FAILS).why
     assert 24_000_000 < bench.now < 44_000_000
@@ -82,7 +90,7 @@ def test_it_listens_longer_than_its_limit_for_texts_that_come_every_30_s() -> No
 def test_one_that_names_no_reason_is_asked_three_times_at_most(
     flavour: str, words: str, longest: float
 ) -> None:
-    bench = empty(flavour, lambda frame: frame.message_id != TEXT)
+    bench = empty(flavour, lambda frame: frame.message_id != mavlink.MAVLINK_MSG_ID_STATUSTEXT)
     start = bench.now
     verdict = bench.consult(seconds=8.0)
     finding = found(verdict, FAILS)
@@ -124,7 +132,7 @@ def test_progress_says_what_it_waits_for_and_goes_from_0_to_1() -> None:
             frame.data
             for data in bench.tick(*mail)
             for frame in leading_frames(data)[0]
-            if frame.message_id != TEXT
+            if frame.message_id != mavlink.MAVLINK_MSG_ID_STATUSTEXT
         ]
         mail = [message for data in consultation.step(now, told) for message in Codec().feed(data)]
         shares.append(consultation.share(now))
@@ -170,7 +178,9 @@ def px4_saying(told: list[bytes], mode: int = HOLD, health: int = 0) -> Verdict:
             beat = Heartbeat(ME, 2, 12, 0x1, mode, 3)
             arrived = [codec.encode(beat), codec.encode(FAILING._replace(health=health))]
         out = [message for data in consultation.step(now, arrived) for message in Codec().feed(data)]
-        if any(isinstance(one, CommandLong) and one.command == RUN_CHECKS for one in out):
+        if any(
+            isinstance(one, CommandLong) and one.command == mavlink.MAV_CMD_RUN_PREARM_CHECKS for one in out
+        ):
             consultation.step(now, told)
         now += TICK
     return consultation.examination.verdict()
@@ -197,7 +207,7 @@ def test_a_disarmed_px4_in_offboard_is_named_with_what_to_do() -> None:
     assert "no offboard signal" in found(verdict, FAILS).why
     # With somebody's set-points the check passes; then it can be armed, and is still not as it should be.
     assert found(px4_saying([], OFFBOARD, 0x10000000), "mode OFFBOARD").severity is Severity.WARNING
-    assert found(px4_saying([], HOLD, 0x10000000), "mode HOLD").severity is Severity.OK
+    assert found(px4_saying([], HOLD, 0x10000000), "mode AUTO HOLD").severity is Severity.OK
 
 
 def test_the_emulated_px4_in_offboard_is_named_too() -> None:

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
-from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.export import mavlink_tables
@@ -115,7 +115,7 @@ def rows_of(found: dict[str, pa.Table]) -> list[tuple[Any, ...]]:
 
 def expected_row(message: Heard) -> dict[str, Any]:
     """A message as a row, by pymavlink's own account of it."""
-    definition = getattr(dialect, f"MAVLink_{message.name.lower()}_message")
+    definition = getattr(mavlink, f"MAVLink_{message.name.lower()}_message")
     row: dict[str, Any] = {}
     for name, of in zip(definition.fieldnames, definition.fieldtypes, strict=True):
         unit = definition.fieldunits_by_name.get(name)
@@ -159,9 +159,9 @@ def test_any_message_of_the_dialect_becomes_a_row(tmp_path: Path) -> None:
 
 
 def test_a_key_that_a_log_of_others_holds_is_not_passed_on(tmp_path: Path) -> None:
-    peer, key = dialect.MAVLink(None, 255, 190), bytes(range(1, 33))
-    beat = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
-    setup = dialect.MAVLink_setup_signing_message(11, 1, list(key), 36_000_000_000_000)
+    peer, key = mavlink.MAVLink(None, 255, 190), bytes(range(1, 33))
+    beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    setup = mavlink.MAVLink_setup_signing_message(11, 1, list(key), 36_000_000_000_000)
     log = tmp_path / "others.tlog"
     stamp = (1_700_000_000_000_000).to_bytes(8, "big")
     log.write_bytes(b"".join(stamp + message.pack(peer) for message in (beat, setup, beat)))

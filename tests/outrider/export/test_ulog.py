@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 from pyulog import ULog
 from pyulog.px4 import PX4ULog
 
@@ -41,17 +41,17 @@ def zero(log: ULog) -> int:
     return int(log.msg_info_dict["time_zero_unix_us"])
 
 
-def write(path: Path, *messages: dialect.MAVLink_message, who: tuple[int, int] = (1, 1)) -> Path:
+def write(path: Path, *messages: mavlink.MAVLink_message, who: tuple[int, int] = (1, 1)) -> Path:
     """A log of these, 100 ms apart, the first of them a HEARTBEAT of an autopilot."""
-    first = dialect.MAVLink_heartbeat_message(2, 3, 0x80, 0, 4, 3)
+    first = mavlink.MAVLink_heartbeat_message(2, 3, 0x80, 0, 4, 3)
     with TlogWriter(path) as writer:
         for number, (message, source) in enumerate([(first, (1, 1)), *((one, who) for one in messages)]):
-            mav = dialect.MAVLink(None, srcSystem=source[0], srcComponent=source[1])
+            mav = mavlink.MAVLink(None, srcSystem=source[0], srcComponent=source[1])
             writer.write(START + 100_000 * number, 0, bytes(message.pack(mav)))
     return path
 
 
-def ulog_of(tmp_path: Path, *messages: dialect.MAVLink_message, who: tuple[int, int] = (1, 1)) -> ULog:
+def ulog_of(tmp_path: Path, *messages: mavlink.MAVLink_message, who: tuple[int, int] = (1, 1)) -> ULog:
     tmp_path.mkdir(exist_ok=True)
     log = write(tmp_path / "log.tlog", *messages, who=who)
     export(log, "ulog", tmp_path / "out", as_json=True)
@@ -83,8 +83,8 @@ def test_any_message_of_the_dialect_can_be_told(tmp_path: Path) -> None:
     log = tmp_path / "all.tlog"
     everything(log)
     with log.open("ab") as file:  # so that there is a vehicle
-        heartbeat = dialect.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3)
-        mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+        heartbeat = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3)
+        mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         file.write((START + 40_000_000_000).to_bytes(8, "big") + bytes(heartbeat.pack(mav)))
     export(log, "ulog", tmp_path / "out", as_json=True)
     found = read(tmp_path / "out" / "vehicle-1.ulg")
@@ -160,9 +160,9 @@ def test_angles_come_back_out_of_the_quaternions(run: Path, folder: Path) -> Non
     np.testing.assert_array_equal(rates["xyz[2]"], [fields["yawspeed"] for fields in said])
 
 
-def setpoint(mask: int, frame: int = 1, system: int = 1) -> dialect.MAVLink_message:
+def setpoint(mask: int, frame: int = 1, system: int = 1) -> mavlink.MAVLink_message:
     numbers = [float(number) for number in range(1, 12)]
-    return dialect.MAVLink_set_position_target_local_ned_message(0, system, 1, frame, mask, *numbers)
+    return mavlink.MAVLink_set_position_target_local_ned_message(0, system, 1, frame, mask, *numbers)
 
 
 ORDERED = [f"{name}[{k}]" for name in ("position", "velocity", "acceleration") for k in range(3)]
@@ -187,17 +187,17 @@ def test_orders_to_others_and_in_other_frames_are_not_the_vehicle_s(tmp_path: Pa
 
 
 def test_texts_are_logged_with_their_severity(tmp_path: Path) -> None:
-    said = dialect.MAVLink_statustext_message(4, b"mind the gap")
+    said = mavlink.MAVLink_statustext_message(4, b"mind the gap")
     (own,) = ulog_of(tmp_path / "own", said).logged_messages
     assert (own.message, own.log_level_str()) == ("mind the gap", "WARNING")
-    other = dialect.MAVLink_statustext_message(200, b"hm")
+    other = mavlink.MAVLink_statustext_message(200, b"hm")
     (told,) = ulog_of(tmp_path / "other", other, who=(255, 190)).logged_messages
     assert (told.message, told.log_level_str()) == ("[255/190] hm", "DEBUG")
 
 
 def test_states_and_battery(tmp_path: Path) -> None:
-    power = dialect.MAVLink_sys_status_message(0, 0, 0, 0, 12_600, -1, 80, *[0] * 6)
-    landed = dialect.MAVLink_extended_sys_state_message(0, 1)
+    power = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 12_600, -1, 80, *[0] * 6)
+    landed = mavlink.MAVLink_extended_sys_state_message(0, 1)
     log = ulog_of(tmp_path, power, landed)
     status = {name: values[0] for name, values in log.get_dataset("vehicle_status").data.items()}
     assert (status["arming_state"], status["system_type"], status["system_id"]) == (2, 2, 1)
@@ -216,8 +216,8 @@ def test_several_vehicles_in_one_log_have_a_file_each(tmp_path: Path) -> None:
         for number in range(20):
             system = (1, 2, 255)[number % 3]
             autopilot = 8 if system == 255 else 3
-            message = dialect.MAVLink_heartbeat_message(2, autopilot, 0, number, 4, 3)
-            mav = dialect.MAVLink(None, srcSystem=system, srcComponent=1)
+            message = mavlink.MAVLink_heartbeat_message(2, autopilot, 0, number, 4, 3)
+            mav = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
             writer.write(START + number * 100_000, 0, bytes(message.pack(mav)))
     export(tmp_path / "two.tlog", "ulog", tmp_path / "out", as_json=True)
     for own in (1, 2):
@@ -228,7 +228,7 @@ def test_several_vehicles_in_one_log_have_a_file_each(tmp_path: Path) -> None:
 
 def test_a_series_never_goes_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "back.tlog"
-    crc = bytes((dialect.MAVLink_heartbeat_message.crc_extra,))
+    crc = bytes((mavlink.MAVLink_heartbeat_message.crc_extra,))
     times = [0, 100, 200, 50, 60, 300]
     with TlogWriter(log) as writer:
         for time in times:

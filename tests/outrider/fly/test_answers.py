@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.dry_run import ONLOOKER, DryRun
-from companion.flight.orders import NAV_RETURN
-from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
 from companion.node import Companion
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
@@ -51,7 +50,7 @@ def test_what_becomes_of_an_order_is_told(phase: Phase) -> None:
         if datagram.link == "ground":
             link.send(datagram.data)
     (news,) = desk.news()
-    assert (news["kind"], news["command"]) == ("ack", NAV_RETURN)
+    assert (news["kind"], news["command"]) == ("ack", mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     text = answered(news["command"], news["result"], phase.value, "a heartbeat")
     taken = phase is Phase.ESCORT
     assert text == ("return: taken" if taken else "return: not taken: phase connect, waits for a heartbeat")
@@ -61,16 +60,27 @@ def test_what_becomes_of_an_order_is_told(phase: Phase) -> None:
 
 def test_answers_to_others_are_none_of_ours() -> None:
     desk, link = intercom()
-    link.send(Codec().encode(CommandAck(Source(1, COMPONENT), NAV_LAND, 0, 0, 0, 255, 190 - 1)))
+    link.send(
+        Codec().encode(CommandAck(Source(1, COMPONENT), mavlink.MAV_CMD_NAV_LAND, 0, 0, 0, 255, 190 - 1))
+    )
     link.send(b"garbage" + bytes(range(50)))
     assert list(desk.news()) == []
-    link.send(Codec().encode(CommandAck(Source(1, COMPONENT), NAV_LAND, 0, 0, 0, 1, OPERATOR)))
+    link.send(
+        Codec().encode(CommandAck(Source(1, COMPONENT), mavlink.MAV_CMD_NAV_LAND, 0, 0, 0, 1, OPERATOR))
+    )
     assert len(list(desk.news())) == 1
     desk.close()
     link.release()
 
 
-@given(st.lists(st.sampled_from([NAV_TAKEOFF, NAV_LAND, NAV_RETURN, 511]), max_size=5))
+@given(
+    st.lists(
+        st.sampled_from(
+            [mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, 511]
+        ),
+        max_size=5,
+    )
+)
 def test_a_dry_run_speaks_in_nobodys_name(orders: list[int]) -> None:
     """The companion may be there as well, and be the one that is asked."""
     node = DryRun(CONFIG.settings, 1, 100, FleetFrame(*ORIGIN), time.thread_time_ns)

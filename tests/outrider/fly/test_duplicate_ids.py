@@ -8,11 +8,11 @@ import time
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.dry_run import DryRun
 from companion.flight.readiness import OPERATORS_GO
-from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
 from companion.node import Companion
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
@@ -177,7 +177,7 @@ def order(command: int, system: int = 1, component: int = COMPONENT) -> CommandL
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from([NAV_TAKEOFF, NAV_LAND, 511]),
+            st.sampled_from([mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND, 511]),
             st.sampled_from([1, 2]),
             st.sampled_from([1, COMPONENT]),
         ),
@@ -192,13 +192,17 @@ def test_a_closed_gate_keeps_goes_and_nothing_else(
     data = b"".join(codec.encode(message) for message in messages)
     inbox = [Datagram("swarm", data), Datagram("ground", data + garbage)]
     passed, answers = TakeoffInhibit(1, None).closed(inbox)
-    goes = [one for one in orders if one == (NAV_TAKEOFF, 1, COMPONENT)]
-    rest = [m for m in messages if (m.command, m.target_system, m.target_component) != (NAV_TAKEOFF, *OWN)]
+    goes = [one for one in orders if one == (mavlink.MAV_CMD_NAV_TAKEOFF, 1, COMPONENT)]
+    rest = [
+        m
+        for m in messages
+        if (m.command, m.target_system, m.target_component) != (mavlink.MAV_CMD_NAV_TAKEOFF, *OWN)
+    ]
     assert passed[0] == inbox[0]
     assert Codec().feed(passed[1].data.removesuffix(garbage)) == rest
     assert passed[1].data.endswith(garbage)
     denied = [message for datagram in answers for message in Codec().feed(datagram.data)]
-    assert denied == [CommandAck(OWN, NAV_TAKEOFF, 2, 0, 0, 255, 190)] * len(goes)
+    assert denied == [CommandAck(OWN, mavlink.MAV_CMD_NAV_TAKEOFF, 2, 0, 0, 255, 190)] * len(goes)
 
 
 def test_no_go_is_taken_before_the_clock_is_known_nor_beside_a_twin() -> None:

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
-from companion.flight.readiness import GPS_RAW, HEALTH, STREAMS
+from companion.flight.readiness import HEALTH, STREAMS
 from companion.values.phase import Phase
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key
@@ -156,7 +157,7 @@ def test_what_an_autopilot_says_is_what_is_stated(flavour: Flavour, estimator: i
     signing = None if key is None else Signing(key)
     autopilot = Autopilot(config, FIREFLY, FleetFrame(47.4, 8.5, 500.0), 1, signing=signing)
     asking = Codec(None, None if key is None else Signing(key))
-    wanted = {**STREAMS, GPS_RAW: HEALTH, estimator: HEALTH}
+    wanted = {**STREAMS, mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: HEALTH, estimator: HEALTH}
     wishes = [
         CommandLong(Source(1, 195), 1, 1, 511, 0, (float(number), float(each), 0.0, 0.0, 0.0, 0.0, 0.0))
         for number, each in wanted.items()

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.flight.setpoint import setpoint
 from companion.planning import setpoints
@@ -26,7 +27,6 @@ from tests.outrider.said import Ended, Run
 
 ROOT = Path(__file__).parents[3]
 CUT, WHOLE = ROOT / "tests" / "data" / "doctor", ROOT.parent / "shared" / "tlogs"
-LOCAL, ATTITUDE = 32, 30
 
 
 class Flown(NamedTuple):
@@ -65,7 +65,11 @@ def dry_run_of_log(run: Run, log: Path, config: str, system: int, *more: str) ->
 
 def places(log: Path, system: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """When (µs) the vehicle said where it was, and where and how fast that is (n, 3), its own local NED."""
-    codec = Codec(lambda identifier, sender, component: (identifier, sender, component) == (LOCAL, system, 1))
+    codec = Codec(
+        lambda identifier, sender, component: (
+            (identifier, sender, component) == (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, system, 1)
+        )
+    )
     rows = [
         (record.time, *message.position_ned, *message.velocity_ned)
         for record in read_tlog(log)
@@ -197,7 +201,7 @@ def test_who_would_have_sent_nothing_is_not_well(piece: Path, run: Run, tmp_path
     records = list(read_tlog(piece))
     with TlogWriter(log) as writer:
         for record in records:
-            if record.frame[7] != ATTITUDE:
+            if record.frame[7] != mavlink.MAVLINK_MSG_ID_ATTITUDE:
                 writer.write(record.time | record.link, record.link, record.frame)
     ended = dry_run_of_log(run, log, "ardupilot", 9)
     assert (ended.status, "wrong: no set-point at all" in ended.err) == (1, True)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import Heartbeat, Source, StatusText
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
@@ -99,7 +99,7 @@ def test_it_is_what_pymavlink_decodes(path: Path, listed: List) -> None:
     components: dict[int, set[int]] = {}
     kinds: dict[int, tuple[int, int]] = {}
     times: dict[int, list[int]] = {}
-    parser = dialect.MAVLink(None)
+    parser = mavlink.MAVLink(None)
     log = read_tlog(path)
     for record in log:
         message = parser.decode(bytearray(record.frame))
@@ -114,7 +114,7 @@ def test_it_is_what_pymavlink_decodes(path: Path, listed: List) -> None:
     assert (said["good"], said["bad"], said["unknown"], said["skipped"]) == report[:4]
     assert said["good"] == sum(vehicle["messages"] for vehicle in said["vehicles"])
     assert [vehicle["system_id"] for vehicle in said["vehicles"]] == sorted(names)
-    enums = dialect.enums
+    enums = mavlink.enums
     for vehicle in said["vehicles"]:
         system = vehicle["system_id"]
         assert vehicle["components"] == sorted(components[system])
@@ -208,7 +208,7 @@ def test_versions_links_signatures_and_odd_systems(tmp_path: Path) -> None:
     signed = frame_at(codec.encode(StatusText(Source(11, 1), 6, "hello")), 0)
     assert isinstance(signed, Frame)
     body = signed.data[:2] + b"\1" + signed.data[3:-2]
-    checksum = dialect.x25crc(body[1:] + bytes([dialect.MAVLink_statustext_message.crc_extra]))
+    checksum = mavlink.x25crc(body[1:] + bytes([mavlink.MAVLink_statustext_message.crc_extra]))
     path = tmp_path / "a.tlog"
     with TlogWriter(path) as log:
         log.write(NOW, 0, codec.encode_v1(plain))

@@ -193,9 +193,9 @@ def test_no_signature_of_a_log_goes_to_a_live_link() -> None:
 
 
 def test_nothing_that_asks_or_orders_is_telemetry() -> None:
-    from pymavlink.dialects.v20 import all as dialect
+    from pymavlink.dialects.v20 import all as mavlink
 
-    names = [dialect.mavlink_map[identifier].msgname for identifier in TELEMETRY]
+    names = [mavlink.mavlink_map[identifier].msgname for identifier in TELEMETRY]
     asking = (
         "SET_",
         "COMMAND_",

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import yaml
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import (
     CommandAck,
@@ -32,7 +33,6 @@ BEFORE = 3.0
 """s from boot to the goal event."""
 ARRIVAL = 20_000
 """µs on the way."""
-ARMED, NAV_TAKEOFF, DENIED = 0x80, 22, 2
 
 Lost = Callable[[int, int, int], bool]
 """Of the nth message from one system to another: whether it is lost."""
@@ -155,7 +155,11 @@ def _write_logs(
                 if tenth % 10 == 0:
                     said.append(Heartbeat(companion, 18, 8, 0, 0, 4))
                     mode = 4 if tenth else 0
-                    own = [Heartbeat(autopilot, 13, 3, ARMED if tenth else 0, mode, 4)]
+                    own = [
+                        Heartbeat(
+                            autopilot, 13, 3, mavlink.MAV_MODE_FLAG_SAFETY_ARMED if tenth else 0, mode, 4
+                        )
+                    ]
                     records += [(now, system, 0, link.encode(beat)) for beat in own]
                 east, north, up = velocity.tolist()
                 sent = LocalPosition(autopilot, now - BOOT, (0.0, 0.0, 0.0), (north, east, -up))
@@ -168,7 +172,9 @@ def _write_logs(
                             records.append((now + ARRIVAL, receiver, 1, data))
                 if tenth == 20:
                     records.append((now, system, 0, link.encode(StatusText(autopilot, 6, text))))
-                    refused = CommandAck(autopilot, NAV_TAKEOFF, DENIED, 0, 0, system, 195)
+                    refused = CommandAck(
+                        autopilot, mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_RESULT_DENIED, 0, 0, system, 195
+                    )
                     records.append((now, system, 0, link.encode(refused)))
         for time, owner, number, data in sorted(records):
             logs[owner].write(time + late.get(owner, 0), number, data)

@@ -16,8 +16,8 @@ from outrider.errors import InputError
 from outrider.report import arrays as files
 from outrider.report import clocks, thinning
 from outrider.report.command import make
-from outrider.report.packing import Packed, pack, unpack
 from outrider.report.reading import read
+from outrider.report.replay import Packed, pack, unpack
 from tests.outrider.report.runs import leave
 
 NUMBERS = st.floats(-1e6, 1e6) | st.just(float("nan"))

@@ -12,7 +12,7 @@ from mavlink_bridge.tlog.log import TlogReport
 from outrider.report.command import make
 from outrider.report.distances import encounters
 from outrider.report.events import Event, together
-from outrider.report.log_events import Saying, command, mode, sayings
+from outrider.report.log_events import Saying, command, sayings
 from outrider.report.run import Log, Motions, Said, Stream, Utterance
 from tests.outrider.report.runs import BEFORE, leave
 from tests.outrider.shipped import scenario
@@ -28,8 +28,8 @@ def log_of(*said: Said) -> Log:
     return Log(11, 0, 1000, sent, {}, NONE, np.empty((0, 3)), uttered, report)
 
 
-def beat(custom: int, base: int = 0, autopilot: int = 3) -> Heartbeat:
-    return Heartbeat(AUTOPILOT, 13, autopilot, base, custom, 4)
+def beat(custom: int, base: int = 0) -> Heartbeat:
+    return Heartbeat(AUTOPILOT, 13, 3, base, custom, 4)
 
 
 def test_all_kinds_in_the_order_of_time(tmp_path: Path) -> None:
@@ -88,19 +88,6 @@ def test_changes_of_a_heartbeat() -> None:
         (4000, "armed", "disarmed"),
         (4000, "mode", "GUIDED → LAND"),
     ]
-
-
-@pytest.mark.parametrize(
-    ("heartbeat", "name"),
-    [
-        (beat(6 << 16, autopilot=12), "OFFBOARD"),
-        (beat(4 << 16 | 6 << 24, autopilot=12), "AUTO LAND"),
-        (beat(99 << 16, autopilot=12), "mode 99"),
-        (beat(77), "mode 77"),
-    ],
-)
-def test_modes_by_their_names(heartbeat: Heartbeat, name: str) -> None:
-    assert mode(heartbeat) == name
 
 
 def test_commands_by_their_names() -> None:

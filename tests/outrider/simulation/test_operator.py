@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.values.components import COMPONENT
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from outrider.simulation.operator import DO_REPOSITION, LINK, NAV_LAND, NAV_TAKEOFF, Operator
+from outrider.simulation.operator import LINK, Operator
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 TICK = 10_000
@@ -52,7 +53,7 @@ def test_an_order_is_repeated_each_half_second_until_it_is_acknowledged() -> Non
     assert len(bench.run(2.2)) == 5
     assert np.diff([time for time, _ in bench.received]).tolist() == [500_000] * 4
     assert bench.operator.unanswered == [11]
-    assert bench.run(3.0, ack(11, NAV_TAKEOFF)) == []
+    assert bench.run(3.0, ack(11, mavlink.MAV_CMD_NAV_TAKEOFF)) == []
     assert bench.operator.unanswered == []
 
 
@@ -65,9 +66,13 @@ def test_it_says_what_was_ordered() -> None:
     assert isinstance(takeoff, CommandLong)
     assert isinstance(land, CommandLong)
     assert isinstance(goal, CommandInt)
-    assert (takeoff.command, takeoff.target_system, takeoff.params[6]) == (NAV_TAKEOFF, 11, 4.5)
-    assert (land.command, land.target_system) == (NAV_LAND, 12)
-    assert (goal.command, goal.target_system, goal.frame) == (DO_REPOSITION, 13, 0)
+    assert (takeoff.command, takeoff.target_system, takeoff.params[6]) == (
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        11,
+        4.5,
+    )
+    assert (land.command, land.target_system) == (mavlink.MAV_CMD_NAV_LAND, 12)
+    assert (goal.command, goal.target_system, goal.frame) == (mavlink.MAV_CMD_DO_REPOSITION, 13, 0)
     assert {m.target_component for m in (takeoff, land, goal)} == {COMPONENT}
     place = FLEET.to_enu(goal.x * 1e-7, goal.y * 1e-7, goal.z)
     # degE7 on the wire: 1.1 cm.
@@ -76,7 +81,11 @@ def test_it_says_what_was_ordered() -> None:
 
 @pytest.mark.parametrize(
     "other",
-    [ack(12, NAV_TAKEOFF), ack(11, NAV_LAND), *(ack(11, NAV_TAKEOFF, result) for result in range(1, 10))],
+    [
+        ack(12, mavlink.MAV_CMD_NAV_TAKEOFF),
+        ack(11, mavlink.MAV_CMD_NAV_LAND),
+        *(ack(11, mavlink.MAV_CMD_NAV_TAKEOFF, result) for result in range(1, 10)),
+    ],
 )
 def test_nothing_else_counts_as_its_answer(other: CommandAck) -> None:
     bench = Bench()
@@ -101,7 +110,7 @@ def test_an_order_that_follows_an_answer_is_sent_again() -> None:
     bench = Bench()
     bench.operator.land(11)
     bench.run(0.1)
-    bench.run(0.1, ack(11, NAV_LAND))
+    bench.run(0.1, ack(11, mavlink.MAV_CMD_NAV_LAND))
     bench.operator.land(11)
     assert len(bench.run(0.1)) == 1
 
@@ -109,7 +118,12 @@ def test_an_order_that_follows_an_answer_is_sent_again() -> None:
 @settings(deadline=None, max_examples=50)
 @given(
     st.lists(
-        st.tuples(st.integers(11, 14), st.sampled_from([NAV_TAKEOFF, NAV_LAND, DO_REPOSITION])),
+        st.tuples(
+            st.integers(11, 14),
+            st.sampled_from(
+                [mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_DO_REPOSITION]
+            ),
+        ),
         unique=True,
         min_size=1,
     ),
@@ -118,17 +132,17 @@ def test_an_order_that_follows_an_answer_is_sent_again() -> None:
 def test_exactly_what_is_not_answered_goes_on(orders: list[tuple[int, int]], data: st.DataObject) -> None:
     bench = Bench()
     for system, command in orders:
-        if command == NAV_TAKEOFF:
+        if command == mavlink.MAV_CMD_NAV_TAKEOFF:
             bench.operator.take_off(system, 5.0)
-        elif command == NAV_LAND:
+        elif command == mavlink.MAV_CMD_NAV_LAND:
             bench.operator.land(system)
         else:
             bench.operator.goal(system, np.array([0.0, 0.0, 5.0]))
     # An order to land takes back one to take off that came before it and is still open.
     taken_back = {
-        (system, NAV_TAKEOFF)
+        (system, mavlink.MAV_CMD_NAV_TAKEOFF)
         for i, (system, command) in enumerate(orders)
-        if command == NAV_LAND and (system, NAV_TAKEOFF) in orders[:i]
+        if command == mavlink.MAV_CMD_NAV_LAND and (system, mavlink.MAV_CMD_NAV_TAKEOFF) in orders[:i]
     }
     orders = [order for order in orders if order not in taken_back]
     assert {(m.target_system, m.command) for m in bench.run(0.5)} == set(orders)

@@ -24,7 +24,6 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Framer
 from mavlink_bridge.wire.signing import EPOCH, Signing
 from outrider.errors import InputError, OutriderError
-from outrider.logs.flight_modes import mode_name
 from outrider.sitl_server.addresses import addresses
 from outrider.sitl_server.display import watching
 from outrider.sitl_server.event_feed import EventFeed
@@ -284,21 +283,6 @@ def test_anything_may_be_received(garbage: bytes, frames: int) -> None:
 
 
 # Words and pictures
-
-
-@pytest.mark.parametrize(
-    ("flavour", "number", "name"),
-    [
-        ("ardupilot", 0, "STABILIZE"),
-        ("ardupilot", 4, "GUIDED"),
-        ("ardupilot", 99, "99"),
-        ("px4", 6 << 16, "OFFBOARD"),
-        ("px4", 4 << 16 | 2 << 24, "TAKEOFF"),
-        ("px4", 4 << 16 | 77 << 24, "4.77"),
-    ],
-)
-def test_modes_have_the_names_that_ground_stations_give_them(flavour: str, number: int, name: str) -> None:
-    assert mode_name(flavour, number) == name
 
 
 def test_what_happens_is_told_once() -> None:

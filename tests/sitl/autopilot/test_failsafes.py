@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import FenceStatus, SysStatus
 from sitl.autopilot.fences import Breach, Fences, Rules
-from sitl.autopilot.firmware import ACCEPTED, FAILED, Mode
+from sitl.autopilot.firmware import Mode
 from sitl.autopilot.missions.items import Item
 from sitl.autopilot.missions.plans import Plans
 from sitl.config.autopilot import AutopilotConfig
@@ -22,6 +23,7 @@ from tests.sitl.autopilot_rig import ARM, FLAVOURS, SITE, VELOCITY_YAW, Rig, set
 from tests.sitl.mission_client import Way, at, upload
 from tests.sitl.outside_client import Client
 
+ACCEPTED, FAILED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_FAILED
 REQUEST, FENCE_STATUS = 512, 162
 STAY_IN, STAY_OUT, CIRCLE_IN, CIRCLE_OUT = 5001, 5002, 5003, 5004
 FENCE = 1

@@ -7,15 +7,19 @@ import math
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import Attitude, CommandAck, CommandInt, FollowTarget, GlobalPosition, Source
-from sitl.autopilot.firmware import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Mode
+from sitl.autopilot.firmware import Mode
 from tests.sitl.autopilot_rig import FLAVOURS, PILOT, SET_MODE, SITE, VELOCITY_YAW, Rig, setpoint
 from tests.sitl.mission_client import at, upload
 from tests.sitl.outside_client import Client
 
 LOITER, FOLLOW, YAW, SPEED, TERMINATE, REPOSITION, PAUSE, CHECK = 17, 32, 115, 178, 185, 192, 193, 401
 START, RETURN = 300, 20
+ACCEPTED, TEMPORARILY_REJECTED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+DENIED, UNSUPPORTED = mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_UNSUPPORTED
+FAILED = mavlink.MAV_RESULT_FAILED
 ABOVE_HOME = 6
 NAN = math.nan
 LEADER = Source(42, 1)

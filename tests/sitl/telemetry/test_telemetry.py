@@ -16,6 +16,7 @@ from mavlink_bridge.messages import (
     CommandAck,
     CommandLong,
     EkfStatus,
+    EstimatorStatus,
     ExtendedSysState,
     GlobalPosition,
     GpsGlobalOrigin,
@@ -82,6 +83,14 @@ def test_px4_sends_no_ardupilot_messages():
     rig = Rig("px4")
     rig.run(3.0)
     assert not rig.all(EkfStatus)
+
+
+def test_a_px4_that_waits_for_a_position_reports_no_gps_glitch():
+    """The same bit means "not initialised" in ArduPilot's EKF_STATUS_REPORT."""
+    rig = Rig("px4", ready_after=1.5)
+    rig.run(1.2)
+    assert rig.order(REQUEST, 230) == [0]
+    assert not rig.all(EstimatorStatus)[-1].flags & (0x400 | 0x10)
 
 
 def test_rates_are_set_reset_and_switched_off():

@@ -14,6 +14,7 @@ from companion.config import CompanionConfig
 from companion.flight.setpoint import setpoint
 from companion.goals.heading import Heading
 from companion.values.bearings import bearing
+from companion.values.components import COMPONENT
 from companion.values.horizon import Array
 from companion.world import World
 from mavlink_bridge.frames import FleetFrame
@@ -61,7 +62,7 @@ def plan_step(rounds: int) -> Array:
                 raise RuntimeError("the benchmark's scene has no plan")
             targets = np.broadcast_to(aim.target, (count, 3))
             heading.plan(epoch, horizon.positions(epoch + steps, count, steps), targets)
-            setpoint(epoch + 10_000, 0, horizon, heading.at(epoch + 10_000), local, Source(1, 195), 0)
+            setpoint(epoch + 10_000, 0, horizon, heading.at(epoch + 10_000), local, Source(1, COMPONENT), 0)
             finished = time.thread_time_ns()
             if turn:
                 spent.append(finished - started)
@@ -74,7 +75,7 @@ def _scene(config: CompanionConfig, seed: int, epoch: int) -> Scene:
     """Return a scene: eight neighbours around, 1.5 to 3 m away at nearly the same height, moving together."""
     random = np.random.default_rng(seed)
     fleet = FleetFrame(47.397742, 8.545594, 488.0)
-    flight = CertifiedFlight(config, Source(1, 195), fleet)
+    flight = CertifiedFlight(config, Source(1, COMPONENT), fleet)
     world = World(config, 1, 101, fleet)
     here = np.array([0.0, 0.0, 5.0])
     around = 2.0 * np.pi * (np.arange(_NEIGHBOURS) + random.uniform(-0.2, 0.2, _NEIGHBOURS)) / _NEIGHBOURS
@@ -85,7 +86,7 @@ def _scene(config: CompanionConfig, seed: int, epoch: int) -> Scene:
         place = here + reach[k] * np.array([np.cos(around[k]), np.sin(around[k]), 0.0])
         speed = course + random.uniform(-0.15, 0.15, 3) * (1.0, 1.0, 0.1)
         plan = _braking(config, epoch, place, speed, fleet.fingerprint)
-        flight.receive(epoch, Tunnel(Source(20 + k, 195), 0, 0, PAYLOAD_TYPE, pack(plan)))
+        flight.receive(epoch, Tunnel(Source(20 + k, COMPONENT), 0, 0, PAYLOAD_TYPE, pack(plan)))
     own = _braking(config, epoch, here, course, fleet.fingerprint)
     return Scene(flight, world, own, standing(here + 8.0 * course, np.array([2.0, 2.0, 0.0])))
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.field.planner import Aim, Planner, standing
 from companion.config import CompanionConfig
@@ -21,6 +22,7 @@ from companion.flight.setpoint import setpoint
 from companion.goals.heading import Heading
 from companion.telemetry.sharing import position_message
 from companion.values.bearings import bearing
+from companion.values.components import COMPONENT
 from companion.values.obstacles import Obstacles
 from companion.world import World
 from mavlink_bridge.frames import FleetFrame
@@ -109,7 +111,7 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
             plan = planner.plan(now, position, velocity, prediction, aim, obstacles)
             targets = np.broadcast_to(aim.target, (horizon.steps + 1, 3))
             heading.plan(now, plan.horizon.knots[1:, 0:3], targets)
-            setpoint(now + 10_000, 0, plan.horizon, heading.at(now + 10_000), local, Source(1, 195), 0)
+            setpoint(now + 10_000, 0, plan.horizon, heading.at(now + 10_000), local, Source(1, COMPONENT), 0)
             finished = time.thread_time_ns()
             planner.dqmpc.solve(plan.problem, plan.omega_scale)
             solved = time.thread_time_ns()
@@ -151,7 +153,9 @@ def physics(rounds: int) -> dict[str, float]:
 
 def codec(rounds: int) -> dict[str, float]:
     """Return the CPU time (µs) to pack and to parse a GLOBAL_POSITION_INT."""
-    message = GlobalPosition(Source(11, 1), 1_000_000, 47.0, 8.0, 500.0, 5.0, (1.0, 2.0, 0.5), 1.0)
+    message = GlobalPosition(
+        Source(11, mavlink.MAV_COMP_ID_AUTOPILOT1), 1_000_000, 47.0, 8.0, 500.0, 5.0, (1.0, 2.0, 0.5), 1.0
+    )
     sender, receiver = Codec(), Codec()
     pack_us, parse_us = [], []
     frame = sender.encode(message)
@@ -187,7 +191,7 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
     for k in range(_NEIGHBOURS):
         place = position + reach[k] * np.array([np.cos(around[k]), np.sin(around[k]), 0.0])
         speed = random.normal(0.0, 1.0, 3) * (1.0, 1.0, 0.1)
-        source = Source(20 + k, 195)
+        source = Source(20 + k, COMPONENT)
         world.receive(980_000, "swarm", position_message(source, 0, fleet, place, speed, None))
         shared = quantise(
             960_000,

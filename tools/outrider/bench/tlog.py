@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, LocalPosition, Message, Source
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
@@ -16,7 +17,7 @@ from mavlink_bridge.wire.codec import Codec
 from outrider.logs.tally import count
 
 _FRAMES = 20_000
-_SOURCE = Source(11, 1)
+_SOURCE = Source(11, mavlink.MAV_COMP_ID_AUTOPILOT1)
 
 
 def reading(rounds: int) -> dict[str, float]:
@@ -77,7 +78,8 @@ def _message(number: int) -> Message:
     now = 1000 * number
     position, velocity = (1.0, 2.0, -5.0), (1.0, 2.0, 0.5)
     if number % 100 == 0:
-        return Heartbeat(_SOURCE, 2, 3, 81, 4, 4)
+        kind, autopilot = mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+        return Heartbeat(_SOURCE, kind, autopilot, 81, mavlink.COPTER_MODE_GUIDED, mavlink.MAV_STATE_ACTIVE)
     if number % 3 == 0:
         return GlobalPosition(_SOURCE, now, 47.0, 8.0, 500.0, 5.0, velocity, None)
     if number % 3 == 1:

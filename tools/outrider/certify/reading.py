@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.avoidance.certified.margins import between
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.frames import FleetFrame
@@ -22,7 +24,6 @@ from outrider.runs.configuration import CONFIGURATION, resolved
 from outrider.scenarios.companion_settings import settings_of
 from outrider.scenarios.scenario import Scenario
 
-_TUNNEL = 385
 _ALLOWED = "allowed: what outrider swarm SCENARIO --avoidance certified --out leaves"
 _OFTEN = 4096
 """Number of records between two progress reports."""
@@ -123,7 +124,10 @@ class _Tally:
 
 def _read(owner: int, path: Path, at: Callable[[int], None]) -> Log:
     """Read one log; ``at`` receives the number of bytes read. Raises LogError."""
-    tally, codec = _Tally(owner), Codec(lambda identifier, _system, _component: identifier == _TUNNEL)
+    tally, codec = (
+        _Tally(owner),
+        Codec(lambda identifier, _system, _component: identifier == mavlink.MAVLINK_MSG_ID_TUNNEL),
+    )
     reader, size = read_tlog(path), 0
     for number, record in enumerate(reader):
         size += 8 + len(record.frame)

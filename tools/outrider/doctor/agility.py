@@ -10,15 +10,17 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.flight.autopilots.limits import STOCK, Limits, limits_of, stock_parameters
-from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
+from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
-from outrider.doctor.identity import ROTORCRAFT
+from outrider.logs.flight_modes import ROTORCRAFT
 from outrider.resources import find
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.yaml_files.yaml_file import load
 
-_FILES: Final = {ARDUPILOT_NUMBER: "ardupilot", PX4_NUMBER: "px4"}
+_FILES: Final = {mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot", mavlink.MAV_AUTOPILOT_PX4: "px4"}
 _SPEED: Final = 5.0
 """Speed for which the stopping distance is given (m/s).
 

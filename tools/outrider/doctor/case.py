@@ -10,10 +10,6 @@ from mavlink_bridge.wire.param_value import number_of
 from outrider.doctor.hearing import Hearing
 from outrider.doctor.speaker import Speaker
 
-PX4_NUMBER, ARDUPILOT_NUMBER = 12, 3
-"""Values of MAV_AUTOPILOT."""
-_BYTEWISE = 0x10
-
 
 class Case(NamedTuple):
     """One vehicle on one link.
@@ -42,7 +38,7 @@ class Case(NamedTuple):
     @property
     def px4(self) -> bool:
         """Whether the autopilot is PX4."""
-        return self.autopilot == PX4_NUMBER
+        return self.vehicle.is_px4
 
     def parameter(self, name: str) -> float | None:
         """Return the value of a parameter, None if it was not received or is no number."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
-from companion.flight.vehicle import PREARM_OK
 from mavlink_bridge.messages import BatteryStatus, SysStatus
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
@@ -15,11 +14,9 @@ from outrider.doctor.finding import Finding, Severity
 _PREFIX: Final = "MAV_SYS_STATUS_"
 _SENSORS: Final = {
     number: entry.name.removeprefix(_PREFIX).removeprefix("SENSOR_").lower().replace("_", " ")
-    for number, entry in dialect.enums["MAV_SYS_STATUS_SENSOR"].items()
-    if entry.name.startswith(_PREFIX) and number != PREARM_OK
+    for number, entry in mavlink.enums["MAV_SYS_STATUS_SENSOR"].items()
+    if entry.name.startswith(_PREFIX) and number != mavlink.MAV_SYS_STATUS_PREARM_CHECK
 }
-_RC: Final = 0x10000
-"""MAV_SYS_STATUS_SENSOR_RC_RECEIVER, which an escort does not need."""
 _LOW, _EMPTY = 0.3, 0.15
 
 
@@ -41,14 +38,14 @@ def checks(case: Case) -> Iterator[Finding]:
         )
     else:
         yield _failing(case)
-    wrong = status.present & status.enabled & ~status.health & ~PREARM_OK
+    wrong = status.present & status.enabled & ~status.health & ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
     names = [name for bit, name in _SENSORS.items() if wrong & bit]
     if names:
         yield Finding(
             f"unhealthy: {', '.join(names)}",
-            Severity.NOTE if wrong == _RC else Severity.WARNING,
+            Severity.NOTE if wrong == mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER else Severity.WARNING,
             "An escort needs no remote control, but a pilot does."
-            if wrong == _RC
+            if wrong == mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
             else "It says so itself (SYS_STATUS).",
             "Look at the sensor, calibrate it, or see what its driver says in a ground station.",
         )

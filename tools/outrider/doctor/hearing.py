@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import BY_ID, Source
 from mavlink_bridge.wire.framing import Frame
 from outrider.doctor.speaker import Speaker
 
 MOST: Final = 128
 """Maximum number of senders that are recorded: a flood of invented ones must not fill the memory."""
-SETPOINTS: Final = frozenset((82, 84, 86))
-"""SET_ATTITUDE_TARGET, SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT."""
+SETPOINTS: Final = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
+        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
+    )
+)
 
 
 class Hearing:
@@ -73,7 +80,7 @@ class Hearing:
             found,
             key=lambda one: (
                 one.source.system > 0,
-                one.source.component == 1,
+                one.source.component == mavlink.MAV_COMP_ID_AUTOPILOT1,
                 -one.source.system if lowest else one.frames,
             ),
             default=None,

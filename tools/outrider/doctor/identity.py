@@ -5,25 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from companion.flight.vehicle import IN_AIR, ON_GROUND
-from mavlink_bridge.messages import AutopilotVersion, ExtendedSysState, Heartbeat
-from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
+from pymavlink.dialects.v20 import all as mavlink
+
+from mavlink_bridge.messages import AutopilotVersion, ExtendedSysState
+from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
-from outrider.doctor.speaker import CRITICAL
-from outrider.logs.flight_modes import mode_name
+from outrider.logs.flight_modes import ROTORCRAFT, mode_of
 from outrider.logs.words import enumerated
 
-ROTORCRAFT: Final = {2, 3, 4, 13, 14, 15, 29, 35, 43}
-"""Values of MAV_TYPE that can hover.
-
-Quadrotor, coaxial, helicopter, hexa-, octo-, tri-, dodeca-, decarotor, generic multirotor.
-"""
-_TRIED: Final = {ARDUPILOT_NUMBER: (4, 6), PX4_NUMBER: (1, 16)}
-_TAKES_SETPOINTS: Final = 0x80
-"""Bit of MAV_PROTOCOL_CAPABILITY."""
+_TRIED: Final = {mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: (4, 6), mavlink.MAV_AUTOPILOT_PX4: (1, 16)}
+_TAKES_SETPOINTS: Final = mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
 _SILENT: Final = 5.0
-_STARTING: Final = (1, 2)
-"""Values of MAV_STATE: boot, calibrating."""
+_STARTING: Final = (mavlink.MAV_STATE_BOOT, mavlink.MAV_STATE_CALIBRATING)
 
 
 def firmware(case: Case) -> Iterator[Finding]:
@@ -121,7 +114,7 @@ def state(case: Case) -> Iterator[Finding]:
         return
     if not case.log and not case.vehicle.vehicle.alive:
         yield Finding(
-            f"no HEARTBEAT for {case.silent_for(0):.0f} s",
+            f"no HEARTBEAT for {case.silent_for(mavlink.MAVLINK_MSG_ID_HEARTBEAT):.0f} s",
             Severity.BLOCKING,
             "Whether it still follows is not known; after 3 s a companion sends nothing more.",
             "See whether the autopilot hangs or the link is gone.",
@@ -133,7 +126,7 @@ def state(case: Case) -> Iterator[Finding]:
             "The link was lost, or it was switched off. All of this is about how it was before.",
             "If it was not switched off: a stronger radio, or a companion on board, which needs none.",
         )
-    mode = _mode(case, beat)
+    mode = mode_of(beat)
     armed = "armed" if case.vehicle.vehicle.armed else "disarmed"
     where = _where(case)
     steered = case.vehicle.vehicle.in_guided_mode
@@ -168,10 +161,10 @@ def state(case: Case) -> Iterator[Finding]:
             "Sensors are being calibrated; it refuses to arm.",
             "Leave it still and ask again in half a minute.",
         )
-    elif beat.system_status >= CRITICAL:
+    elif beat.system_status >= mavlink.MAV_STATE_CRITICAL:
         yield Finding(
             "its state is critical"
-            if beat.system_status == CRITICAL
+            if beat.system_status == mavlink.MAV_STATE_CRITICAL
             else "its state is an emergency, or it shuts down",
             Severity.BLOCKING,
             "A failsafe of the autopilot is at work (battery, estimator, links), and has the last word.",
@@ -187,17 +180,16 @@ def state(case: Case) -> Iterator[Finding]:
         )
 
 
-def _mode(case: Case, beat: Heartbeat) -> str:
-    if not case.px4 and beat.type not in ROTORCRAFT:
-        return str(beat.custom_mode)  # Other ArduPilot vehicles number their modes differently.
-    return mode_name("px4" if case.px4 else "ardupilot", beat.custom_mode)
-
-
 def _where(case: Case) -> str:
     extended = case.vehicle.latest(ExtendedSysState)
     if extended is None:
         return ""
-    words = {ON_GROUND: ", on the ground", IN_AIR: ", in the air", 3: ", taking off", 4: ", landing"}
+    words = {
+        mavlink.MAV_LANDED_STATE_ON_GROUND: ", on the ground",
+        mavlink.MAV_LANDED_STATE_IN_AIR: ", in the air",
+        mavlink.MAV_LANDED_STATE_TAKEOFF: ", taking off",
+        mavlink.MAV_LANDED_STATE_LANDING: ", landing",
+    }
     return words.get(extended.landed_state, "")
 
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import CommandLong, Message, Source, SysStatus
 from outrider.doctor.speaker import Speaker
 
-RUN_CHECKS: Final = 401
-_PX4: Final = 12
 _LISTEN: Final = 35_000_000
 """µs; ArduPilot sends its texts every 30 s even without a request."""
 _LISTEN_PX4: Final = 6_000_000
@@ -43,7 +43,7 @@ class Objections:
         self._last = now
         self._times += 1
         system, component = vehicle.source
-        return [CommandLong(me, system, component, RUN_CHECKS, 0, (0.0,) * 7)]
+        return [CommandLong(me, system, component, mavlink.MAV_CMD_RUN_PREARM_CHECKS, 0, (0.0,) * 7)]
 
     def left(self, vehicle: Speaker, now: int) -> int:
         """Return the longest time (µs) left to wait; 0 when there is nothing to wait for."""
@@ -51,18 +51,13 @@ class Objections:
             return 0
         if self._known(vehicle):
             return max(max(vehicle.objected_at, self._last) + _SETTLED - now, 0)
-        listen = _LISTEN_PX4 if _is_px4(vehicle) else _LISTEN
+        listen = _LISTEN_PX4 if vehicle.is_px4 else _LISTEN
         return listen if self._first is None else max(self._first + listen - now, 0)
 
     def _open(self, vehicle: Speaker) -> bool:
         fails = vehicle.latest(SysStatus) is not None and not vehicle.vehicle.healthy
-        return fails and not vehicle.vehicle.armed and (vehicle.tells_checks or _is_px4(vehicle))
+        return fails and not vehicle.vehicle.armed and (vehicle.tells_checks or vehicle.is_px4)
 
     def _known(self, vehicle: Speaker) -> bool:
         """Return whether the vehicle was asked and has named a reason, possibly before the request."""
         return bool(vehicle.objections) and self._first is not None
-
-
-def _is_px4(vehicle: Speaker) -> bool:
-    beat = vehicle.vehicle.heartbeat
-    return beat is not None and beat.autopilot == _PX4

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import EkfStatus, EstimatorStatus, GpsRaw
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
-from outrider.doctor.speaker import ABSOLUTE_POSITION, FIX_3D
 
-_CONSTANT_POSITION: Final = 0x80
-_RELATIVE_POSITION: Final = 0x8
-_UNINITIALISED: Final = 0x400
-"""Bit of ArduPilot's EKF_STATUS_REPORT."""
 _POOR_HDOP, _POOR_ACCURACY = 2.0, 2.5
 
 
 def estimator(case: Case) -> Iterator[Finding]:
-    """Yield findings from ArduPilot's EKF_STATUS_REPORT or PX4's ESTIMATOR_STATUS."""
+    """Yield findings from ArduPilot's EKF_STATUS_REPORT or PX4's ESTIMATOR_STATUS: ten bits agree."""
     reported: EkfStatus | EstimatorStatus | None
     reported = case.vehicle.latest(EstimatorStatus) if case.px4 else case.vehicle.latest(EkfStatus)
     if reported is None:
@@ -30,16 +26,16 @@ def estimator(case: Case) -> Iterator[Finding]:
             "Nobody asked for it in this log." if case.log else "It was asked for and did not come.",
         )
         return
-    if reported.flags & ABSOLUTE_POSITION and not reported.flags & _UNINITIALISED:
+    if reported.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS and not reported.flags & mavlink.EKF_UNINITIALIZED:
         yield Finding(
             "the estimator has an absolute position",
             Severity.OK,
             f"Set-points in local NED mean a place on the globe.{case.vehicle.located.history}",
         )
         return
-    if not case.px4 and reported.flags & _CONSTANT_POSITION:
+    if not case.px4 and reported.flags & mavlink.EKF_CONST_POS_MODE:
         why = "It assumes that it does not move at all (constant position)."
-    elif reported.flags & _RELATIVE_POSITION:
+    elif reported.flags & mavlink.ESTIMATOR_POS_HORIZ_REL:
         why = "It knows only how it moved (optical flow, dead reckoning), not where on the globe it is."
     else:
         why = "It has no position."
@@ -66,7 +62,7 @@ def gps(case: Case) -> Iterator[Finding]:
         )
         return
     satellites = "" if fix.satellites is None else f", {fix.satellites} satellites"
-    if fix.fix_type < FIX_3D:
+    if fix.fix_type < mavlink.GPS_FIX_TYPE_3D_FIX:
         yield Finding(
             f"GPS: no fix in three dimensions{satellites}",
             Severity.BLOCKING,
@@ -74,7 +70,12 @@ def gps(case: Case) -> Iterator[Finding]:
             "Open sky, time, or a look at the receiver (GPS1_TYPE; GPS_1_CONFIG with PX4).",
         )
         return
-    words = {3: "3D fix", 4: "DGPS", 5: "RTK float", 6: "RTK fixed"}
+    words = {
+        mavlink.GPS_FIX_TYPE_3D_FIX: "3D fix",
+        mavlink.GPS_FIX_TYPE_DGPS: "DGPS",
+        mavlink.GPS_FIX_TYPE_RTK_FLOAT: "RTK float",
+        mavlink.GPS_FIX_TYPE_RTK_FIXED: "RTK fixed",
+    }
     what = f"GPS: {words.get(fix.fix_type, f'fix {fix.fix_type}')}{satellites}"
     poor = (fix.hdop is not None and fix.hdop > _POOR_HDOP) or fix.horizontal_accuracy > _POOR_ACCURACY
     if poor:
@@ -85,7 +86,7 @@ def gps(case: Case) -> Iterator[Finding]:
             "nearer than they say.",
             "Wait for more satellites, or keep wider distances (position_sigma).",
         )
-    elif fix.fix_type >= 5:
+    elif fix.fix_type >= mavlink.GPS_FIX_TYPE_RTK_FLOAT:
         yield Finding(what, Severity.OK, f"Good to centimetres or decimetres.{case.vehicle.fixed.history}")
     else:
         yield Finding(

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
 
-from companion.flight.vehicle import INVALID
+from pymavlink.dialects.v20 import all as mavlink
+
+from companion.values.components import COMPONENT
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 from outrider.doctor.hearing import MOST, SETPOINTS, Hearing
 from outrider.doctor.speaker import Speaker
 from outrider.logs.words import enumerated
-
-COMPANION: Final = 195
-"""Component id of ``fly``."""
 
 
 def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
@@ -105,7 +103,7 @@ def _about(case: Case, speaker: Speaker) -> Iterator[Finding]:
             else "Two who steer one vehicle make it jump between what each wants.",
             "" if case.log else f"End the program that speaks as {name} before an escort begins.",
         )
-    elif own and component == COMPANION:
+    elif own and component == COMPONENT:
         yield Finding(
             f"a companion is at work already ({name})",
             Severity.NOTE if case.log else Severity.WARNING,
@@ -118,7 +116,7 @@ def _about(case: Case, speaker: Speaker) -> Iterator[Finding]:
             Severity.NOTE,
             "It may take the vehicle over at any time, and keeps it then.",
         )
-    elif speaker.heartbeat is not None and speaker.heartbeat.autopilot == INVALID:
+    elif speaker.heartbeat is not None and speaker.heartbeat.autopilot == mavlink.MAV_AUTOPILOT_INVALID:
         kind = (enumerated("MAV_TYPE", speaker.heartbeat.type) or "").removeprefix("MAV_TYPE_").lower()
         yield Finding(
             f"another component: {name}, {kind.replace('_', ' ')}", Severity.NOTE, "It does not disturb."

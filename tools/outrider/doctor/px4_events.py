@@ -11,8 +11,10 @@ from struct import Struct
 from typing import Final
 
 from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import all as mavlink
 
-from mavlink_bridge.wire.framing import SIGNATURE_LENGTH, Frame
+from mavlink_bridge.wire.framing import Frame
+from outrider.logs.flight_modes import mode_name
 
 EVENT: Final = 410
 CRC_EXTRA: Final = b"\xa0"
@@ -101,20 +103,20 @@ _CHECKS: Final = {
     "check_gf_violation_max_hor_dist": "it is outside its fence",
     "check_gf_violation_max_alt": "it is above its fence",
 }
-# Navigation states by custom_mode's main and sub mode.
+# Navigation states by mode.
 _STATES: Final = {
-    (1, 0): 0,
-    (2, 0): 1,
-    (3, 0): 2,
-    (4, 2): 17,
-    (4, 3): 4,
-    (4, 4): 3,
-    (4, 5): 5,
-    (4, 6): 18,
-    (4, 8): 19,
-    (4, 9): 20,
-    (6, 0): 14,
-    (7, 0): 15,
+    "MANUAL": 0,
+    "ALTCTL": 1,
+    "POSCTL": 2,
+    "AUTO TAKEOFF": 17,
+    "AUTO HOLD": 4,
+    "AUTO MISSION": 3,
+    "AUTO RETURN": 5,
+    "AUTO LAND": 18,
+    "AUTO FOLLOW": 19,
+    "AUTO PRECLAND": 20,
+    "OFFBOARD": 14,
+    "STABILIZED": 15,
 }
 
 
@@ -133,7 +135,7 @@ def genuine(frame: Frame) -> bool:
     """Return whether ``frame`` is an EVENT with a correct checksum."""
     if frame.message_id != EVENT or frame.version != 2:
         return False
-    end = len(frame.data) - 2 - (SIGNATURE_LENGTH if frame.signed else 0)
+    end = len(frame.data) - 2 - (mavlink.MAVLINK_SIGNATURE_BLOCK_LEN if frame.signed else 0)
     return mcrf4xx(frame.data[1:end] + CRC_EXTRA) == int.from_bytes(frame.data[end : end + 2], "little")
 
 
@@ -143,6 +145,6 @@ def reason(frame: Frame, custom_mode: int) -> str | None:
         return None
     payload = frame.payload.ljust(LAYOUT.size, b"\0")
     number, _, _, _, _, levels, modes = LAYOUT.unpack_from(payload)
-    state = _STATES.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF))
+    state = _STATES.get(mode_name("px4", custom_mode))
     concerned = state is None or modes >> state & 1
     return _WORDS.get(number & 0xFFFFFF) if concerned and levels & 0xF <= _WARNING else None

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import CommandLong, Heartbeat, Message, ParamRequestRead, Source
-from outrider.doctor.case import PX4_NUMBER
 from outrider.doctor.examination import Examination
 from outrider.doctor.objections import Objections
 from outrider.doctor.settings import names
 from outrider.doctor.speaker import Speaker
 
-COMPONENT: Final = 193
-"""MAV_COMP_ID_ONBOARD_COMPUTER3.
+COMPONENT: Final[int] = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER3
+"""Component id of the doctor.
 
 It is not a ground station: FS_GCS_ENABLE and NAV_DLL_ACT act when a ground station's HEARTBEAT, once
 received, is lost. It is not 195, the id of ``fly``: others would take the doctor for a companion.
@@ -27,7 +28,6 @@ STRANGER: Final = Source(245, COMPONENT)
 
 A serial link, for example, may wait for a first message.
 """
-_ONBOARD_CONTROLLER, _INVALID, _ACTIVE = 18, 8, 4
 _HEARTBEAT_EVERY: Final = 1_000_000
 _PATIENCE: Final = 700_000
 """Time until a request is repeated (µs), and until streams that flow unasked have arrived."""
@@ -35,11 +35,26 @@ _LISTEN: Final = 2_000_000
 _TRIES: Final = 3
 _AT_ONCE: Final = 2
 """Maximum number of requests in one step: 57 600 baud carry a hundred a second, but also other traffic."""
-_REQUEST_MESSAGE: Final = 512
-_ONCE: Final = (148, 49, 242)
-"""AUTOPILOT_VERSION, GPS_GLOBAL_ORIGIN, HOME_POSITION: requested at once, as they are rarely streamed."""
-_FLOWING: Final = (1, 32, 30, 33, 245, 24, 147, 2)
-_ESTIMATOR: Final = {True: 230, False: 193}
+_ONCE: Final = (
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+)
+"""Requested at once, as they are rarely streamed."""
+_FLOWING: Final = (
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
+)
+_ESTIMATOR: Final = {
+    True: mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+    False: mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+}
 """Id of the estimator's status message, by whether the autopilot is PX4."""
 
 
@@ -74,7 +89,8 @@ class Questions:
         said: list[Message] = []
         if self._beat is None or now - self._beat >= _HEARTBEAT_EVERY:
             self._beat = now
-            said.append(Heartbeat(self.me, _ONBOARD_CONTROLLER, _INVALID, 0, 0, _ACTIVE))
+            kind, autopilot = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
+            said.append(Heartbeat(self.me, kind, autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE))
         if vehicle is not None:
             open_ones = [key for key in self._wanted(vehicle, now) if self._is_open(key, vehicle, now)]
             said += [self._ask(key, vehicle, now) for key in open_ones[:_AT_ONCE]]
@@ -98,7 +114,7 @@ class Questions:
         return 0 if vehicle is None else self._objections.left(vehicle, now)
 
     def _wanted(self, vehicle: Speaker, now: int) -> tuple[int | str, ...]:
-        px4 = _is_px4(vehicle)
+        px4 = vehicle.is_px4
         wanted: tuple[int | str, ...] = _ONCE + names(px4=px4)
         if self._met is not None and now - self._met >= _LISTEN:
             wanted += (*_FLOWING, _ESTIMATOR[px4])
@@ -116,13 +132,8 @@ class Questions:
             return ParamRequestRead(self.me, -1, system, component, key)
         self._examination.asked[key] = times + 1
         params = (float(key), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return CommandLong(self.me, system, component, _REQUEST_MESSAGE, 0, params)
+        return CommandLong(self.me, system, component, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, params)
 
 
 def _answered(key: int | str, vehicle: Speaker) -> bool:
     return key in vehicle.parameters if isinstance(key, str) else key in vehicle.streams
-
-
-def _is_px4(vehicle: Speaker) -> bool:
-    beat = vehicle.vehicle.heartbeat
-    return beat is not None and beat.autopilot == PX4_NUMBER

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.flight.autopilots.limits import stock_parameters
-from outrider.doctor.case import ARDUPILOT_NUMBER, PX4_NUMBER, Case
+from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 from outrider.doctor.rule import Rule
 from outrider.doctor.rules_ardupilot import ARDUPILOT_RULES
 from outrider.doctor.rules_px4 import PX4_RULES
 
 _ALSO: Final = {
-    True: ("BAT_LOW_THR", *stock_parameters(PX4_NUMBER)),
-    False: ("BATT_LOW_VOLT", *stock_parameters(ARDUPILOT_NUMBER)),
+    True: ("BAT_LOW_THR", *stock_parameters(mavlink.MAV_AUTOPILOT_PX4)),
+    False: ("BATT_LOW_VOLT", *stock_parameters(mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)),
 }
 """Parameters that other checks need, by whether the autopilot is PX4."""
 _URGENT: Final = frozenset(("COM_OBL_RC_ACT", "GUID_TIMEOUT"))

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections import deque
 from typing import Final, TypeVar, cast
 
-from companion.flight.vehicle import INVALID, PREARM_OK, Vehicle
+from pymavlink.dialects.v20 import all as mavlink
+
+from companion.flight.vehicle import Vehicle
 from mavlink_bridge.messages import (
     Attitude,
     AttitudeQuaternion,
@@ -32,13 +34,6 @@ from outrider.doctor.px4_events import reason
 from outrider.doctor.slope import Slope
 
 M = TypeVar("M", bound=Message)
-GROUND_STATION: Final = 6
-"""MAV_TYPE_GCS."""
-ABSOLUTE_POSITION: Final = 0x10
-"""Bit of ESTIMATOR_STATUS_FLAGS, which EKF_STATUS_REPORT shares."""
-CRITICAL: Final = 5
-"""Value of MAV_STATE; 6 is emergency."""
-FIX_3D: Final = 3
 _KEPT_FRAMES, _KEPT_TEXTS, _KEPT_PARAMETERS, _KEPT_PLACES = 32, 40, 4096, 8
 _KEPT_OBJECTIONS: Final = 16
 _OBJECTING: Final = ("prearm", "preflight", "arming denied", "arm:")
@@ -148,12 +143,21 @@ class Speaker:
     def is_autopilot(self) -> bool:
         """Whether it is an autopilot, by its heartbeat."""
         beat = self.heartbeat
-        return beat is not None and beat.autopilot != INVALID and beat.type != GROUND_STATION
+        return (
+            beat is not None
+            and beat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
+            and beat.type != mavlink.MAV_TYPE_GCS
+        )
+
+    @property
+    def is_px4(self) -> bool:
+        """Whether it is a PX4, by its heartbeat."""
+        return self.heartbeat is not None and bool(self.heartbeat.autopilot == mavlink.MAV_AUTOPILOT_PX4)
 
     @property
     def is_ground_station(self) -> bool:
         """Whether it is a ground station, by its heartbeat."""
-        return self.heartbeat is not None and self.heartbeat.type == GROUND_STATION
+        return self.heartbeat is not None and self.heartbeat.type == mavlink.MAV_TYPE_GCS
 
     def _note(self, now: int, message: Message) -> None:
         if isinstance(message, _CLOCKED) and message.time_boot:
@@ -165,7 +169,7 @@ class Speaker:
             case Heartbeat():
                 profile = self.vehicle.profile
                 fell = profile is not None and message.custom_mode in profile.fallen_modes
-                failed = fell and message.system_status >= CRITICAL
+                failed = fell and message.system_status >= mavlink.MAV_STATE_CRITICAL
                 self.guided_losses += guided and self.vehicle.armed and failed
             case StatusText():
                 self.texts.append((now, message))
@@ -177,11 +181,14 @@ class Speaker:
                 self.identities.add((message.uid, message.uid2))
             case SysStatus():
                 self.armable.tell(now, self.vehicle.healthy)
-                self.tells_checks |= bool((message.present | message.health) & PREARM_OK)
+                self.tells_checks |= bool(
+                    (message.present | message.health) & mavlink.MAV_SYS_STATUS_PREARM_CHECK
+                )
             case EkfStatus() | EstimatorStatus():
-                self.located.tell(now, bool(message.flags & ABSOLUTE_POSITION))
+                # The two messages share the bit.
+                self.located.tell(now, bool(message.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS))
             case GpsRaw():
-                self.fixed.tell(now, message.fix_type >= FIX_3D)
+                self.fixed.tell(now, message.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX)
             case GpsGlobalOrigin():
                 self._move(message)
             case GlobalPosition():

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.flight.readiness import STREAMS
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
@@ -29,19 +31,40 @@ class Need(NamedTuple):
 
 
 NEEDS: Final = (
-    Need(32, "LOCAL_POSITION_NED", _ASKED[32], 2.0, True, "Every plan begins where this says that it is."),
-    Need(30, "ATTITUDE", _ASKED[30], 2.0, True, "It says where the nose points when set-points begin."),
-    Need(1, "SYS_STATUS", _ASKED[1], 0.2, True, "It has the pre-arm check and the battery."),
     Need(
-        245,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        "LOCAL_POSITION_NED",
+        _ASKED[mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED],
+        2.0,
+        True,
+        "Every plan begins where this says that it is.",
+    ),
+    Need(
+        mavlink.MAVLINK_MSG_ID_ATTITUDE,
+        "ATTITUDE",
+        _ASKED[mavlink.MAVLINK_MSG_ID_ATTITUDE],
+        2.0,
+        True,
+        "It says where the nose points when set-points begin.",
+    ),
+    Need(
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+        "SYS_STATUS",
+        _ASKED[mavlink.MAVLINK_MSG_ID_SYS_STATUS],
+        0.2,
+        True,
+        "It has the pre-arm check and the battery.",
+    ),
+    Need(
+        mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
         "EXTENDED_SYS_STATE",
-        _ASKED[245],
+        _ASKED[mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE],
         0.5,
         False,
         "It says whether an armed vehicle stands or flies.",
     ),
     Need(
-        33,
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
         "GLOBAL_POSITION_INT",
         1.0,
         0.2,

@@ -11,10 +11,11 @@ from outrider.export.attitude import leanings
 from outrider.export.mcap_file import Entry, McapFile
 from outrider.export.written import Written
 from outrider.logs.message_stream import Watch, watched
+from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION
 from outrider.runs.source import Run
 
-_ATTACHED = ((CONFIGURATION, "application/yaml"), ("summary.json", "application/json"))
+_ATTACHED = ((CONFIGURATION, "application/yaml"), (names.SUMMARY, "application/json"))
 _PREPARED = 0.15
 """Share of the work that is done after the first pass through the logs, which reads the attitudes."""
 

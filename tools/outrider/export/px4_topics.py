@@ -11,13 +11,13 @@ from collections.abc import Callable, Mapping
 from struct import Struct
 from typing import Any, Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from outrider.export.ulog_file import Topic
 from outrider.logs.dialect import Kind
 
-_LOCAL_NED = 1
-_ARMED_FLAG, _ARMED, _DISARMED = 128, 2, 1
-_ON_GROUND = 1
-_FORCE, _YAW, _YAW_RATE = 512, 1024, 2048
+_ARMED, _DISARMED = 2, 1
+"""Values of PX4's arming_state."""
 _NAN = math.nan
 _CODES: Final = {"bool": "?", "uint8_t": "B", "float": "f", "double": "d"}
 
@@ -95,7 +95,7 @@ class Px4Topics:
         system, component = self._who
         if values["target_system"] != system or values["target_component"] not in (0, component):
             return []
-        if values["coordinate_frame"] != _LOCAL_NED:
+        if values["coordinate_frame"] != mavlink.MAV_FRAME_LOCAL_NED:
             return []
         position, velocity, acceleration, yaw, yaw_rate = _setpoint(values)
         return [_view(ORDERED, *position, *velocity, *acceleration, yaw, yaw_rate)]
@@ -122,20 +122,20 @@ class Px4Topics:
 
     def followed(self, values: Values) -> list[View]:
         """Convert POSITION_TARGET_LOCAL_NED, if it is in local NED."""
-        if values["coordinate_frame"] != _LOCAL_NED:
+        if values["coordinate_frame"] != mavlink.MAV_FRAME_LOCAL_NED:
             return []
         position, velocity, acceleration, yaw, yaw_rate = _setpoint(values)
         return [_view(FOLLOWED, *position, yaw, yaw_rate, *velocity, *acceleration)]
 
     def status(self, values: Values) -> list[View]:
         """Convert HEARTBEAT."""
-        armed = _ARMED if values["base_mode"] & _ARMED_FLAG else _DISARMED
+        armed = _ARMED if values["base_mode"] & mavlink.MAV_MODE_FLAG_SAFETY_ARMED else _DISARMED
         return [_view(STATUS, armed, values["type"], *self._who)]
 
     def landed(self, values: Values) -> list[View]:
         """Convert EXTENDED_SYS_STATE; an undefined landed state gives nothing."""
         state = values["landed_state"]
-        return [_view(LANDED, state == _ON_GROUND)] if state else []
+        return [_view(LANDED, state == mavlink.MAV_LANDED_STATE_ON_GROUND)] if state else []
 
     def battery(self, values: Values) -> list[View]:
         """Convert SYS_STATUS."""
@@ -192,13 +192,15 @@ def _setpoint(values: Values) -> tuple[Numbers, Numbers, Numbers, float, float]:
     def counts(names: tuple[str, str, str], first: int) -> Numbers:
         return tuple(_NAN if mask & first << k else values[name] for k, name in enumerate(names))
 
-    acceleration = (_NAN,) * 3 if mask & _FORCE else counts(("afx", "afy", "afz"), 64)
+    acceleration: Numbers = (_NAN,) * 3
+    if not mask & mavlink.POSITION_TARGET_TYPEMASK_FORCE_SET:
+        acceleration = counts(("afx", "afy", "afz"), mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE)
     return (
-        counts(("x", "y", "z"), 1),
-        counts(("vx", "vy", "vz"), 8),
+        counts(("x", "y", "z"), mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE),
+        counts(("vx", "vy", "vz"), mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE),
         acceleration,
-        _NAN if mask & _YAW else values["yaw"],
-        _NAN if mask & _YAW_RATE else values["yaw_rate"],
+        _NAN if mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE else values["yaw"],
+        _NAN if mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE else values["yaw_rate"],
     )
 
 

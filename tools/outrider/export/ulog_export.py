@@ -13,6 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from outrider.errors import InputError
 from outrider.export.px4_topics import TOPICS, Px4Topics
 from outrider.export.ulog_file import Topic, UlogFile
@@ -21,10 +23,7 @@ from outrider.logs.dialect import Kind
 from outrider.logs.message_stream import Log, Spoken, Watch, watched
 from outrider.runs.source import Run
 
-AUTOPILOT: Final = 1
-"""MAV_COMP_ID_AUTOPILOT1."""
 SECOND: Final = 1_000_000
-_NO_AUTOPILOT = 8
 _SURVEYED = 0.3
 """Share of the work that is done after the first pass, which finds the senders."""
 _HEAD = (("uint8_t", "link"), ("uint8_t", "system"), ("uint8_t", "component"))
@@ -72,9 +71,9 @@ def survey(messages: Iterable[Spoken]) -> Survey:
 
 def _is_vehicle(spoken: Spoken) -> bool:
     """Return whether the message is the heartbeat of an autopilot."""
-    if spoken.kind.name != "HEARTBEAT" or spoken.component != AUTOPILOT:
+    if spoken.kind.name != "HEARTBEAT" or spoken.component != mavlink.MAV_COMP_ID_AUTOPILOT1:
         return False
-    return bool(spoken.kind.read(spoken.payload)["autopilot"] != _NO_AUTOPILOT)
+    return bool(spoken.kind.read(spoken.payload)["autopilot"] != mavlink.MAV_AUTOPILOT_INVALID)
 
 
 def _vehicles(log: Log, found: Survey) -> list[int]:
@@ -123,7 +122,7 @@ class _Book:
     def __init__(self, file: UlogFile, system: int, zero: int, by_link: bool) -> None:
         self.file = file
         self._system, self._zero, self._by_link = system, zero, by_link
-        self._px4 = Px4Topics(system, AUTOPILOT)
+        self._px4 = Px4Topics(system, mavlink.MAV_COMP_ID_AUTOPILOT1)
 
     def add(self, spoken: Spoken) -> None:
         """Write a message, its conversion to PX4's topics, and its text if it is a STATUSTEXT."""
@@ -131,7 +130,7 @@ class _Book:
         link = spoken.link if self._by_link else 0
         head = bytes((spoken.link, spoken.system, spoken.component))
         self.file.data(time, mavlink_topic(kind), (link, spoken.system, spoken.component), head + payload)
-        own = (spoken.system, spoken.component) == (self._system, AUTOPILOT)
+        own = (spoken.system, spoken.component) == (self._system, mavlink.MAV_COMP_ID_AUTOPILOT1)
         for view in (self._px4.said if own else self._px4.reported)(kind, payload):
             self.file.data(time, view.topic, link, view.values)
         if kind.name == "STATUSTEXT":

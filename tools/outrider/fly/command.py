@@ -26,12 +26,13 @@ from outrider.fly.screen import Screen
 from outrider.fly.terminal import Terminal
 from outrider.fly.wiring import Wiring, wire
 from outrider.interruption import Came, noted
+from outrider.runs import names
+from outrider.runs.configuration import CONFIGURATION
 from outrider.runs.directories import new_directory
 from outrider.terminal.lines import say
 
 FAULT: Final = 3
 """Exit status of a flight that ended with a fault."""
-CONFIGURATION, SUMMARY = "configuration.yaml", "summary.json"
 _STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 """Signals that suspend a process: Ctrl-Z, and a terminal's signals to background processes."""
@@ -67,10 +68,10 @@ def _live(asked: Request) -> int:
             flight = _flown(asked, directory, event_log, stops, wiring)
     found = summary(flight, directory)
     try:
-        (directory / SUMMARY).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        (directory / names.SUMMARY).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         with suppress(OSError):
-            say(f"{directory / SUMMARY}: not written: {error.strerror}")
+            say(f"{directory / names.SUMMARY}: not written: {error.strerror}")
     with suppress(OSError):
         if asked.as_json:
             sys.stdout.write(json.dumps(found) + "\n")

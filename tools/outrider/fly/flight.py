@@ -16,11 +16,13 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any, Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.dry_run import ONLOOKER
 from companion.flight.hold_on_exit import LastWord
 from companion.flight.landing import Landing
 from companion.flight.readiness import OPERATORS_GO
-from companion.values.components import AUTOPILOT, COMPONENT
+from companion.values.components import COMPONENT
 from companion.values.phase import Phase
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.messages import Heartbeat, Source
@@ -293,7 +295,7 @@ class Flight:
         state = self.state
         if self.asked.dry_run or state.beat is None:
             return
-        beat = Heartbeat(Source(self.asked.system, AUTOPILOT), *state.beat)
+        beat = Heartbeat(Source(self.asked.system, mavlink.MAV_COMP_ID_AUTOPILOT1), *state.beat)
         if self._signing is not None:
             self._signing.resume(state.stamp)
         word = LastWord(self.asked.system, beat, self._signing, steered=state.ours)

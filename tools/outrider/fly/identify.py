@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.flight.autopilots import Profile
 from companion.flight.autopilots.known import KNOWN, profile_of
-from companion.telemetry.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
-from companion.values.components import AUTOPILOT
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.wire.codec import Codec
@@ -15,7 +15,6 @@ from outrider.errors import InputError
 _BEAT = 1_000_000
 _PATIENCE = 60_000_000
 """Time for which only other vehicles may be received (µs): the own autopilot may boot last."""
-_HEARTBEAT = 0
 
 
 class Identification:
@@ -29,7 +28,9 @@ class Identification:
         self._link, self._endpoint, self._own, self._system = link, endpoint, own, own.system
         self._signing = signing
         self._codec = Codec(
-            lambda identifier, _system, component: identifier == _HEARTBEAT and component == AUTOPILOT,
+            lambda identifier, _system, component: (
+                identifier == mavlink.MAVLINK_MSG_ID_HEARTBEAT and component == mavlink.MAV_COMP_ID_AUTOPILOT1
+            ),
             signing,
         )
         self._others: dict[int, Heartbeat] = {}
@@ -48,11 +49,18 @@ class Identification:
             # Routers and autopilots that wait for a first message learn the return address from this
             # heartbeat.
             self._next = now + _BEAT
-            beat = Heartbeat(self._own, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+            beat = Heartbeat(
+                self._own,
+                mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+                mavlink.MAV_AUTOPILOT_INVALID,
+                0,
+                0,
+                mavlink.MAV_STATE_ACTIVE,
+            )
             self._link.send(self._codec.encode(beat))
         for data in self._link.receive():
             for message in self._codec.feed(data, whole=True):
-                if isinstance(message, Heartbeat) and message.autopilot != AUTOPILOT_INVALID:
+                if isinstance(message, Heartbeat) and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID:
                     if message.source.system == self._system:
                         return self._known(message)
                     self._others[message.source.system] = message

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config import CompanionConfig
 from companion.flight.readiness import HEALTH, STREAMS
-from companion.telemetry.sharing import ACTIVE, AUTOPILOT_INVALID, ONBOARD_CONTROLLER
 from mavlink_bridge.links.endpoints import BAUD_RATES, Endpoint, Serial
 from mavlink_bridge.messages import (
     Attitude,
@@ -37,19 +38,20 @@ TARGET_HZ: Final = 5.0
 """Rate of the target's GLOBAL_POSITION_INT on the same link (Hz)."""
 _BITS: Final = 10
 """Bits per byte on the line, with start and stop bit."""
-_SIGNATURE: Final = 13
 _SECOND: Final = 1e6
 _ONE: Final = Source(1, 1)
 _STATE: Final = GlobalPosition(_ONE, 1, 1.0, 1.0, 1.0, 1.0, (1.0, 1.0, 1.0), 1.0)
 _PLAN: Final = Tunnel(_ONE, 0, 0, PAYLOAD_TYPE, b"\xff" * 128)
-_BEAT: Final = Heartbeat(_ONE, ONBOARD_CONTROLLER, AUTOPILOT_INVALID, 0, 0, ACTIVE)
+_BEAT: Final = Heartbeat(
+    _ONE, mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE
+)
 _ANY: Final[Vector] = (1.0, 1.0, 1.0)
 _SETPOINT: Final = SetpointLocal(_ONE, 1, 1, 1, 1, 1, _ANY, _ANY, _ANY, 1.0, 1.0)
 _TOLD: Final[dict[int, Message]] = {
-    1: SysStatus(_ONE, 1, 1, 1, 1.0, 1.0),
-    30: Attitude(_ONE, 1, 1.0, 1.0, 1.0, _ANY),
-    32: LocalPosition(_ONE, 1, _ANY, _ANY),
-    245: ExtendedSysState(_ONE, 1, 1),
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: SysStatus(_ONE, 1, 1, 1, 1.0, 1.0),
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: Attitude(_ONE, 1, 1.0, 1.0, 1.0, _ANY),
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: LocalPosition(_ONE, 1, _ANY, _ANY),
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: ExtendedSysState(_ONE, 1, 1),
 }
 _HEALTH: Final[tuple[Message, ...]] = (
     GpsRaw(_ONE, 1, 3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 9, 1.0, 1.0, 1.0, 1.0),
@@ -142,4 +144,5 @@ def doubts_of_autopilot(endpoint: Endpoint, config: CompanionConfig, signed: boo
 
 
 def _size(message: Message, signed: bool) -> int:
-    return len(Codec().encode(message)) + (_SIGNATURE if signed else 0)
+    size = len(Codec().encode(message))
+    return size + (mavlink.MAVLINK_SIGNATURE_BLOCK_LEN if signed else 0)

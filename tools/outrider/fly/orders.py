@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
+from typing import Final
 
-from companion.flight.command_protocol import ACCEPTED
-from companion.flight.orders import NAV_LOITER_UNLIM, NAV_RETURN
-from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.telemetry.reception import LINKS
 from companion.values.components import COMPONENT
 from mavlink_bridge.messages import CommandLong, Source
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 
-OPERATOR = 190
-"""MAV_COMP_ID_MISSIONPLANNER, used under the vehicle's own system id, which no ground station uses."""
+OPERATOR: Final[int] = mavlink.MAV_COMP_ID_MISSIONPLANNER
+"""Component id of the orders, used under the vehicle's own system id, which no ground station uses."""
 QUIT = "quit"
-_COMMANDS = {"go": NAV_TAKEOFF, "hold": NAV_LOITER_UNLIM, "return": NAV_RETURN, "land": NAV_LAND}
+_COMMANDS = {
+    "go": mavlink.MAV_CMD_NAV_TAKEOFF,
+    "hold": mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+    "return": mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+    "land": mavlink.MAV_CMD_NAV_LAND,
+}
 WORDS = (*_COMMANDS, QUIT)
 _NAN = float("nan")
 
@@ -41,7 +46,7 @@ def answered(command: int, result: int, phase: str, waiting: str) -> str:
     If the order was not accepted, the text names the current ``phase`` and what the companion waits for.
     """
     word = next((word for word, number in _COMMANDS.items() if number == command), f"command {command}")
-    if result == ACCEPTED:
+    if result == mavlink.MAV_RESULT_ACCEPTED:
         return f"{word}: taken"
     why = f", waits for {waiting}" if waiting else ""
     return f"{word}: not taken: phase {phase}{why}"

@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.links.link import LinkCounters
 from mavlink_bridge.messages import CommandAck
 from mavlink_bridge.wire.codec import Codec
@@ -26,7 +28,6 @@ No parent then forwards orders or sends the hold request at the end.
 """
 _BETWEEN: Final = 0.5
 """Time between two beats (s)."""
-_ACK: Final = 77
 _BUFFER: Final = 1 << 20
 
 
@@ -86,7 +87,9 @@ class OrderLink:
     def __init__(self, end: socket.socket, clock: Callable[[], float] = time.monotonic) -> None:
         """Wrap the socket; ``clock`` returns seconds."""
         self._end, self._clock = end, clock
-        self._codec = Codec(lambda identifier, _system, _component: identifier == _ACK)
+        self._codec = Codec(
+            lambda identifier, _system, _component: identifier == mavlink.MAVLINK_MSG_ID_COMMAND_ACK
+        )
         self._received = 0
         self._contact: float | None = None
         self.stop = False

@@ -5,14 +5,22 @@ from __future__ import annotations
 from struct import Struct
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.dry_run import REQUESTS
 from mavlink_bridge.links.link import Link, LinkCounters
 from mavlink_bridge.wire.framing import Frame, leading_frames
 
-_COMMAND_LONG: Final = 76
 _COMMAND: Final = Struct("<28xH")
-_TELL: Final = frozenset((0, 20, 111, 251, 253))
-"""HEARTBEAT, PARAM_REQUEST_READ, TIMESYNC, NAMED_VALUE_FLOAT, STATUSTEXT."""
+_TELL: Final = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
+        mavlink.MAVLINK_MSG_ID_TIMESYNC,
+        mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
+        mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+    )
+)
 
 
 class ReadOnlyLink:
@@ -53,7 +61,7 @@ class ReadOnlyLink:
 
 def harmless(frame: Frame) -> bool:
     """Return whether ``frame`` leaves a vehicle's behaviour unchanged."""
-    if frame.message_id == _COMMAND_LONG:
+    if frame.message_id == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
         (command,) = _COMMAND.unpack_from(frame.payload.ljust(_COMMAND.size, b"\0"))
         return command in REQUESTS
     return frame.message_id in _TELL

@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections import Counter
 from math import dist, hypot, inf, isfinite, pi
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config.planning import HeadingConfig, LimitsConfig
-from companion.flight.setpoint import FRAME_LOCAL_NED, is_finite
+from companion.flight.setpoint import is_finite
 from mavlink_bridge.messages import SetpointLocal, Vector
 
 TOGETHER = 100_000
@@ -80,7 +82,9 @@ class SetpointCheck:
         wrong = {
             "not all are finite": not self.finite,
             f"type masks other than 0x{mask:03X}": bool(set(self.masks) - {mask}),
-            f"frames other than {FRAME_LOCAL_NED}": bool(set(self.frames) - {FRAME_LOCAL_NED}),
+            f"frames other than {mavlink.MAV_FRAME_LOCAL_NED}": bool(
+                set(self.frames) - {mavlink.MAV_FRAME_LOCAL_NED}
+            ),
             f"faster than {self._fastest:.1f} m/s": self.speed > self._fastest + _ROUNDED,
             f"more than {self._hardest:.1f} m/s²": self.acceleration > self._hardest + _ROUNDED,
             f"a jump of {self.jump:.2f} m": self.jump > _CORRECTED,

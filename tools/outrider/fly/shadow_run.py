@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.flight.autopilots import Profile
 from companion.flight.autopilots.known import KNOWN, profile_of
-from companion.telemetry.sharing import AUTOPILOT_INVALID
-from companion.values.components import AUTOPILOT
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.tlog.log import read_tlog
@@ -28,7 +28,6 @@ from outrider.terminal.share_progress import share_progress
 
 _FAR: Final = 20_000.0
 """Distance from the fleet origin (m) beyond which a flight is not one of this fleet."""
-_HEARTBEAT: Final = 0
 
 
 def dry_run_of_log(asked: Request, log: Path) -> int:
@@ -100,11 +99,12 @@ def _faults(asked: Request, found: ShadowRun, mask: int) -> list[str]:
 
 def _autopilots(log: Path) -> dict[int, int]:
     """Return MAV_AUTOPILOT of each vehicle of the log, by system id."""
-    codec = Codec(lambda identifier, _system, component: (identifier, component) == (_HEARTBEAT, AUTOPILOT))
+    beat = mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAV_COMP_ID_AUTOPILOT1
+    codec = Codec(lambda identifier, _system, component: (identifier, component) == beat)
     found: dict[int, int] = {}
     for record in read_tlog(log):
         for message in codec.feed(record.frame):
-            if isinstance(message, Heartbeat) and message.autopilot != AUTOPILOT_INVALID:
+            if isinstance(message, Heartbeat) and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID:
                 known = profile_of(message) is not None
                 if known or message.source.system not in found:
                     found[message.source.system] = message.autopilot
@@ -117,7 +117,7 @@ def _profile(asked: Request, log: Path, autopilots: dict[int, int]) -> Profile:
     Raises InputError, which lists the vehicles that are there and those that may be flown.
     """
     system = asked.system
-    profile = KNOWN.get(autopilots.get(system, AUTOPILOT_INVALID))
+    profile = KNOWN.get(autopilots.get(system, mavlink.MAV_AUTOPILOT_INVALID))
     if profile is not None:
         return profile
     there = ", ".join(

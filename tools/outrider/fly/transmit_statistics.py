@@ -6,6 +6,8 @@ from collections import Counter
 from struct import Struct
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config.planning import LimitsConfig
 from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.messages import SetpointLocal
@@ -14,7 +16,6 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import leading_frames
 from outrider.fly.setpoint_check import gauge_for
 
-_COMMAND_LONG, _SETPOINT = 76, 84
 _COMMAND: Final = Struct("<28xH")
 
 
@@ -31,7 +32,11 @@ class TransmitStatistics:
         self.commands: Counter[int] = Counter()
         self.setpoints = gauge_for(limits, compensation=compensation)
         self.newest: SetpointLocal | None = None
-        self._codec = Codec(lambda identifier, _system, _component: identifier == _SETPOINT)
+        self._codec = Codec(
+            lambda identifier, _system, _component: (
+                identifier == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
+            )
+        )
 
     def begin(self, now: int, node: str, /) -> None:
         """Do nothing; a tap needs this method."""
@@ -42,10 +47,10 @@ class TransmitStatistics:
             return
         for frame in leading_frames(datagram.data)[0]:
             self.messages[datagram.link] += 1
-            if frame.message_id == _COMMAND_LONG:
+            if frame.message_id == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
                 (command,) = _COMMAND.unpack_from(frame.payload.ljust(_COMMAND.size, b"\0"))
                 self.commands[command] += 1
-            elif frame.message_id == _SETPOINT:
+            elif frame.message_id == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED:
                 for message in self._codec.feed(frame.data, whole=True):
                     if isinstance(message, SetpointLocal):
                         self.take(now, message)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from contextlib import ExitStack
 from typing import NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config import CompanionConfig
 from companion.telemetry.reception import accepts
-from companion.values.components import AUTOPILOT, COMPONENT
+from companion.values.components import COMPONENT
 from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.errors import LinkError, LogError
 from mavlink_bridge.links.demultiplexer import Dealer, DealtLink, Wants
@@ -21,12 +23,15 @@ from outrider.supervision.duplicate_ids import DuplicateIds
 
 LAST_VEHICLE = 250
 """Highest system id of a vehicle; those above are ground stations'."""
-_COMMANDS = (75, 76)
-_SWARMS = frozenset((33, 111, 385))
-"""Messages between companions: GLOBAL_POSITION_INT, TIMESYNC, TUNNEL.
-
-Other messages may come from any sender.
-"""
+_COMMANDS = (mavlink.MAVLINK_MSG_ID_COMMAND_INT, mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
+_SWARMS = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_TIMESYNC,
+        mavlink.MAVLINK_MSG_ID_TUNNEL,
+    )
+)
+"""Messages between companions; other messages may come from any sender."""
 
 
 class Wiring(NamedTuple):
@@ -78,7 +83,10 @@ def wants(name: str, system: int, target: int, config: CompanionConfig) -> Wants
     def ground(header: Header) -> bool:
         if header.system != system:
             return True
-        return header.message_id in _COMMANDS and header.component not in (AUTOPILOT, COMPONENT)
+        return header.message_id in _COMMANDS and header.component not in (
+            mavlink.MAV_COMP_ID_AUTOPILOT1,
+            COMPONENT,
+        )
 
     rules: dict[str, Wants] = {
         "autopilot": autopilot,

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from outrider.runs.figures import LIMIT, TARGET, THING, colour
 from outrider.sweep.runs import Ending, Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_TARGET, _THING = "0.25", "0.6"
-_LIMIT = "#b00020"
 _LONG = 44
 """Largest number of characters of a failure above a panel."""
 _HIGH = 6.0
@@ -69,19 +68,19 @@ def _paths(axes: Axes, scene: Mapping[str, Any]) -> None:
     from matplotlib.patches import Circle
 
     for east, north, radius in scene["obstacles"]:
-        axes.add_patch(Circle((east, north), radius, color=_THING, lw=0.0))
+        axes.add_patch(Circle((east, north), radius, color=THING, lw=0.0))
     for way, radius in zip(scene["moving"], scene["moving_radius"], strict=True):
-        axes.plot(*np.array(way).T, color=_THING, lw=0.8)
-        axes.add_patch(Circle(way[-1], radius, fc="0.8", ec=_THING, lw=0.8))
+        axes.plot(*np.array(way).T, color=THING, lw=0.8)
+        axes.add_patch(Circle(way[-1], radius, fc="0.8", ec=THING, lw=0.8))
     positions = np.array(scene["position"])
     for k in range(positions.shape[1]):
-        colour = f"C{k % 10}" if k < scene["vehicles"] else _THING
-        axes.plot(*positions[:, k].T, lw=0.9, color=colour)
-        axes.plot(*positions[0, k], "o", ms=3, mfc="none", color=colour)
-        axes.plot(*positions[-1, k], "o", ms=4, color=colour)
+        of = colour(k) if k < scene["vehicles"] else THING
+        axes.plot(*positions[:, k].T, lw=0.9, color=of)
+        axes.plot(*positions[0, k], "o", ms=3, mfc="none", color=of)
+        axes.plot(*positions[-1, k], "o", ms=4, color=of)
     if scene["target"]:
-        axes.plot(*np.array(scene["target"]).T, color=_TARGET, lw=1.2, ls=":")
-        axes.plot(*scene["target"][-1], "*", ms=9, color=_TARGET)
+        axes.plot(*np.array(scene["target"]).T, color=TARGET, lw=1.2, ls=":")
+        axes.plot(*scene["target"][-1], "*", ms=9, color=TARGET)
     axes.set_aspect("equal", adjustable="datalim")
     axes.tick_params(labelsize=7)
     axes.grid(alpha=0.3)
@@ -90,7 +89,7 @@ def _paths(axes: Axes, scene: Mapping[str, Any]) -> None:
 def _separation(axes: Axes, scene: Mapping[str, Any]) -> None:
     near = np.array(scene["separation"])
     axes.plot(scene["time_s"], np.where(near < 0.0, np.nan, near), lw=1.0)
-    axes.axhline(scene["d_min"], color=_LIMIT, lw=1.0)
+    axes.axhline(scene["d_min"], color=LIMIT, lw=1.0)
     axes.set_ylim(0.0, _HIGH)
     axes.set_xlabel("s", fontsize=8)
     axes.tick_params(labelsize=7)

@@ -6,9 +6,6 @@ from typing import NamedTuple
 
 from mavlink_bridge.tlog.log import TlogReport
 
-NO_AUTOPILOT = 8
-"""MAV_AUTOPILOT_INVALID: a component that is no autopilot."""
-
 
 class Gaps(NamedTuple):
     """Silences of more than ``limit`` µs: their ``number``, and the ``longest`` (µs; 0 without any)."""

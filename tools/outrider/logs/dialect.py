@@ -7,7 +7,7 @@ from struct import Struct
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
 _CODES: Final = {
     "int8_t": "b",
@@ -128,9 +128,9 @@ def text(raw: bytes) -> str:
 @cache
 def kind(identifier: int) -> Kind:
     """Return the type of message with this id; raise KeyError if the dialect lacks it."""
-    return Kind(dialect.mavlink_map[identifier])
+    return Kind(mavlink.mavlink_map[identifier])
 
 
 def identifiers() -> list[int]:
     """Return the ids of all types of messages in the dialect."""
-    return sorted(dialect.mavlink_map)
+    return sorted(mavlink.mavlink_map)

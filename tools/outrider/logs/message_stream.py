@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.framing import Flaw, frame_at
-from mavlink_bridge.wire.signing import SETUP_SIGNING
 from outrider.logs.dialect import Kind, kind
 
 LATEST: Final = (1 << 63) // 1000 - 1
@@ -76,7 +77,7 @@ class Log:
             frame = frame_at(record.frame, 0)
             if isinstance(frame, Flaw):
                 raise LogError(f"{self.path}: the reader handed out what is no frame")
-            if frame.message_id == SETUP_SIGNING:
+            if frame.message_id == mavlink.MAVLINK_MSG_ID_SETUP_SIGNING:
                 continue
             known = kind(frame.message_id)
             yield Spoken(

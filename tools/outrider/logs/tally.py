@@ -7,18 +7,18 @@ from collections.abc import Callable, Iterable
 from itertools import islice
 from pathlib import Path
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.tlog.log import Record, TlogReader
 from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.framing import SIGNED_FLAG, START_V2
-from outrider.logs.census import NO_AUTOPILOT, Census, Gaps, Vehicle
+from outrider.logs.census import Census, Gaps, Vehicle
 
 SHORTEST_GAP = 1 << 21
 """µs, 2.1 s: a shorter silence is never a gap, because components send a HEARTBEAT every second."""
 UNUSUAL = 8
 """A silence of this many usual intervals is a gap."""
-_HEARTBEAT = 0
 _OFTEN = 1 << 12
 """Number of records between two reports of progress."""
 
@@ -92,9 +92,9 @@ class _Tally:
         """Count ``records``, in the order of the log."""
         known = self._streams.get
         for time, link, frame in records:
-            if frame[0] == START_V2:
+            if frame[0] == mavlink.PROTOCOL_MARKER_V2:
                 key = frame[5:10]
-                signed = frame[2] == SIGNED_FLAG
+                signed = frame[2] == mavlink.MAVLINK_IFLAG_SIGNED
             else:
                 key, signed = frame[3:6], False
             stream = known(key) or self._meet(key, time)
@@ -135,7 +135,11 @@ class _Tally:
         counts: Counter[int] = Counter()
         for key, stream in streams.items():
             counts[_message_id(key)] += stream.count
-        beats = [stream.frame for key, stream in sorted(streams.items()) if _message_id(key) == _HEARTBEAT]
+        beats = [
+            stream.frame
+            for key, stream in sorted(streams.items())
+            if _message_id(key) == mavlink.MAVLINK_MSG_ID_HEARTBEAT
+        ]
         beat = _spokesman(beats)
         return Vehicle(
             system,
@@ -159,4 +163,8 @@ def _message_id(key: bytes) -> int:
 def _spokesman(frames: list[bytes]) -> Heartbeat | None:
     """Return the autopilot's heartbeat, or else that of the lowest component id; None without any."""
     beats = [message for frame in frames for message in Codec().feed(frame) if isinstance(message, Heartbeat)]
-    return min(beats, key=lambda beat: (beat.autopilot == NO_AUTOPILOT, beat.source.component), default=None)
+    return min(
+        beats,
+        key=lambda beat: (beat.autopilot == mavlink.MAV_AUTOPILOT_INVALID, beat.source.component),
+        default=None,
+    )

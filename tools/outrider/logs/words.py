@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
-from outrider.logs.census import NO_AUTOPILOT, Vehicle
+from outrider.logs.census import Vehicle
 
 MILLION: Final = 1_000_000
 """µs of a second."""
@@ -15,7 +15,7 @@ MILLION: Final = 1_000_000
 
 def rates(vehicle: Vehicle) -> Mapping[str, float]:
     """Return the messages per second by name, the most frequent first."""
-    return {dialect.mavlink_map[number].msgname: vehicle.rate(many) for number, many in vehicle.counts}
+    return {mavlink.mavlink_map[number].msgname: vehicle.rate(many) for number, many in vehicle.counts}
 
 
 def enumerated(enumeration: str, number: int | None) -> str | None:
@@ -25,13 +25,13 @@ def enumerated(enumeration: str, number: int | None) -> str | None:
     """
     if number is None:
         return None
-    entry = dialect.enums[enumeration].get(number)
+    entry = mavlink.enums[enumeration].get(number)
     return f"{enumeration}_{number}" if entry is None else str(entry.name)
 
 
 def kind(vehicle: Vehicle) -> str:
     """Return type and autopilot in words."""
-    autopilot = None if vehicle.autopilot == NO_AUTOPILOT else vehicle.autopilot
+    autopilot = None if vehicle.autopilot == mavlink.MAV_AUTOPILOT_INVALID else vehicle.autopilot
     named = (("MAV_TYPE", vehicle.kind), ("MAV_AUTOPILOT", autopilot))
     names = [(enumeration, enumerated(enumeration, number)) for enumeration, number in named]
     words = [name.removeprefix(f"{before}_").lower().replace("_", " ") for before, name in names if name]

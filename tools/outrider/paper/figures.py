@@ -10,13 +10,13 @@ import numpy as np
 
 from outrider.paper.results import Result
 from outrider.paper.rows import Row
+from outrider.runs.figures import TARGET, THING, colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _METHODS = ("baseline", "swivel", "approach_angle", "tangential")
-_TARGET = "0.25"
 
 
 def draw(
@@ -51,12 +51,12 @@ def _paths(axes: Axes, row: Row, trace: Mapping[str, Any]) -> None:
     flying = len(trace["gradient"][0]) if trace["gradient"] else 0
     for k in range(positions.shape[1]):
         bystander = k >= flying
-        colour = "0.6" if bystander else f"C{k % 10}"
-        axes.plot(positions[:, k, 0], positions[:, k, 1], lw=1.0, color=colour)
-        axes.plot(*positions[0, k, :2], "o", ms=4, mfc="none", color=colour)
-        axes.plot(*positions[-1, k, :2], "s" if bystander else "o", ms=5, color=colour)
+        of = THING if bystander else colour(k)
+        axes.plot(positions[:, k, 0], positions[:, k, 1], lw=1.0, color=of)
+        axes.plot(*positions[0, k, :2], "o", ms=4, mfc="none", color=of)
+        axes.plot(*positions[-1, k, :2], "s" if bystander else "o", ms=5, color=of)
     if trace["target"] is not None and row.scenario.startswith("scenario"):
-        axes.plot(*trace["target"][:2], "*", ms=11, color=_TARGET)
+        axes.plot(*trace["target"][:2], "*", ms=11, color=TARGET)
     axes.set(title=row.scenario, xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)

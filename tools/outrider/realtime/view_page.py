@@ -1,17 +1,16 @@
 """Shared memory of a real-time run for its view: states of the nodes, and commands to them.
 
-As on the ``Board`` each row is written by one process; a reader may see one half old and half new. The memory
-exists only in a run with a view.
+As on the ``SharedPage`` each row is written by one process; a reader may see one half old and half new. The
+memory exists only in a run with a view.
 """
 
 from __future__ import annotations
-
-import mmap
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.config.planning import MethodName
+from outrider.processes.shared_memory import SharedMemory
 from outrider.scene.changes import Change
 from outrider.scene.companion_snapshot import MODES, CompanionSnapshot
 from outrider.scene.snapshot import KNOTS, Array, State
@@ -31,8 +30,7 @@ class Window:
     """Shared memory for ``vehicles`` vehicles; made before the processes fork."""
 
     def __init__(self, vehicles: int) -> None:
-        memory = mmap.mmap(-1, 8 * (_WISHES + vehicles * _ROW))
-        numbers = np.frombuffer(memory, dtype=np.float64)
+        numbers = SharedMemory(0, _WISHES + vehicles * _ROW, 0).numbers
         self._commands: NDArray[np.float64] = numbers[:_WISHES]
         self._rows: NDArray[np.float64] = numbers[_WISHES:].reshape(vehicles, _ROW)
         self._rows[:] = np.nan

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import zip_longest
 from typing import NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.node import Datagram, Node
 from mavlink_bridge.tlog.log import Record
 from mavlink_bridge.wire.framing import leading_frames
@@ -17,8 +19,6 @@ from mavlink_bridge.wire.header import header
 from outrider.runs import names
 
 _LINKS = {number: link for link, number in names.LINK_NUMBERS.items()}
-SETPOINT = 84
-"""Id of SET_POSITION_TARGET_LOCAL_NED."""
 
 
 class Sent(NamedTuple):
@@ -85,7 +85,9 @@ def reenact(
         for before, after in zip_longest(logged, again):
             if before == after:
                 frames += 1
-                setpoints += header(before.frame).message_id == SETPOINT
+                setpoints += (
+                    header(before.frame).message_id == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
+                )
                 continue
             different += 1
             first = first or Difference(now, before, after)

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from pydantic import ValidationError
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from mavlink_bridge.messages import SetpointLocal
@@ -15,7 +16,7 @@ from mavlink_bridge.wire.header import header
 from outrider.errors import InputError
 from outrider.resources import find
 from outrider.scenarios.scenario import Origin, RecordedTarget, Ring, Scenario
-from outrider.shadow.roles import SETPOINT, Survey
+from outrider.shadow.roles import Survey
 from outrider.simulation.preparation import Prepared
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
@@ -67,11 +68,15 @@ def prepared(log: Path, seen: Survey, target: int, like: str) -> Prepared:
 
 def setpoints(log: Path) -> list[tuple[int, SetpointLocal]]:
     """Return all SET_POSITION_TARGET_LOCAL_NED of a log, with their times (µs)."""
-    codec = Codec(lambda identifier, _system, _component: identifier == SETPOINT)
+    codec = Codec(
+        lambda identifier, _system, _component: (
+            identifier == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
+        )
+    )
     return [
         (record.time, message)
         for record in read_tlog(log)
-        if header(record.frame).message_id == SETPOINT
+        if header(record.frame).message_id == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
         for message in codec.feed(record.frame)
         if isinstance(message, SetpointLocal)
     ]

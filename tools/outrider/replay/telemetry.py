@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link
@@ -19,48 +19,52 @@ from mavlink_bridge.wire.framing import without_signature
 from mavlink_bridge.wire.header import header
 from outrider.logs.timeline import IDLE, on_one_line
 
-_NAMES = [
-    "HEARTBEAT",
-    "SYS_STATUS",
-    "GPS_RAW_INT",
-    "GPS2_RAW",
-    "RAW_IMU",
-    "SCALED_IMU",
-    "SCALED_IMU2",
-    "SCALED_PRESSURE",
-    "ATTITUDE",
-    "ATTITUDE_QUATERNION",
-    "LOCAL_POSITION_NED",
-    "GLOBAL_POSITION_INT",
-    "SERVO_OUTPUT_RAW",
-    "VFR_HUD",
-    "ATTITUDE_TARGET",
-    "POSITION_TARGET_LOCAL_NED",
-    "POSITION_TARGET_GLOBAL_INT",
-    "HIGHRES_IMU",
-    "ALTITUDE",
-    "ESTIMATOR_STATUS",
-    "BATTERY_STATUS",
-    "HOME_POSITION",
-    "GPS_GLOBAL_ORIGIN",
-    "EXTENDED_SYS_STATE",
-    "VIBRATION",
-    "STATUSTEXT",
-    "WIND",
-    "EKF_STATUS_REPORT",
-    "MISSION_CURRENT",
-    "NAV_CONTROLLER_OUTPUT",
-    "TERRAIN_REPORT",
-    "NAMED_VALUE_FLOAT",
-]
 # Messages that an autopilot takes as sensor input are left out: ODOMETRY, DISTANCE_SENSOR, ADSB_VEHICLE,
 # SYSTEM_TIME and similar. A vehicle that follows another by its GLOBAL_POSITION_INT would follow a log.
-TELEMETRY: Final = frozenset(getattr(dialect, f"MAVLINK_MSG_ID_{name}") for name in _NAMES)
+TELEMETRY: Final = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+        mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+        mavlink.MAVLINK_MSG_ID_GPS2_RAW,
+        mavlink.MAVLINK_MSG_ID_RAW_IMU,
+        mavlink.MAVLINK_MSG_ID_SCALED_IMU,
+        mavlink.MAVLINK_MSG_ID_SCALED_IMU2,
+        mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
+        mavlink.MAVLINK_MSG_ID_VFR_HUD,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET,
+        mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+        mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT,
+        mavlink.MAVLINK_MSG_ID_HIGHRES_IMU,
+        mavlink.MAVLINK_MSG_ID_ALTITUDE,
+        mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+        mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
+        mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+        mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+        mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+        mavlink.MAVLINK_MSG_ID_VIBRATION,
+        mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+        mavlink.MAVLINK_MSG_ID_WIND,
+        mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+        mavlink.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
+        mavlink.MAVLINK_MSG_ID_TERRAIN_REPORT,
+        mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
+    )
+)
 """Ids of messages that report and request nothing."""
-_HEARTBEAT, _GROUND_STATION = 0, 6
 _TYPE_AT = 4
 """Offset of MAV_TYPE in a HEARTBEAT's payload."""
-_PAYLOAD = {0xFE: 6, 0xFD: 10}
+_PAYLOAD: Final[dict[int, int]] = {
+    mavlink.PROTOCOL_MARKER_V1: mavlink.HEADER_LEN_V1,
+    mavlink.PROTOCOL_MARKER_V2: mavlink.HEADER_LEN_V2,
+}
+"""Offset of the payload in a frame by the frame's first byte."""
 
 
 class Forwarder:
@@ -77,9 +81,9 @@ class Forwarder:
         # A listening link learns its destinations from what it receives; the content is ignored.
         self._link.receive()
         system, component, message_id = header(frame)
-        if message_id == _HEARTBEAT:
+        if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
             kind = frame[_PAYLOAD[frame[0]] + _TYPE_AT] if len(frame) > _PAYLOAD[frame[0]] + _TYPE_AT else 0
-            if kind == _GROUND_STATION:
+            if kind == mavlink.MAV_TYPE_GCS:
                 self._vehicles.discard((system, component))
             else:
                 self._vehicles.add((system, component))

@@ -9,24 +9,14 @@ import numpy as np
 from outrider.errors import InputError
 from outrider.report.run import Array, Motions, Plans, PlanTimes
 from outrider.runs.array_file import Shapes, read_arrays
+from outrider.runs.arrays import motion_shapes
 
 _LONGEST = 1e5
 """Largest time (s) from the goal event."""
 _FAR = 1e9
 """Largest magnitude (m, m/s, rad): more is damage."""
 
-_MOTIONS = {
-    "system": ("K",),
-    "time_s": ("T",),
-    "position": ("T", "K", 3),
-    "velocity": ("T", "K", 3),
-    "reference": ("T", "K", 3),
-    "yaw": ("T", "K"),
-    "tilt": ("T", "K"),
-    "target": ("T", 3),
-    "separation": ("T",),
-    "moving": ("T", "M", 3),
-}
+_MOTIONS = motion_shapes("K", "M")
 _PLANS = {"system": ("n",), "time_s": ("n",), "gradient": ("n", 3)}
 _PLAN_TIMES = {"system": ("n",), "plan_ms": ("n",)}
 

@@ -5,33 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from pymavlink.dialects.v20 import all as dialect
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import CommandAck, Heartbeat, StatusText
+from outrider.logs.flight_modes import is_armed, mode_of
 from outrider.report.run import Log
 
-ARMED = 0x80
-"""MAV_MODE_FLAG_SAFETY_ARMED."""
-_ACCEPTED, _IN_PROGRESS = 0, 5
-_PX4 = 12
-_ARDUCOPTER = {
-    0: "STABILIZE",
-    1: "ACRO",
-    2: "ALT_HOLD",
-    3: "AUTO",
-    4: "GUIDED",
-    5: "LOITER",
-    6: "RTL",
-    7: "CIRCLE",
-    9: "LAND",
-    16: "POSHOLD",
-    17: "BRAKE",
-    21: "SMART_RTL",
-}
-_PX4_MAIN = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 4: "AUTO", 5: "ACRO", 6: "OFFBOARD", 7: "STABILIZED"}
-_PX4_AUTO = {1: "READY", 2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND"}
-_SEVERE = 4
-"""MAV_SEVERITY_WARNING; a lower number is more severe."""
 _SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 _PIECE = 50
 """A STATUSTEXT of this length continues in the next one."""
@@ -72,7 +51,7 @@ def sayings(log: Log) -> Iterator[Saying]:
             yield text
             text = None
         if isinstance(said, CommandAck):
-            if said.result not in (_ACCEPTED, _IN_PROGRESS):
+            if said.result not in (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS):
                 yield Saying(time, "refused", f"{command(said.command)}: {_result(said.result)}", bad=True)
         elif isinstance(said, Heartbeat):
             yield from _changes(time, before, said)
@@ -81,37 +60,30 @@ def sayings(log: Log) -> Iterator[Saying]:
         yield text
 
 
-def mode(heartbeat: Heartbeat) -> str:
-    """Return the autopilot's name of the mode."""
-    number = heartbeat.custom_mode
-    if heartbeat.autopilot != _PX4:
-        return _ARDUCOPTER.get(number, f"mode {number}")
-    main, sub = number >> 16 & 0xFF, number >> 24
-    name = _PX4_MAIN.get(main, f"mode {main}")
-    return f"{name} {_PX4_AUTO.get(sub, sub)}" if main == 4 and sub else name
-
-
 def command(number: int) -> str:
     """Return MAVLink's name of a command, without the prefix."""
-    entry = dialect.enums["MAV_CMD"].get(number)
+    entry = mavlink.enums["MAV_CMD"].get(number)
     return str(entry.name).removeprefix("MAV_CMD_") if entry is not None else f"command {number}"
 
 
 def _result(number: int) -> str:
-    entry = dialect.enums["MAV_RESULT"].get(number)
+    entry = mavlink.enums["MAV_RESULT"].get(number)
     return str(entry.name).removeprefix("MAV_RESULT_").lower() if entry is not None else f"result {number}"
 
 
 def _text(time: int, said: StatusText) -> Saying:
     severity = min(said.severity, len(_SEVERITIES) - 1)
-    return Saying(time, "text", f"{_SEVERITIES[severity]}: {said.text}", bad=severity < _SEVERE)
+    return Saying(
+        time, "text", f"{_SEVERITIES[severity]}: {said.text}", bad=severity < mavlink.MAV_SEVERITY_WARNING
+    )
 
 
 def _changes(time: int, before: Heartbeat | None, now: Heartbeat) -> Iterator[Saying]:
+    state = "armed" if is_armed(now) else "disarmed"
     if before is None:
-        yield Saying(time, "mode", f"{mode(now)}, {'armed' if now.base_mode & ARMED else 'disarmed'}")
+        yield Saying(time, "mode", f"{mode_of(now)}, {state}")
         return
-    if (before.base_mode ^ now.base_mode) & ARMED:
-        yield Saying(time, "armed", "armed" if now.base_mode & ARMED else "disarmed")
+    if is_armed(before) != is_armed(now):
+        yield Saying(time, "armed", state)
     if before.custom_mode != now.custom_mode:
-        yield Saying(time, "mode", f"{mode(before)} → {mode(now)}")
+        yield Saying(time, "mode", f"{mode_of(before)} → {mode_of(now)}")

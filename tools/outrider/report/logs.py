@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.messages import CommandAck, Heartbeat, LocalPosition, Message, StatusText
@@ -16,10 +17,12 @@ from outrider.report.run import Log, Sender, Stream, Times, Utterance
 from outrider.runs import names
 
 SWARM = names.LINK_NUMBERS["swarm"]
-AUTOPILOT = 1
-"""MAV_COMP_ID_AUTOPILOT1."""
-_DECODED = {0, 32, 77, 253}
-"""HEARTBEAT, LOCAL_POSITION_NED, COMMAND_ACK, STATUSTEXT."""
+_DECODED = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
+    mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+}
 _LATEST = 1 << 62
 """Latest time (µs): a damaged time stamp may exceed a 64-bit integer."""
 _OFTEN = 4096
@@ -43,7 +46,7 @@ def read_log(owner: int, path: Path, at: Callable[[int], None] = lambda _bytes: 
 
 def sequence_and_sender(frame: bytes) -> tuple[int, Sender]:
     """Return the sequence number (0…255) and the sender from the header of a whole frame."""
-    if frame[0] == 0xFD:
+    if frame[0] == mavlink.PROTOCOL_MARKER_V2:
         return frame[4], Sender(frame[5], frame[6])
     return frame[2], Sender(frame[3], frame[4])
 
@@ -104,11 +107,11 @@ class _Pass:
         too.
         """
         if isinstance(message, LocalPosition):
-            if message.source.component == AUTOPILOT:
+            if message.source.component == mavlink.MAV_COMP_ID_AUTOPILOT1:
                 self._moments.append(time)
                 self._speeds.extend(message.velocity_ned)
         elif isinstance(message, Heartbeat):
-            if message.source.component == AUTOPILOT:
+            if message.source.component == mavlink.MAV_COMP_ID_AUTOPILOT1:
                 self._utterances.append(Utterance(time, message))
         elif isinstance(message, CommandAck | StatusText):
             self._utterances.append(Utterance(time, message))

@@ -18,7 +18,6 @@ from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION, Resolved
 from outrider.yaml_files.yaml_file import load
 
-SUMMARY, FLIGHT, PLANS, PLAN_TIMES = "summary.json", "flight.npz", "plans.npz", "plan_times.npz"
 _ALLOWED = "allowed: what outrider swarm leaves"
 _MOST_BYTES = 1 << 20
 """Largest size of a summary or a configuration."""
@@ -56,11 +55,11 @@ def read(
             gaps.append(Gap(name, _without_place(str(error).partition("\n")[0], directory / name) + more))
         return None
 
-    summary = part(SUMMARY, _summary)
+    summary = part(names.SUMMARY, _summary)
     configuration = part(CONFIGURATION, _text)
     resolved = None if configuration is None else part(CONFIGURATION, lambda path: load(path, Resolved))
-    motions = part(FLIGHT, arrays.motions)
-    plans, plan_times = part(PLANS, arrays.plans), part(PLAN_TIMES, arrays.plan_times)
+    motions = part(names.FLIGHT, arrays.motions)
+    plans, plan_times = part(names.PLANS, arrays.plans), part(names.PLAN_TIMES, arrays.plan_times)
     scenario = None if resolved is None else resolved.scenario
     logs = _logs(
         directory,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from outrider.errors import Fault, InputError
 from outrider.logs.message_stream import LATEST
-from outrider.runs.array_file import read_arrays
+from outrider.runs.array_file import Shapes, read_arrays
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -54,6 +54,22 @@ class Plans(NamedTuple):
     value: Array
 
 
+def motion_shapes(vehicles: int | str, moving: int | str) -> Shapes:
+    """Return the shapes of the arrays of ``flight.npz``: K and M as numbers, or as letters if unknown."""
+    return {
+        "system": (vehicles,),
+        "time_s": ("T",),
+        "position": ("T", vehicles, 3),
+        "velocity": ("T", vehicles, 3),
+        "reference": ("T", vehicles, 3),
+        "yaw": ("T", vehicles),
+        "tilt": ("T", vehicles),
+        "target": ("T", 3),
+        "separation": ("T",),
+        "moving": ("T", moving, 3),
+    }
+
+
 def read_motion(path: Path, vehicles: int, moving: int) -> Motion | None:
     """Read ``flight.npz`` with the given number of vehicles and moving obstacles.
 
@@ -61,22 +77,7 @@ def read_motion(path: Path, vehicles: int, moving: int) -> Motion | None:
     """
     if not path.is_file():
         return None
-    arrays = read_arrays(
-        path,
-        {
-            "start_us": (),
-            "system": (vehicles,),
-            "time_s": ("T",),
-            "position": ("T", vehicles, 3),
-            "velocity": ("T", vehicles, 3),
-            "reference": ("T", vehicles, 3),
-            "yaw": ("T", vehicles),
-            "tilt": ("T", vehicles),
-            "target": ("T", 3),
-            "separation": ("T",),
-            "moving": ("T", moving, 3),
-        },
-    )
+    arrays = read_arrays(path, {"start_us": (), **motion_shapes(vehicles, moving)})
     start, seconds = int(arrays["start_us"]), arrays["time_s"].astype(np.float64)
     rest = {name: arrays[name].astype(np.float32) for name in Motion._fields[4:]}
     return Motion(start, _unix(path, start, seconds), seconds, arrays["system"].astype(np.int64), **rest)

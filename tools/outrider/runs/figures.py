@@ -15,10 +15,15 @@ from outrider.scenarios.scenario import TARGET_SYSTEM
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_TARGET = "0.25"
-_LIMIT = "#b00020"
+TARGET, THING, LIMIT = "0.25", "0.6", "#b00020"
+"""Colours in pictures of flights: the target, obstacles and bystanders, and limits."""
 _NAMED = 24
 """Number of vehicles; the names of more would cover the figure."""
+
+
+def colour(k: int) -> str:
+    """Return the colour of vehicle ``k`` in pictures of flights."""
+    return f"C{k % 10}"
 
 
 def draw(flight: Outcome, summary: dict[str, Value], path: Path) -> None:
@@ -65,23 +70,24 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
     few = len(flight.systems) <= _NAMED
     for k, system in enumerate(flight.systems):
         name = f"{system}" if few else "_nolegend_"
-        (line,) = axes.plot(samples.position[:, k, 0], samples.position[:, k, 1], lw=1.0, label=name)
-        axes.plot(*samples.position[0, k, :2], "o", ms=4, mfc="none", color=line.get_color())
-        axes.plot(*samples.position[-1, k, :2], "o", ms=5, color=line.get_color())
+        of = colour(k)
+        axes.plot(samples.position[:, k, 0], samples.position[:, k, 1], lw=1.0, color=of, label=name)
+        axes.plot(*samples.position[0, k, :2], "o", ms=4, mfc="none", color=of)
+        axes.plot(*samples.position[-1, k, :2], "o", ms=5, color=of)
     for obstacle in flight.scenario.obstacles:
-        axes.add_patch(Circle(obstacle.at[:2], obstacle.radius, color="0.6", lw=0.0))
+        axes.add_patch(Circle(obstacle.at[:2], obstacle.radius, color=THING, lw=0.0))
     for j, moving in enumerate(flight.scenario.moving):
         way = samples.moving[:, j, :2]
-        axes.plot(way[:, 0], way[:, 1], color="0.6", lw=1.0)
-        axes.add_patch(Circle(way[-1], moving.radius, fc="0.8", ec="0.6", lw=1.0))
+        axes.plot(way[:, 0], way[:, 1], color=THING, lw=1.0)
+        axes.add_patch(Circle(way[-1], moving.radius, fc="0.8", ec=THING, lw=1.0))
     there = samples.target[np.isfinite(samples.target).all(axis=1)]
     if len(there):
-        axes.plot(there[:, 0], there[:, 1], color=_TARGET, lw=1.6, ls=":")
+        axes.plot(there[:, 0], there[:, 1], color=TARGET, lw=1.6, ls=":")
         name = "target" if flight.target_system == TARGET_SYSTEM else f"target {flight.target_system}"
-        axes.plot(*there[-1, :2], "*", ms=12, color=_TARGET, label=name)
+        axes.plot(*there[-1, :2], "*", ms=12, color=TARGET, label=name)
         if flight.scenario.task == "escort":
             outline = there[-1] + flight.scenario.companion.surface.outline()
-            axes.plot(outline[:, 0], outline[:, 1], color=_TARGET, lw=0.8, ls="--")
+            axes.plot(outline[:, 0], outline[:, 1], color=TARGET, lw=0.8, ls="--")
     axes.set(title="paths from above (o start, ● end)", xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
@@ -96,8 +102,8 @@ def _separation(axes: Axes, flight: Outcome, samples: Samples, time: np.ndarray)
     offset = np.linalg.norm(samples.position - samples.target[:, None], axis=-1).min(axis=1)
     if flight.scenario.d_min_target is not None:
         axes.plot(time, offset, lw=1.0, color="C2", label="vehicle to target")
-    axes.axhline(flight.scenario.d_min, color=_LIMIT, lw=1.0, label=f"d_min {flight.scenario.d_min} m")
-    axes.axhline(flight.span, color=_LIMIT, lw=1.0, ls=":", label=f"tip to tip {flight.span} m")
+    axes.axhline(flight.scenario.d_min, color=LIMIT, lw=1.0, label=f"d_min {flight.scenario.d_min} m")
+    axes.axhline(flight.span, color=LIMIT, lw=1.0, ls=":", label=f"tip to tip {flight.span} m")
     axes.set(title="least separation", ylabel="m")
     axes.set_ylim(0.0, None)
     _finish(axes, flight)

@@ -1,4 +1,4 @@
-"""Writer of ``flight.npz`` and ``plan_times.npz`` of a run directory: true motions, and costs of plans."""
+"""Writer of the ``.npz`` files of a run directory: true motions, and the costs and gradients of all plans."""
 
 from __future__ import annotations
 
@@ -44,6 +44,22 @@ def write_plan_times(flight: Outcome, path: Path) -> None:
         system=np.repeat(np.array(flight.systems[: len(spent)]), [len(part) for part in spent]),
         time_s=(np.array([at for part in due for at in part], dtype=np.int64) - start) * 1e-6,
         plan_ms=np.array([ns for part in spent for ns in part], dtype=np.float64) * 1e-6,
+    )
+
+
+def write_plans(flight: Outcome, path: Path) -> None:
+    """Write arrays with a row for each plan.
+
+    ``system``; ``time_s`` after the goal event, on the companion's clock; ``gradient`` (n, 3), ∇J divided by
+    Ω_t, fleet-local ENU, m. Lock-step writes the same bytes each time.
+    """
+    logs = flight.plan_logs
+    start = flight.clock_start or 0
+    np.savez_compressed(
+        path,
+        system=np.repeat(np.array(flight.systems[: len(logs)]), [len(log.times) for log in logs]),
+        time_s=np.concatenate([(log.times - start) * 1e-6 for log in logs]),
+        gradient=np.concatenate([log.gradients for log in logs]),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 TARGET, OPERATOR = "target", "operator"
+SUMMARY, FLIGHT, PLANS, PLAN_TIMES = "summary.json", "flight.npz", "plans.npz", "plan_times.npz"
 LINK_NUMBERS = {"autopilot": 0, "swarm": 1, "target": 2, "ground": 3}
 """Link numbers in the low two bits of a tlog's time stamps."""
 

@@ -13,7 +13,6 @@ from outrider.runs.arrays import Motion, Plans, read_motion, read_plans
 from outrider.runs.configuration import CONFIGURATION, configured
 from outrider.scenarios.scenario import Scenario
 
-FLIGHT, PLANS, PLAN_TIMES = "flight.npz", "plans.npz", "plan_times.npz"
 ALLOWED: Final = "allowed: a directory that outrider swarm left, or a tlog"
 
 
@@ -58,11 +57,11 @@ def _run(directory: Path, of_log: str) -> Run:
         raise InputError(Fault(str(directory), f"not a run directory: no {CONFIGURATION} in it; {ALLOWED}"))
     resolved = configured(directory, ALLOWED, of_log)
     scenario = resolved.scenario
-    motion = read_motion(directory / FLIGHT, len(scenario.systems), len(scenario.moving))
+    motion = read_motion(directory / names.FLIGHT, len(scenario.systems), len(scenario.moving))
     gradients = plan_times = None
     if motion is not None:
-        gradients = read_plans(directory / PLANS, "gradient", 3, motion.start_us)
-        plan_times = read_plans(directory / PLAN_TIMES, "plan_ms", None, motion.start_us)
+        gradients = read_plans(directory / names.PLANS, "gradient", 3, motion.start_us)
+        plan_times = read_plans(directory / names.PLAN_TIMES, "plan_ms", None, motion.start_us)
     logs, unread = [], []
     for system in scenario.systems:
         log = Log(directory / names.log(system), system)
@@ -72,5 +71,7 @@ def _run(directory: Path, of_log: str) -> Run:
         except LogError as error:
             unread.append(str(error))
     if motion is None and not logs:
-        raise InputError(Fault(str(directory), f"holds neither {FLIGHT} nor a log vehicle-N.tlog; {ALLOWED}"))
+        raise InputError(
+            Fault(str(directory), f"holds neither {names.FLIGHT} nor a log vehicle-N.tlog; {ALLOWED}")
+        )
     return Run(directory, scenario, resolved.seed, motion, gradients, plan_times, tuple(logs), tuple(unread))

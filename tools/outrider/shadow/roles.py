@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
-from companion.values.components import AUTOPILOT, COMPONENT
+from companion.values.components import COMPONENT
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, LocalPosition, Source
 from mavlink_bridge.tlog.log import Record
@@ -19,9 +20,12 @@ from mavlink_bridge.wire.header import header
 from outrider.errors import Fault, InputError
 from outrider.logs.timeline import on_one_line
 
-SETPOINT, LOCAL, GLOBAL, ORIGIN = 84, 32, 33, 49
 _FAR = 5000.0
-_SURVEYED = {LOCAL, GLOBAL, ORIGIN}
+_SURVEYED = {
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+}
 
 
 class Part(Enum):
@@ -46,7 +50,8 @@ class Cast:
     def part(self, frame: bytes) -> Part:
         """Return the companion's use of the record of ``frame``."""
         system, component, message_id = header(frame)
-        if message_id == SETPOINT and (system, component) != (self.own, AUTOPILOT):
+        from_autopilot = (system, component) == (self.own, mavlink.MAV_COMP_ID_AUTOPILOT1)
+        if message_id == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED and not from_autopilot:
             return Part.SENT
         if system == self.own:
             return Part.NOTHING if component == COMPONENT else Part.AUTOPILOT
@@ -111,7 +116,7 @@ def survey(records: Iterable[Record], own: int, name: str) -> Survey:
         for message in codec.feed(record.frame):
             if isinstance(message, GlobalPosition):
                 placed.add(message.source.system)
-            if message.source != Source(own, AUTOPILOT):
+            if message.source != Source(own, mavlink.MAV_COMP_ID_AUTOPILOT1):
                 continue
             match message:
                 case GlobalPosition():

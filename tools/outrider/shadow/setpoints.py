@@ -4,18 +4,28 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import SetpointLocal
 
 Array = NDArray[np.float64]
-_LOCAL_NED = 1
 TOGETHER = 100_000
 """µs. A longer interval is a gap, not a step."""
-_TRIPLES = {"position": 0x007, "velocity": 0x038, "acceleration": 0x1C0}
+_TRIPLES: Final[dict[str, int]] = {
+    "position": mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Y_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Z_IGNORE,
+    "velocity": mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VZ_IGNORE,
+    "acceleration": mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AZ_IGNORE,
+}
 """Bits of the type mask that mean *ignored*."""
 
 
@@ -62,10 +72,10 @@ def course(told: Sequence[tuple[int, SetpointLocal]]) -> Course:
     masks = np.array([m.type_mask for _, m in told], dtype=np.int64)
     for k, bits in enumerate(_TRIPLES.values()):
         values[(masks & bits) != 0, 3 * k : 3 * k + 3] = np.nan
-    values[(masks & 0x400) != 0, 9] = np.nan
+    values[(masks & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE) != 0, 9] = np.nan
     frames = np.array([m.frame for _, m in told], dtype=np.int64)
     # Offsets, and axes of the body, are no positions.
-    values[frames != _LOCAL_NED, 0:3] = np.nan
+    values[frames != mavlink.MAV_FRAME_LOCAL_NED, 0:3] = np.nan
     return Course(
         np.array([time for time, _ in told], dtype=np.int64),
         values[:, 0:3],
@@ -118,9 +128,9 @@ def _finite(message: SetpointLocal) -> bool:
     """Return whether all values that the mask does not ignore are finite."""
     parts = {"position": message.position, "velocity": message.velocity, "acceleration": message.acceleration}
     used = [v for name, triple in parts.items() if not message.type_mask & _TRIPLES[name] for v in triple]
-    if not message.type_mask & 0x400:
+    if not message.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE:
         used.append(message.yaw)
-    if not message.type_mask & 0x800:
+    if not message.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE:
         used.append(message.yaw_rate)
     return bool(np.isfinite(used).all())
 

@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.config import CompanionConfig
 from companion.shadow import ShadowCompanion
 from mavlink_bridge.clocks.clock import SimulatedClock
@@ -25,7 +27,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import header
 from outrider.logs.timeline import IDLE, on_one_line
 from outrider.scenarios.part import TARGET_SYSTEM
-from outrider.shadow.roles import GLOBAL, Cast, Part, Survey
+from outrider.shadow.roles import Cast, Part, Survey
 from outrider.simulation.beacon import Beacon
 from outrider.simulation.paths import Motion
 from outrider.supervision.supervised_node import SupervisedNode
@@ -157,10 +159,12 @@ class _StandIn:
     """
 
     def __init__(self, own: int, seen: Survey, fleet: FleetFrame) -> None:
-        self.own = Source(own, 1)
+        self.own = Source(own, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._local = None if seen.local else fleet
         self._codec = Codec()
-        self._reader = Codec(lambda identifier, _system, _component: identifier == GLOBAL)
+        self._reader = Codec(
+            lambda identifier, _system, _component: identifier == mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+        )
         latitude, longitude, altitude = seen.origin or (fleet.latitude, fleet.longitude, fleet.altitude)
         self._origin: Message | None = GpsGlobalOrigin(self.own, latitude, longitude, altitude, 0)
 
@@ -170,7 +174,8 @@ class _StandIn:
         if self._origin is not None:
             found.insert(0, self._codec.encode(self._origin))
             self._origin = None
-        if self._local is not None and header(frame)[1:] == (1, GLOBAL):
+        position = mavlink.MAV_COMP_ID_AUTOPILOT1, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+        if self._local is not None and header(frame)[1:] == position:
             for message in self._reader.feed(frame):
                 if isinstance(message, GlobalPosition):
                     place = enu_to_ned(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.telemetry.sharing import position_message
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel
@@ -14,7 +16,7 @@ class Beacon:
     """Sender of positions as ``system`` on ``link``, ``rate_hz`` times a second; times are µs."""
 
     def __init__(self, system: int, link: str, rate_hz: float, fleet: FleetFrame) -> None:
-        self.source = Source(system, 1)
+        self.source = Source(system, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._link, self._fleet = link, fleet
         self._period = round(1e6 / rate_hz)
         self._boot: int | None = None

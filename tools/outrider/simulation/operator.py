@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from pymavlink.dialects.v20 import all as mavlink
 
-from companion.flight.orders import DO_REPOSITION, NAV_RETURN
-from companion.flight.state_machine import NAV_LAND, NAV_TAKEOFF
 from companion.values.components import COMPONENT
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Source
@@ -16,7 +15,6 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 
 LINK = "ground"
-GLOBAL_FRAME = 0
 _NAN = float("nan")
 _RETRY = 500_000
 
@@ -30,7 +28,7 @@ class Operator:
 
     def __init__(self, fleet: FleetFrame) -> None:
         self._fleet = fleet
-        self._source = Source(255, 190)
+        self._source = Source(255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
         self._codec = Codec()
         self._open: dict[_Key, tuple[CommandInt | CommandLong, int]] = {}
         self._now = 0
@@ -38,18 +36,19 @@ class Operator:
     def take_off(self, system: int, height: float) -> None:
         """Order a climb to ``height`` (m) above the start, and then the escort."""
         params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, height)
-        self._order(CommandLong(self._source, system, COMPONENT, NAV_TAKEOFF, 0, params))
+        self._order(CommandLong(self._source, system, COMPONENT, mavlink.MAV_CMD_NAV_TAKEOFF, 0, params))
 
     def land(self, system: int) -> None:
         """Order a landing on the spot; a pending order to take off is withdrawn."""
-        self._open.pop((system, NAV_TAKEOFF), None)
+        self._open.pop((system, mavlink.MAV_CMD_NAV_TAKEOFF), None)
         params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0)
-        self._order(CommandLong(self._source, system, COMPONENT, NAV_LAND, 0, params))
+        self._order(CommandLong(self._source, system, COMPONENT, mavlink.MAV_CMD_NAV_LAND, 0, params))
 
     def come_back(self, system: int) -> None:
         """Order a return to the start and a landing there; a pending order to take off is withdrawn."""
-        self._open.pop((system, NAV_TAKEOFF), None)
-        self._order(CommandLong(self._source, system, COMPONENT, NAV_RETURN, 0, (0.0,) * 7))
+        self._open.pop((system, mavlink.MAV_CMD_NAV_TAKEOFF), None)
+        command = mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        self._order(CommandLong(self._source, system, COMPONENT, command, 0, (0.0,) * 7))
 
     def goal(self, system: int, position: NDArray[np.float64]) -> None:
         """Order a flight to ``position`` (3,), fleet-local ENU."""
@@ -59,8 +58,8 @@ class Operator:
                 self._source,
                 system,
                 COMPONENT,
-                GLOBAL_FRAME,
-                DO_REPOSITION,
+                mavlink.MAV_FRAME_GLOBAL,
+                mavlink.MAV_CMD_DO_REPOSITION,
                 (-1.0, 0.0, 0.0, _NAN),
                 round(latitude * 1e7),
                 round(longitude * 1e7),
@@ -78,7 +77,7 @@ class Operator:
         self._now = now
         for datagram in inbox:
             for message in self._codec.feed(datagram.data):
-                if isinstance(message, CommandAck) and message.result == 0:
+                if isinstance(message, CommandAck) and message.result == mavlink.MAV_RESULT_ACCEPTED:
                     self._open.pop((message.source.system, message.command), None)
         out = []
         for key, (order, due) in self._open.items():

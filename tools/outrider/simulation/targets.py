@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.frames import FleetFrame
@@ -225,7 +226,8 @@ def load(config: RecordedTarget, path: Path, fleet: FleetFrame) -> Recording:
     Raises InputError when there is no such log, when it ends before the piece does, or when it holds fewer
     than two such messages there.
     """
-    codec = Codec(lambda identifier, system, _component: identifier == 33 and system == config.system)
+    wanted = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, config.system
+    codec = Codec(lambda identifier, system, _component: (identifier, system) == wanted)
     first: int | None = None
     last = 0
     times: list[int] = []

@@ -8,11 +8,14 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from mavlink_bridge.clocks.clock import WallClock
-from mavlink_bridge.errors import EndpointError
+from mavlink_bridge.clocks.clock import Clock, WallClock
+from mavlink_bridge.errors import EndpointError, LinkError
+from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.opening import open_link
 from outrider.address_scope import exposed
 from outrider.errors import InputError
 from outrider.interruption import noted
@@ -22,7 +25,6 @@ from outrider.sitl_server.figures import Value, ready, summary
 from outrider.sitl_server.persistence import prepare
 from outrider.sitl_server.processes import Processes
 from outrider.sitl_server.request import Request
-from outrider.sitl_server.wiring import wire
 
 _LOOK: Final = 0.1
 """Time between two polls of the board (s)."""
@@ -47,7 +49,7 @@ def run(asked: Request, terms: Terms) -> int:
     began = time.monotonic()
     prepare(terms.state, asked.flavour, asked.systems)
     places = _addresses(asked, terms)
-    processes = Processes(asked, wire(places, WallClock()), terms.state)
+    processes = Processes(asked, _opened(places, WallClock()), terms.state)
     with noted((signal.SIGINT, signal.SIGTERM)) as stopped:
         try:
             announce(asked)
@@ -81,6 +83,25 @@ def _addresses(asked: Request, terms: Terms) -> list[Address]:
             "who can send there: --signing-key FILE is against that\n"
         )
     return places
+
+
+def _opened(places: Sequence[Address], clock: Clock) -> list[list[Link]]:
+    """Return the links of each vehicle. Raises InputError if one cannot be opened; then none stays open."""
+    with ExitStack() as opened:
+        every: list[list[Link]] = []
+        for address in places:
+            links = []
+            for endpoint in address.endpoints:
+                try:
+                    link = open_link(endpoint, clock)
+                except LinkError as error:
+                    hint = "; is another SITL running? --port-base P puts all ports elsewhere"
+                    raise InputError(f"{error}{hint if 'in use' in str(error) else ''}") from None
+                opened.callback(link.close)
+                links.append(link)
+            every.append(links)
+        opened.pop_all()
+    return every
 
 
 def _wait(processes: Processes, stopped: Sequence[object], count: int) -> None:

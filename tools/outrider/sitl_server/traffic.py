@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.wire.framing import STARTS, claimed_length
 
-_STATUSTEXT: Final = 253
-_HEADER: Final = 10
 _TEXT: Final = 50
 # Length of the payload's first fields: severity, 50 characters, id. The number of the piece follows.
 _PIECE: Final = 53
@@ -41,8 +41,8 @@ class Traffic:
         at = 0
         while at < len(data):
             length = data[at + 1]
-            if data[at + 7] == _STATUSTEXT and not data[at + 8] and not data[at + 9]:
-                self._note(data[at + _HEADER : at + _HEADER + length])
+            if data[at + 7] == mavlink.MAVLINK_MSG_ID_STATUSTEXT and not data[at + 8] and not data[at + 9]:
+                self._note(data[at + mavlink.HEADER_LEN_V2 : at + mavlink.HEADER_LEN_V2 + length])
             at += claimed_length(data, at) or len(data)
             self.sent += 1
 

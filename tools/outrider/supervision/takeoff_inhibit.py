@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from struct import Struct
 from typing import Final
 
-from companion.flight.state_machine import NAV_TAKEOFF
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.telemetry.reception import LINKS
 from companion.values.components import COMPONENT
 from mavlink_bridge.messages import CommandAck, Source
@@ -15,10 +16,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Frame, leading_frames
 from mavlink_bridge.wire.signing import Signing
 
-_COMMAND_LONG: Final = 76
 _ORDER: Final = Struct("<28xHBB")
-_DENIED: Final = 2
-"""MAV_RESULT."""
 
 
 class TakeoffInhibit:
@@ -40,12 +38,13 @@ class TakeoffInhibit:
             others = b"".join(frame.data for frame in frames if frame not in goes) + datagram.data[end:]
             passed.append(Datagram("ground", others))
             for go in goes:
-                answer = CommandAck(self._own, NAV_TAKEOFF, _DENIED, 0, 0, go.system, go.component)
+                command, result = mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_RESULT_DENIED
+                answer = CommandAck(self._own, command, result, 0, 0, go.system, go.component)
                 answers.append(Datagram("ground", self._codec.encode(answer)))
         return passed, answers
 
     def _is_go(self, frame: Frame) -> bool:
-        if frame.message_id != _COMMAND_LONG:
+        if frame.message_id != mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
             return False
         whom = _ORDER.unpack_from(frame.payload.ljust(_ORDER.size, b"\0"))
-        return whom == (NAV_TAKEOFF, *self._own)
+        return whom == (mavlink.MAV_CMD_NAV_TAKEOFF, *self._own)

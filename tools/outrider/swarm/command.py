@@ -12,11 +12,11 @@ import yaml
 
 from outrider.interruption import interruptible
 from outrider.resources import config_root
-from outrider.runs import figures
+from outrider.runs import figures, names
+from outrider.runs.configuration import CONFIGURATION
 from outrider.runs.directories import new_directory
-from outrider.runs.flight_file import write_flight, write_plan_times
+from outrider.runs.flight_file import write_flight, write_plan_times, write_plans
 from outrider.runs.outcome import Outcome
-from outrider.runs.plans_file import write_plans
 from outrider.runs.summary import Cost, Value, summarise, write
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.flight import Flight, Progress
@@ -62,7 +62,7 @@ def fly(
     with interruptible(f"{directory} keeps the configuration and the logs up to there, but no summary"):
         scenario = prepared.scenario
         resolved = {"seed": seed, "scenario": scenario.model_dump(mode="json")}
-        (directory / "configuration.yaml").write_text(
+        (directory / CONFIGURATION).write_text(
             yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True), encoding="utf-8"
         )
         if pace.real_time:
@@ -72,10 +72,10 @@ def fly(
         if show is not None:
             show.orders.write(directory)
         summary = summarise(outcome, cost, directory)
-        write(summary, directory / "summary.json")
-        write_plans(outcome, directory / "plans.npz")
-        write_flight(outcome, directory / "flight.npz")
-        write_plan_times(outcome, directory / "plan_times.npz")
+        write(summary, directory / names.SUMMARY)
+        write_plans(outcome, directory / names.PLANS)
+        write_flight(outcome, directory / names.FLIGHT)
+        write_plan_times(outcome, directory / names.PLAN_TIMES)
         figures.draw(outcome, summary, directory / "flight.png")
         return summary
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from outrider.runs.figures import LIMIT
 from outrider.sweep.report import CellReport
 from outrider.sweep.runs import Ending, Run
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 MOST_CURVES = 10
 """Number of cells with a colour and a curve of their own; every cell has a row."""
-_LIMIT = "#b00020"
 Reading = Callable[[Run], float | None]
 
 
@@ -102,14 +102,14 @@ def _spreads(
         shown = [(v, run) for v, run in readings if isfinite(v)]
         if never := len(readings) - len(shown):
             beside = axes.get_yaxis_transform()
-            axes.text(1.005, index, f"{never} never", va="center", fontsize=8, color=_LIMIT, transform=beside)
+            axes.text(1.005, index, f"{never} never", va="center", fontsize=8, color=LIMIT, transform=beside)
         if not shown:
             continue
         values = np.array([value for value, _ in shown])
         bad = np.array([run.ending is Ending.VIOLATION for _, run in shown])
         height = index + scatter.uniform(-0.3, 0.3, size=len(values))
         axes.plot(values[~bad], height[~bad], ".", ms=3, alpha=0.35, color=color, mew=0)
-        axes.plot(values[bad], height[bad], "x", ms=5, color=_LIMIT)
+        axes.plot(values[bad], height[bad], "x", ms=5, color=LIMIT)
         p5, p25, p50, p75, p95 = np.percentile(values, (5, 25, 50, 75, 95))
         axes.plot([p5, p95], [index, index], lw=1.0, color="0.15")
         axes.plot([p25, p75], [index, index], lw=4.0, color="0.15", solid_capstyle="butt")
@@ -120,6 +120,6 @@ def _spreads(
 
 def _limits(axes: Axes, cells: Sequence[CellReport]) -> None:
     for limit in sorted({cell.d_min for cell in cells if cell.d_min is not None}):
-        axes.axvline(limit, color=_LIMIT, lw=1.0, label=f"d_min {limit:g} m")
+        axes.axvline(limit, color=LIMIT, lw=1.0, label=f"d_min {limit:g} m")
     for span in sorted({cell.span for cell in cells if cell.span is not None}):
-        axes.axvline(span, color=_LIMIT, lw=1.0, ls=":", label=f"tip to tip {span:.2f} m")
+        axes.axvline(span, color=LIMIT, lw=1.0, ls=":", label=f"tip to tip {span:.2f} m")

@@ -6,19 +6,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
+from outrider.logs.flight_modes import mode_of
 from outrider.replay.run_replay import again
 from outrider.replay.target_replay import setpoints
-from outrider.report.log_events import mode
 from outrider.runs import names
 from outrider.runs.summary import Value
 from outrider.shadow.shadow_run import ShadowRun
 from outrider.testing.golden import Golden
 from outrider.testing.setpoints import Setpoints
-
-_HEARTBEAT = 0
 
 
 class Transition(NamedTuple):
@@ -122,14 +122,13 @@ class Replayed(Setpoints):
 
 def modes(log: Path, system: int) -> list[Transition]:
     """Return the modes of the autopilot of ``system``, from its HEARTBEATs in ``log``."""
-    codec = Codec(
-        lambda identifier, sender, component: (identifier, sender, component) == (_HEARTBEAT, system, 1)
-    )
+    beat = mavlink.MAVLINK_MSG_ID_HEARTBEAT, system, mavlink.MAV_COMP_ID_AUTOPILOT1
+    codec = Codec(lambda identifier, sender, component: (identifier, sender, component) == beat)
     found: list[Transition] = []
     for record in read_tlog(log):
         for message in codec.feed(record.frame):
             if isinstance(message, Heartbeat):
-                name = mode(message)
+                name = mode_of(message)
                 if not found or found[-1].mode != name:
                     found.append(Transition(record.time, name))
     return found

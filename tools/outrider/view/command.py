@@ -1,4 +1,4 @@
-"""Command ``outrider view``: plays a run, or shows vehicles from their MAVLink messages."""
+"""Command ``outrider view``: plays a run, writes it as one file, or shows vehicles from their messages."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Final, NamedTuple
+
+import numpy as np
 
 from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.errors import EndpointError, LinkError, LogError
@@ -23,13 +25,15 @@ from outrider.terminal.share_progress import share_progress
 from outrider.view.listener import Listener
 from outrider.view.page_server import PageServer
 from outrider.view.player import Player, load
-from outrider.view.recording import html
+from outrider.view.renderer import Renderer
 from outrider.view.source import Source
 
 _ALLOWED: Final = (
     "allowed: a run directory, or endpoints that are listened to: udpin:HOST:PORT, mcast:, tcp:HOST:PORT, "
     "/dev/DEVICE,BAUD, tlog:PATH"
 )
+_EVERY: Final = 0.1
+"""Time between two pictures of a recording (s)."""
 
 
 class Terms(NamedTuple):
@@ -108,10 +112,30 @@ def _write(player: Player, path: Path) -> int:
     if not path.parent.is_dir():
         raise InputError(f"--html {path}: there is no directory {path.parent}")
     with _quiet(), share_progress() as watch:
-        text = html(player, watch)
+        text = _html(player, watch)
     path.write_text(text, encoding="utf-8")
     sys.stdout.write(f"{path}\n")
     return 0
+
+
+def _html(player: Player, watch: Callable[[str, float], None]) -> str:
+    """Return the HTML of the whole run of ``player``, at its own speed, without the table and the plot.
+
+    It plays in any browser without a network.
+    """
+    page_server = PageServer("127.0.0.1", 0)
+    try:
+        stage = Renderer(page_server.server, player.scene)
+        begin, end = player.span
+        stage.show(player.moment(begin))
+        recording = page_server.server.get_scene_serializer()
+        for at in np.arange(begin, end, _EVERY).tolist():
+            stage.show(player.moment(at))
+            recording.insert_sleep(_EVERY)
+            watch("drawing", (at - begin) / max(end - begin, _EVERY))
+        return recording.as_html()
+    finally:
+        page_server.stop()
 
 
 @contextlib.contextmanager

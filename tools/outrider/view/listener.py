@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.committed import horizon_of
 from mavlink_bridge.errors import PlanWireError
@@ -30,9 +31,14 @@ CARRIED; attitudes and plans are valid for FRESH.
 PICTURE, NEW_SCENE = 0.04, 1.0
 """Shortest time (s) between two snapshots, and between two scenes."""
 MOST = 250
-_ACCEPTED = {0, 30, 33, 251, 385}
-"""HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, NAMED_VALUE_FLOAT, TUNNEL."""
-_AUTOPILOT, _SAMPLES = 1, 101
+_ACCEPTED = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
+    mavlink.MAVLINK_MSG_ID_TUNNEL,
+}
+_SAMPLES = 101
 
 
 class _Fix(NamedTuple):
@@ -126,7 +132,7 @@ class Listener:
             received.leant = wall
             received.attitude = euler_attitude(message.roll, message.pitch, message.yaw)
         elif isinstance(message, Heartbeat):
-            if component == _AUTOPILOT:
+            if component == mavlink.MAV_COMP_ID_AUTOPILOT1:
                 received.beat = message
         elif isinstance(message, NamedValue):
             if message.name == "plan_ms":

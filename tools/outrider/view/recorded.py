@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.committed import horizon_of
 from companion.flight.vehicle import HEARTBEAT_LOST
-from companion.values.components import AUTOPILOT
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, Source, Tunnel
 from mavlink_bridge.tlog.log import read_tlog
@@ -23,8 +23,12 @@ from outrider.scene.snapshot import NO_PLAN, Array, Single, euler_attitude, padd
 
 FRESH = 1_000_000
 """Time (µs) for which a plan is shown after its epoch, and an attitude after its message."""
-_DECODED = {0, 30, 33, 385}
-"""HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, TUNNEL."""
+_DECODED = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    mavlink.MAVLINK_MSG_ID_TUNNEL,
+}
 _SWARM, _AUTOPILOT = names.LINK_NUMBERS["swarm"], names.LINK_NUMBERS["autopilot"]
 _OFTEN = 4096
 
@@ -108,7 +112,7 @@ def _take(found: Record, owner: int, time: int, link: int, message: Message) -> 
             found.leant.append(time)
             found.attitudes.append(euler_attitude(message.roll, message.pitch, message.yaw))
     elif isinstance(message, Heartbeat):
-        own = message.source == Source(owner, AUTOPILOT) and link == _AUTOPILOT
+        own = message.source == Source(owner, mavlink.MAV_COMP_ID_AUTOPILOT1) and link == _AUTOPILOT
         if own and (not found.beaten or time >= found.beaten[-1]):
             found.beaten.append(time)
             found.beats.append(message)
