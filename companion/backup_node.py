@@ -119,7 +119,7 @@ class BackupNode:
             self._signing.present(now)
         for link, data in inbox:
             for message in self._codecs[link].feed(data, whole=True):
-                self._hear(now, message)
+                self._receive(now, message)
         beat = self._heartbeat(now)
         profile = self._profile(now)
         if profile is None:
@@ -152,7 +152,7 @@ class BackupNode:
         beat = Heartbeat(self._own, kind, autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE)
         return [Datagram("autopilot", self._codecs["autopilot"].encode(beat))]
 
-    def _hear(self, now: int, message: Message) -> None:
+    def _receive(self, now: int, message: Message) -> None:
         match message:
             case Heartbeat():
                 self._beat = now, message

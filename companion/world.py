@@ -15,7 +15,7 @@ from companion.estimation.time_sync import Answer
 from companion.estimation.tracks import State, Track
 from companion.obstacles.moving import MovingObstacles
 from companion.obstacles.neighbours import Neighbours
-from companion.obstacles.sensed import Sensed, Stance
+from companion.obstacles.sensed import Sensed, SensorPose
 from companion.obstacles.static import FixedObstacles
 from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
@@ -223,7 +223,9 @@ class World:
         known = np.array(
             [x + 1e-6 * min(when - time, most) * v for _, time, x, v in self.neighbours.last_received()]
         ).reshape(-1, 3)
-        self.sensed.receive_distances(now, message, Stance(when, place, yaw, local.yaw_to_fleet(0.0)), known)
+        self.sensed.receive_distances(
+            now, message, SensorPose(when, place, yaw, local.yaw_to_fleet(0.0)), known
+        )
 
     def _receive_own(self, now: int, message: Message) -> None:
         if isinstance(message, LocalPosition | Attitude):

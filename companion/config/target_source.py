@@ -72,7 +72,7 @@ def message_of(source: TargetSource) -> int | None:
     return _MESSAGES.get(source.kind)
 
 
-def speaker_of(source: TargetSource, system: int, target: int) -> int | None:
+def sender_of(source: TargetSource, system: int, target: int) -> int | None:
     """Return the system id whose messages count for the companion of ``system``; None for any.
 
     ``target`` is the system id of its target.

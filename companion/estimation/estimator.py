@@ -36,7 +36,7 @@ _STEPS = 2048
 """Number of cached steps: one second's worth for two hundred senders."""
 
 
-class Doubt(NamedTuple):
+class RefusedMeasurement(NamedTuple):
     """The last of ``witnesses`` refused measurements that agree with each other, true at ``time`` (µs)."""
 
     time: int
@@ -55,7 +55,7 @@ class Belief(NamedTuple):
     x: Six
     P: Square
     turn: Turn
-    doubts: tuple[Doubt, ...]
+    doubts: tuple[RefusedMeasurement, ...]
     refused: int
 
 
@@ -147,7 +147,7 @@ class Estimator:
                 break
         if witnesses >= self._witnesses:
             return Belief(time, z, first, self._turning.unknown, (), belief.refused)
-        doubts.append(Doubt(time, z, witnesses))
+        doubts.append(RefusedMeasurement(time, z, witnesses))
         return belief._replace(doubts=tuple(doubts[-_DOUBTS:]), refused=belief.refused + 1)
 
     def _most(self, elapsed: int) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 
 from companion.estimation.estimator import Belief, Estimator, Measured
-from companion.estimation.sender_clock import Dated
+from companion.estimation.sender_clock import TrackTime
 
 
 class OutOfSequenceBuffer:
@@ -40,7 +40,7 @@ class OutOfSequenceBuffer:
         self.belief: Belief | None = None
         self.too_late = 0
 
-    def put(self, dated: Dated, z: Measured) -> bool:
+    def put(self, dated: TrackTime, z: Measured) -> bool:
         """Add a measurement ``z``; return whether it became part of the filter state.
 
         A measurement from before the window is refused and counted. If several have the same stamp the first
@@ -63,7 +63,7 @@ class OutOfSequenceBuffer:
             self._forget()
         return before is None or belief.refused == before.refused
 
-    def _between(self, dated: Dated, z: Measured) -> bool:
+    def _between(self, dated: TrackTime, z: Measured) -> bool:
         """Insert a late measurement; return whether it became part of the filter state."""
         times, time = self._times, dated.time
         place = bisect_right(times, time)

@@ -75,7 +75,7 @@ Fewer repetitions are duplicates.
 """
 
 
-class Dated(NamedTuple):
+class TrackTime(NamedTuple):
     """Time of a message in the track's own time, µs.
 
     ``stamped``: the time comes from the sender's stamp. Then there is one measurement of that time, and
@@ -98,7 +98,7 @@ class _Least(NamedTuple):
     above: float
 
 
-class _Suspect(NamedTuple):
+class _Outlier(NamedTuple):
     """A message off the line."""
 
     received: int
@@ -164,7 +164,7 @@ class SenderClock:
         self._begun = self._timed = False
         self._stamp = self._newest = 0
         self._repeats, self._repeated = 0, 0
-        self._suspects: list[_Suspect] = []
+        self._suspects: list[_Outlier] = []
         self._suspected = 0
         self._received = 0
         self._line = 0.0
@@ -172,7 +172,7 @@ class SenderClock:
         self._pieces: deque[_Least] = deque(maxlen=_MEMORY)
         self._least = _Least(0, 0, 0, 0.0)
 
-    def date(self, received: int, stamp: int) -> Dated | None:
+    def date(self, received: int, stamp: int) -> TrackTime | None:
         """Return when a message was true that arrived at ``received`` with ``stamp``.
 
         ``received`` is on the companion's clock, ``stamp`` on the sender's. A stamp of 0 means none: the
@@ -182,13 +182,13 @@ class SenderClock:
         if stamp <= 0:
             return self._by_arrival(received)
         if not self._begun:
-            return self._begin(_Suspect(received, stamp), received - stamp, 1)
+            return self._begin(_Outlier(received, stamp), received - stamp, 1)
         if self._base is None:
-            return self._suspect(_Suspect(received, stamp))
+            return self._suspect(_Outlier(received, stamp))
         lag = received - stamp
         expected = self._line + self._rate * max(received - self._received, 0)
         if stamp < self._newest - self._tolerance or lag < expected - self._tolerance:
-            return self._suspect(_Suspect(received, stamp))
+            return self._suspect(_Outlier(received, stamp))
         if stamp != self._stamp:
             self._stamp, self._repeats, self._repeated = stamp, 0, received
             if stamp > self._newest:
@@ -205,7 +205,7 @@ class SenderClock:
         self._lately.append(lag)
         self._follow(received, lag, expected)
         self.skew = round(self._line) - self._delay - self._base
-        return Dated(stamp + self._base, True)
+        return TrackTime(stamp + self._base, True)
 
     def reads(self, received: int, stamp: int) -> int:
         """Return when another message of this sender was true, on the companion's clock.
@@ -251,14 +251,14 @@ class SenderClock:
         received, lag = self._received, self._lag
         self._least = _Least(received, received, lag, max(lag - self._line, 0.0))
 
-    def _by_arrival(self, received: int) -> Dated:
+    def _by_arrival(self, received: int) -> TrackTime:
         if not self._timed:
             # Track time starts near 0, not at the companion's time: it is then the same for all companions
             # that receive the same messages at the same intervals.
             self._timed, self.skew = True, received - self._delay
-        return Dated(received - self._delay - self.skew, False)
+        return TrackTime(received - self._delay - self.skew, False)
 
-    def _begin(self, last: _Suspect, lag: int, support: int) -> Dated:
+    def _begin(self, last: _Outlier, lag: int, support: int) -> TrackTime:
         """Set the line through ``lag``; the track's time continues, as its skew stays unchanged."""
         received, stamp = last
         if not self._timed:
@@ -276,9 +276,9 @@ class SenderClock:
         self._pieces.clear()
         self._least = _Least(received, received, lag, 0.0)
         self.support = support
-        return Dated(stamp + self._base, True)
+        return TrackTime(stamp + self._base, True)
 
-    def _suspect(self, new: _Suspect) -> Dated | None:
+    def _suspect(self, new: _Outlier) -> TrackTime | None:
         """Date a message off the line; return None if it cannot be dated.
 
         Enough such messages that agree define a new line. If they contradict each other for a second there is

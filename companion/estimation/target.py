@@ -6,7 +6,7 @@ import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
-from companion.config.target_source import CameraSource, FixedSource, message_of, speaker_of
+from companion.config.target_source import CameraSource, FixedSource, message_of, sender_of
 from companion.estimation.tracks import State, Track
 from companion.values.horizon import Array
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
@@ -34,13 +34,13 @@ class Target:
         self._system = system
         number = message_of(source)
         self._kind = None if number is None else BY_ID[number].message
-        self._believed = speaker_of(source, system, target_system)
+        self._believed = sender_of(source, system, target_system)
         self._links = ("target", "autopilot") if isinstance(source, CameraSource) else ("target",)
         self._fixed = None
         if isinstance(source, FixedSource):
             self._fixed = State(np.array(source.at), np.zeros(3), 0, 0.0)
         self._track = self._before = Track(config.target)
-        self._speaker: Source | None = None
+        self._sender: Source | None = None
         self._received = 0
         self.refused = 0
 
@@ -48,7 +48,7 @@ class Target:
         """Receive a message from ``link`` at ``now`` (µs); return whether it became part of the track."""
         if self._kind is None or not isinstance(message, self._kind) or link not in self._links:
             return False
-        if not self._may_speak(now, message.source):
+        if not self._accepts(now, message.source):
             self.refused += 1
             return False
         if not self._measure(now, message):
@@ -84,7 +84,7 @@ class Target:
         """Track of the current sender, or of the previous one until the current one's has a state."""
         return self._before if self._track.time is None else self._track
 
-    def _may_speak(self, now: int, source: Source) -> bool:
+    def _accepts(self, now: int, source: Source) -> bool:
         """Return whether messages of ``source`` are accepted at ``now`` (µs).
 
         Two components of one system may both report a target, each with its own clock and errors. The one
@@ -94,14 +94,14 @@ class Target:
             return False
         if self._believed is None and source.system == self._system:
             return False
-        if source == self._speaker:
+        if source == self._sender:
             return True
-        if self._speaker is not None:
+        if self._sender is not None:
             if now - self._received <= self._config.guard.target_stale_us:
                 return False
             # The new sender has another clock and other errors.
             self._before, self._track = self._known, Track(self._config.target)
-        self._speaker, self._received = source, now
+        self._sender, self._received = source, now
         return True
 
     def _measure(self, now: int, message: Message) -> bool:

@@ -29,7 +29,7 @@ _PATIENCE = 3_000_000
 _RECEIVED = frozenset((mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_COMMAND_ACK))
 
 
-class LastWord:
+class HoldOnExit:
     """A ``Node`` with one link, ``autopilot``; times are wall-clock µs.
 
     ``heartbeat``: the last that the companion received, None for none; ``steered``: whether the companion

@@ -56,16 +56,16 @@ class Readiness:
         self._config = config
         self._vehicle = vehicle
         self._commands = calls
-        self._wishes = Commands(calls.own)
+        self._requests = Commands(calls.own)
         self.limits = AutopilotLimits(config, vehicle, calls.own)
 
     def receive(self, ack: CommandAck) -> None:
         """Receive an acknowledgement of the autopilot."""
-        self._wishes.receive(ack)
+        self._requests.receive(ack)
 
     def forget(self) -> None:
         """Forget all requests and answers."""
-        self._wishes.forget()
+        self._requests.forget()
         self.limits.forget()
 
     @property
@@ -83,8 +83,8 @@ class Readiness:
             return []
         health = mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, profile.estimator_message
         wanted = [_interval(message, HEALTH) for message in health]
-        open_ = [call for call in wanted if not self._wishes.answered(*call)]
-        return self._wishes.call(now, *open_[0]) if open_ else []
+        open_ = [call for call in wanted if not self._requests.answered(*call)]
+        return self._requests.call(now, *open_[0]) if open_ else []
 
     def unseen(self, view: View) -> str:
         """Return the missing input that every plan needs, or an empty string."""

@@ -35,7 +35,7 @@ from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 
 _MOST = 255
 """Number of system ids."""
-_VOICE = 1_000_000
+_PRIORITY = 1_000_000
 """µs after a companion's position during which positions from the same vehicle's autopilot are ignored."""
 _STRAYED = 1.0
 """m; a neighbour further than this from its own plan is not following it: its track is used instead.
@@ -90,7 +90,7 @@ class Neighbours:
         self._states: Array = np.zeros((0, 6))
         self._times = np.zeros(0, dtype=np.int64)
         # Arrival times (µs), independent of the times at which the measurements are dated.
-        self._came: dict[int, int] = {}
+        self._received: dict[int, int] = {}
         self._arrivals = np.zeros(0, dtype=np.int64)
         self._clocks: dict[int, PlanClock] = {}
         self._fading = fading(config)
@@ -105,11 +105,11 @@ class Neighbours:
         """m: least distance to a neighbour so far, by its messages; updated if ``guard.near`` is set."""
         # When (µs) a vehicle's companion last reported its position; whether its track uses its autopilot's
         # messages.
-        self._spoken: dict[int, int] = {}
+        self._companion_time: dict[int, int] = {}
         self._by_autopilot: dict[int, bool] = {}
         self._brief = False
         # Moving obstacles: they may be larger than a vehicle and are not bound by its limits.
-        self._things = {one.system for one in config.moving}
+        self._moving_obstacles = {one.system for one in config.moving}
         self.relevance = RelevanceFilter(config)
         self._trusted = TrustedPeers()
         self._uncertainty = ReportedUncertainty()
@@ -134,7 +134,7 @@ class Neighbours:
         if system == self._system:
             return
         by_autopilot = component == mavlink.MAV_COMP_ID_AUTOPILOT1
-        if by_autopilot and now - self._spoken.get(system, now - _VOICE) < _VOICE:
+        if by_autopilot and now - self._companion_time.get(system, now - _PRIORITY) < _PRIORITY:
             # Its companion reports the position already, dated by another clock.
             return
         track = self._tracks.get(system)
@@ -147,11 +147,11 @@ class Neighbours:
         if reported and not by_autopilot:
             # Unusable positions, such as those of a receiver without a fix, do not suppress the autopilot's
             # messages.
-            self._spoken[system] = now
+            self._companion_time[system] = now
         if track.time is None:
             return
         if track.time != before:
-            self._came[system] = now
+            self._received[system] = now
         if system not in self._rows:
             self._rows[system] = len(self._ids)
             self._ids += (system,)
@@ -197,8 +197,8 @@ class Neighbours:
 
     def listen(self, now: int, own: State | None) -> None:
         """Determine the neighbours to ignore for a while; ``own`` is the own state at ``now`` (µs)."""
-        self._put_down()
-        self.relevance.look(own, self._ids, self._states, now - self._times, self._familiar)
+        self._update_rows()
+        self.relevance.look(own, self._ids, self._states, now - self._times, self._trusted_rows)
 
     def ignores(self, system: int, component: int) -> bool:
         """Return whether position and plan messages of this sender need not be decoded now."""
@@ -206,14 +206,14 @@ class Neighbours:
             return False
         if component != mavlink.MAV_COMP_ID_AUTOPILOT1 and not self._by_autopilot.get(system, True):
             # The companion's ignored messages still have priority over its autopilot's.
-            self._spoken[system] = self.relevance.now
+            self._companion_time[system] = self.relevance.now
         return True
 
-    def _familiar(self) -> NDArray[np.bool_]:
+    def _trusted_rows(self) -> NDArray[np.bool_]:
         """Return which rows (M,) are trusted for a while: vehicles with plans and limits like the own."""
         plans = self._table.at(self._ids, self._times)
         trusted = self._trusted.trusted(self.relevance.now, self._states, plans)
-        for system in self._things | self._uncertainty.systems(self.relevance.now):
+        for system in self._moving_obstacles | self._uncertainty.systems(self.relevance.now):
             if system in self._rows:
                 trusted[self._rows[system]] = False
         return trusted
@@ -232,13 +232,13 @@ class Neighbours:
         """
         config, stale = self._config, self._config.guard.plan_stale_us
         steps = config.horizon.steps + 1
-        self._put_down()
+        self._update_rows()
         age = now - self._times
         ids, states, times, since = self._ids, self._states, self._times, now - self._arrivals
         doubtful = self._uncertainty.systems(now)
         if places is not None and ids:
             near = self.relevance.near(places, states, age)
-            for system in self._things | doubtful:
+            for system in self._moving_obstacles | doubtful:
                 if system in self._rows:
                     near[self._rows[system]] = True
             if not near.all():
@@ -316,7 +316,7 @@ class Neighbours:
         """
         if own is None or self._config.guard.near is None or not self._ids:
             return None
-        self._put_down()
+        self._update_rows()
         age = np.minimum(np.maximum(now - self._times, 0), self._config.neighbour.extrapolate_us)
         off = self._states[:, 0:3] + 1e-6 * age[:, None] * self._states[:, 3:6] - own.position
         distance = np.sqrt(np.vecdot(off, off))
@@ -328,14 +328,14 @@ class Neighbours:
     @property
     def below(self) -> int:
         """Number of vehicles received so far whose system id is smaller than the own."""
-        return sum(system < self._system for system in self._ids if system not in self._things)
+        return sum(system < self._system for system in self._ids if system not in self._moving_obstacles)
 
     def mates(self, now: int) -> Array:
         """Return the positions (M, 3), m, of the vehicles that fly by plans of their own.
 
         These are the ones with a fresh plan.
         """
-        self._put_down()
+        self._update_rows()
         if not self._ids:
             return np.empty((0, 3))
         fresh = self._planning(now)
@@ -345,19 +345,19 @@ class Neighbours:
 
     def mate_ids(self, now: int) -> frozenset[int]:
         """Return the system ids of the vehicles that fly by plans of their own."""
-        self._put_down()
+        self._update_rows()
         return frozenset(compress(self._ids, self._planning(now).tolist())) if self._ids else frozenset()
 
     def _planning(self, now: int) -> NDArray[np.bool_]:
         """Return, for each neighbour, whether it flies by plans of its own."""
         _, fresh = self._table.positions(self._ids, now, now - self._config.guard.plan_stale_us)
-        for system in self._things & self._rows.keys():
+        for system in self._moving_obstacles & self._rows.keys():
             fresh[self._rows[system]] = False
         return fresh
 
     def last_received(self) -> list[tuple[int, int, Array, Array]]:
         """Return system id, time (µs), position (3,) and velocity (3,) of each neighbour's last state."""
-        self._put_down()
+        self._update_rows()
         return [
             (system, int(time), state[0:3], state[3:6])
             for system, time, state in zip(self._ids, self._times, self._states, strict=True)
@@ -365,10 +365,10 @@ class Neighbours:
 
     def ages(self, now: int) -> dict[int, int]:
         """Return the age (µs) of each neighbour's track, by system id."""
-        self._put_down()
+        self._update_rows()
         return dict(zip(self._ids, (now - self._times).tolist(), strict=True))
 
-    def _put_down(self) -> None:
+    def _update_rows(self) -> None:
         """Update the rows of the neighbours received since the last update."""
         if not self._fresh:
             return
@@ -376,7 +376,7 @@ class Neighbours:
         tracks = [self._tracks[system] for system in self._fresh]
         self._states[rows] = [track.last for track in tracks]
         self._times[rows] = [track.time or 0 for track in tracks]
-        self._arrivals[rows] = [self._came[system] for system in self._fresh]
+        self._arrivals[rows] = [self._received[system] for system in self._fresh]
         self._fresh.clear()
 
 

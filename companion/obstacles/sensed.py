@@ -23,7 +23,7 @@ from mavlink_bridge.messages import AdsbVehicle, ObstacleDistance
 _NEAR = 1e-6
 
 
-class Stance(NamedTuple):
+class SensorPose(NamedTuple):
     """Pose of the vehicle at ``time`` (µs): position (3,) m, and directions of nose and north, rad.
 
     The directions are counter-clockwise from the fleet's east. ``yaw`` is None where it is unknown.
@@ -43,7 +43,9 @@ class Sensed:
         self.proximity = None if config.proximity is None else Proximity(config.proximity)
         self.traffic = None if config.traffic is None else Traffic(config.traffic)
 
-    def receive_distances(self, now: int, message: ObstacleDistance, stance: Stance, known: Array) -> None:
+    def receive_distances(
+        self, now: int, message: ObstacleDistance, stance: SensorPose, known: Array
+    ) -> None:
         """Receive OBSTACLE_DISTANCE from an own sensor.
 
         ``stance``: the vehicle's pose when the message was true; ``known`` (K, 3): positions of neighbours.

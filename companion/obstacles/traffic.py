@@ -84,17 +84,25 @@ class Traffic:
     def outside(self, now: int, goal: Array, here: Array, clearance: float) -> Array:
         """Return the ``goal`` (3,), or a place of the same height beside the paths that it lies on.
 
-        That place is ``clearance`` (m) outside their keep-out volumes, on the side where the vehicle is: the
+        That place is ``clearance`` (m) outside their keep-out volumes, if possible on the vehicle's side: the
         vehicle flies there, and is not pushed by the field.
         """
+        self._forget(now)
         room = self._config.radius + clearance
-        for there, beside in self.around(now, np.stack([goal, here]), clearance).positions:
+        for one in self._received.values():
+            there, beside = self._nearest(now, one, np.stack([goal, here]))
             off, own = goal - there, here - beside
             if off @ off < room**2:
-                # Never up or down: there may be ground below.
                 ways = (own, off) if own @ own < room**2 else (off, own)
-                way = next((way[:2] for way in ways if hypot(way[0], way[1]) > _NEAR), _EAST)
-                goal = np.append(there[:2] + way * (room / hypot(way[0], way[1])), goal[2])
+                # Never up or down: there may be ground below.
+                places = [
+                    np.append(there[:2] + way[:2] * (room / hypot(way[0], way[1])), goal[2])
+                    for way in (*ways, _EAST)
+                    if hypot(way[0], way[1]) > _NEAR
+                ]
+                # A way that is not at a right angle to the path may lead nearer to another point of it.
+                away = [hypot(*(place - self._nearest(now, one, place[None])[0])[:2]) for place in places]
+                goal = next((p for p, d in zip(places, away, strict=True) if d >= room - _NEAR), places[0])
         return goal
 
     def _take(self, now: int, message: AdsbVehicle, place: Array, here: Array) -> bool:

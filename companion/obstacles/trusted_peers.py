@@ -23,7 +23,7 @@ _BESIDE = 1.0
 """m by which the plan may pass beside that state."""
 
 
-class _Story(NamedTuple):
+class _Record(NamedTuple):
     track: Track
     refused: int
 
@@ -32,7 +32,7 @@ class TrustedPeers:
     """Trust of one companion in its neighbours, in the order of the rows of their last states."""
 
     def __init__(self) -> None:
-        self._stories: list[_Story] = []
+        self._records: list[_Record] = []
         self._since = np.zeros(0, dtype=np.int64)
 
     def note(self, now: int, row: int, track: Track) -> None:
@@ -41,14 +41,14 @@ class TrustedPeers:
         ``row`` is an existing one or the next one. It must be called for every message that was given to the
         track; otherwise a refused or doubted measurement is missed.
         """
-        story = _Story(track, track.refused)
-        if row == len(self._stories):
-            self._stories.append(story)
+        record = _Record(track, track.refused)
+        if row == len(self._records):
+            self._records.append(record)
             self._since = np.append(self._since, now)
             return
-        last = self._stories[row]
-        if last.track is not track or last.refused != story.refused or track.doubted:
-            self._stories[row] = story
+        last = self._records[row]
+        if last.track is not track or last.refused != record.refused or track.doubted:
+            self._records[row] = record
             self._since[row] = now
 
     def trusted(self, now: int, states: Array, plans: Located) -> NDArray[np.bool_]:

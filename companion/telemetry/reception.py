@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
-from companion.config.target_source import CameraSource, message_of, speaker_of
+from companion.config.target_source import CameraSource, message_of, sender_of
 
 _WHERE = {mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mavlink.MAVLINK_MSG_ID_TUNNEL}
 """Messages with a neighbour's position and plan: not decoded while the relevance filter ignores it."""
@@ -58,17 +58,17 @@ def accepts(
     traffic = {mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE} if config.traffic is not None else set()
     # Sensors of the own system may send on both links.
     sensors = distances | traffic
-    reported, speaker = message_of(source), speaker_of(source, system, target)
+    reported, target_sender = message_of(source), sender_of(source, system, target)
     if link == "autopilot":
         camera = reported if isinstance(source, CameraSource) else None
         return lambda identifier, sender, component: (
             (identifier in wanted and sender == system and component == mavlink.MAV_COMP_ID_AUTOPILOT1)
             or (identifier in sensors and sender == system)
-            or (identifier == camera and sender == speaker)
+            or (identifier == camera and sender == target_sender)
         )
     if link == "target":
         return lambda identifier, sender, _component: (
-            identifier == reported and (speaker is None or sender == speaker)
+            identifier == reported and (target_sender is None or sender == target_sender)
         )
     if link == "swarm":
         # Traffic may come from any sender.

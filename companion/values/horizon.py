@@ -122,7 +122,7 @@ class HorizonTable:
             self._latest[sender] = horizon
             self._fresh.add(sender)
 
-    def _put_down(self) -> None:
+    def _update_rows(self) -> None:
         """Write the horizons stored since the last call into the table, row by row."""
         new = [sender for sender in self._fresh if sender not in self._rows]
         if new:
@@ -184,7 +184,7 @@ class HorizonTable:
     def _rows_of(self, senders: Sequence[int]) -> NDArray[np.int64]:
         """Return the row of each sender (M,); −1 for those without a horizon."""
         if self._fresh:
-            self._put_down()
+            self._update_rows()
         return np.array([self._rows.get(sender, -1) for sender in senders], dtype=np.int64)
 
     def _segments(self, rows: NDArray[np.int64], elapsed: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -65,7 +65,7 @@ class WallClock:
             time.sleep(left * 1e-6)
 
 
-class Account(Protocol):
+class LostTime(Protocol):
     """Shared record of the simulated time that is given up: ``lost``, µs.
 
     All clocks that show the same time share one account.
@@ -90,12 +90,12 @@ class PacedClock:
     its own.
     """
 
-    def __init__(self, clock: Clock, speed: float, stride: int, account: Account | None = None) -> None:
+    def __init__(self, clock: Clock, speed: float, stride: int, account: LostTime | None = None) -> None:
         self._clock, self._speed, self._stride = clock, speed, stride
         self._start = clock.now()
         self._most = stride
         self._latest = 0
-        self._account: Account = _Own() if account is None else account
+        self._account: LostTime = _Own() if account is None else account
 
     @property
     def start(self) -> int:

@@ -21,8 +21,8 @@ _ROUNDS: Final = 1000
 """Number of reads after which ``forget`` ends even if data keeps arriving: more than any system buffers."""
 
 
-class Ear(Protocol):
-    """Observer of all frames that pass a ``Dealer``."""
+class FrameObserver(Protocol):
+    """Observer of all frames that pass a ``Demultiplexer``."""
 
     def said(self, data: bytes) -> None:
         """Observe frames that leave, by whichever end."""
@@ -33,19 +33,19 @@ class Ear(Protocol):
         ...
 
 
-class Dealer:
+class Demultiplexer:
     """Demultiplexer of ``link``: one end for each name of ``deal``.
 
     The function of a name in ``deal`` decides which headers its end gets. A frame goes to every end that
-    wants it, and is discarded if none does. Checksums are verified, signatures are not. ``ear`` observes all
-    frames.
+    wants it, and is discarded if none does. Checksums are verified, signatures are not. ``observer`` observes
+    all frames.
 
     The ends are read by one thread at a time. The physical link is closed with the last of them.
     """
 
-    def __init__(self, link: Link, deal: Mapping[str, Wants], ear: Ear | None = None) -> None:
-        self.link, self._ear = link, ear
-        self.ends = {name: DealtLink(self, first=number == 0) for number, name in enumerate(deal)}
+    def __init__(self, link: Link, deal: Mapping[str, Wants], observer: FrameObserver | None = None) -> None:
+        self.link, self._observer = link, observer
+        self.ends = {name: DemultiplexedLink(self, first=number == 0) for number, name in enumerate(deal)}
         self._deal = [(self.ends[name], wants) for name, wants in deal.items()]
         self._framer = Framer()
         self._open = len(self.ends)
@@ -57,9 +57,9 @@ class Dealer:
                 (Header(frame.system, frame.component, frame.message_id), frame.data)
                 for frame in self._framer.feed(datagram, whole=True)
             ]
-            if self._ear is not None:
+            if self._observer is not None:
                 for header, data in frames:
-                    self._ear.received(header, data)
+                    self._observer.received(header, data)
             for end, wants in self._deal:
                 own = [data for header, data in frames if wants(header)]
                 if own:
@@ -67,14 +67,14 @@ class Dealer:
 
     def send(self, data: bytes) -> None:
         """Send ``data`` by the physical link."""
-        if self._ear is not None:
-            self._ear.said(data)
+        if self._observer is not None:
+            self._observer.said(data)
         self.link.send(data)
 
     def forget(self) -> None:
         """Discard all that has arrived until now, at all ends.
 
-        ``ear`` does not receive it either, because the time of its sending is unknown.
+        ``observer`` does not receive it either, because the time of its sending is unknown.
         """
         for _ in range(_ROUNDS):
             # A read that returns nothing may have accepted a TCP connection whose peer has sent already.
@@ -96,10 +96,10 @@ def _readable(fileno: int | None) -> bool:
     return fileno is not None and bool(select.select([fileno], [], [], 0)[0])
 
 
-class DealtLink:
-    """One end of a ``Dealer``: a ``Link``; if it is not read, the oldest data is dropped."""
+class DemultiplexedLink:
+    """One end of a ``Demultiplexer``: a ``Link``; if it is not read, the oldest data is dropped."""
 
-    def __init__(self, dealer: Dealer, *, first: bool) -> None:
+    def __init__(self, dealer: Demultiplexer, *, first: bool) -> None:
         self._dealer, self._first = dealer, first
         self._waiting: deque[bytes] = deque()
         self._bytes = 0

@@ -62,7 +62,7 @@ class TcpCaller(StreamLink):
     def _reopen(self, now: int) -> None:
         if self._calling is not None and now - self._called_at < PATIENCE:
             return
-        self._hang_up()
+        self._disconnect()
         call = socket.socket(self._family, socket.SOCK_STREAM)
         call.setblocking(False)
         try:
@@ -81,21 +81,21 @@ class TcpCaller(StreamLink):
             return
         # A connection to a free port of this machine may by chance reach itself.
         if call.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) or call.getsockname() == self._address:
-            self._hang_up()
+            self._disconnect()
             return
         self._selector.unregister(call)
         self._calling = None
         _quick(call)
         self._adopt(call.detach())
 
-    def _hang_up(self) -> None:
+    def _disconnect(self) -> None:
         if self._calling is not None:
             self._selector.unregister(self._calling)
             self._calling.close()
             self._calling = None
 
     def _release(self) -> None:
-        self._hang_up()
+        self._disconnect()
 
 
 class TcpListener(StreamLink):

@@ -17,7 +17,7 @@ from mavlink_bridge.loops.schedule import Schedule
 from mavlink_bridge.network.simulated import SimulatedNetwork
 from mavlink_bridge.node import Datagram, Node
 
-__all__ = ["BUFFER", "QUANTUM", "Direction", "LockStep", "Scheduled", "Tap"]
+__all__ = ["BUFFER", "QUANTUM", "Direction", "LockStep", "Scheduled", "StepObserver"]
 
 Direction = Literal["in", "out"]
 
@@ -40,7 +40,7 @@ class Scheduled(NamedTuple):
     clock: NodeClock | None = None
 
 
-class Tap(Protocol):
+class StepObserver(Protocol):
     """Observer of every step of a node and of every datagram that enters (``in``) or leaves (``out``) it.
 
     A tap must not change anything.
@@ -75,7 +75,7 @@ class LockStep:
         scheduled: Iterable[Scheduled],
         network: SimulatedNetwork,
         base_tick: int,
-        taps: Sequence[Tap] = (),
+        taps: Sequence[StepObserver] = (),
         buffer: int = BUFFER,
     ) -> None:
         entries = sorted(scheduled, key=lambda entry: entry.node.name)
@@ -169,7 +169,7 @@ class LockStep:
     def _tick(self, now: int, slots: list[Schedule]) -> None:
         network = self._network
         if self._hanging:
-            slots = self._awake(now, slots)
+            slots = self._running(now, slots)
         times = [slot.told(now) for slot in slots]
         inboxes = [network.receive(now, slot.name) for slot in slots]
         if self._taps:
@@ -181,7 +181,7 @@ class LockStep:
             if outbox:
                 network.send(now, slot.name, outbox)
 
-    def _awake(self, now: int, slots: list[Schedule]) -> list[Schedule]:
+    def _running(self, now: int, slots: list[Schedule]) -> list[Schedule]:
         """Return those of ``slots`` that are not hung; for the others, buffer what has arrived."""
         for slot in slots:
             room = self._hanging.get(slot.name)

@@ -13,7 +13,7 @@ from mavlink_bridge.links.link import Link
 from mavlink_bridge.loops.deadlines import Deadlines
 from mavlink_bridge.loops.histogram import Histogram, Spread
 from mavlink_bridge.loops.inbox import CAPACITY, Inbox
-from mavlink_bridge.loops.lockstep import Direction, Scheduled, Tap
+from mavlink_bridge.loops.lockstep import Direction, Scheduled, StepObserver
 from mavlink_bridge.node import Datagram
 
 _NAP: Final = 100_000
@@ -63,7 +63,7 @@ class RealTime:
         scheduled: Scheduled,
         links: Mapping[str, Link | Sequence[Link]],
         clock: Clock,
-        taps: Sequence[Tap] = (),
+        taps: Sequence[StepObserver] = (),
         *,
         tolerance: int | None = None,
         capacity: int = CAPACITY,

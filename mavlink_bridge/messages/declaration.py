@@ -74,9 +74,9 @@ class Converter(NamedTuple):
                 raise ValueError
             return self.struct.pack(*fields)
         except (ValueError, OverflowError, StructError):
-            raise self._blame(message) from None
+            raise self._encode_error(message) from None
 
-    def _blame(self, message: Message) -> EncodeError:
+    def _encode_error(self, message: Message) -> EncodeError:
         if self.finite:
             for name, value in zip(message._fields, message, strict=True):
                 for number in value if isinstance(value, Iterable) else (value,):

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import CommandInt, CommandLong
 from sitl.autopilot.commander import Commander
-from sitl.autopilot.firmware import Denial, Firmware, Mode
+from sitl.autopilot.firmware import CommandRefusal, Firmware, Mode
 from sitl.values.home import ABOVE_HOME, ABOVE_SEA
 
 _FORCED: Final = 21196.0
@@ -49,7 +49,7 @@ class Verdict(NamedTuple):
     reason: str
 
 
-Handler = Callable[[Order], Denial | None]
+Handler = Callable[[Order], CommandRefusal | None]
 """Executes one command, or returns the reason for refusing it."""
 
 
@@ -73,38 +73,40 @@ class Orders:
         handler = self._handlers.get(message.command)
         if handler is None:
             return Verdict(mavlink.MAV_RESULT_UNSUPPORTED, f"Command {message.command} is not supported")
-        denial = handler(_order(message, now))
-        return Verdict(mavlink.MAV_RESULT_ACCEPTED, "") if denial is None else Verdict(*denial)
+        refusal = handler(_order(message, now))
+        return Verdict(mavlink.MAV_RESULT_ACCEPTED, "") if refusal is None else Verdict(*refusal)
 
     def set_mode(self, custom_mode: int, base_mode: int, now: int) -> Verdict:
         """Execute SET_MODE (11), which has the mode in one number, at ``now`` (µs)."""
         main, sub = self._flavour.split(custom_mode)
-        denial = self._set_mode(Order((base_mode, main, sub), None, now))
-        return Verdict(mavlink.MAV_RESULT_ACCEPTED, "") if denial is None else Verdict(*denial)
+        refusal = self._set_mode(Order((base_mode, main, sub), None, now))
+        return Verdict(mavlink.MAV_RESULT_ACCEPTED, "") if refusal is None else Verdict(*refusal)
 
-    def _arm(self, order: Order) -> Denial | None:
+    def _arm(self, order: Order) -> CommandRefusal | None:
         wanted, code = order.params[:2]
         if wanted == 1.0:
             return self._commander.arm(order.now, forced=code == _FORCED)
         if wanted == 0.0:
             return self._commander.disarm(forced=code == _FORCED)
-        return Denial(mavlink.MAV_RESULT_DENIED, "Arming: parameter 1 must be 0 or 1")
+        return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Arming: parameter 1 must be 0 or 1")
 
-    def _take_off(self, order: Order) -> Denial | None:
+    def _take_off(self, order: Order) -> CommandRefusal | None:
         return self._commander.take_off(order.params[6], order.relative, order.now)
 
-    def _land(self, order: Order) -> Denial | None:
+    def _land(self, order: Order) -> CommandRefusal | None:
         return self._commander.enter(Mode.LAND, order.now)
 
-    def _set_mode(self, order: Order) -> Denial | None:
+    def _set_mode(self, order: Order) -> CommandRefusal | None:
         base, main, sub = order.params[:3]
         custom = math.isfinite(base) and int(base) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if not (custom and math.isfinite(main)):
-            return Denial(mavlink.MAV_RESULT_DENIED, "Mode refused: only custom modes are known")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Mode refused: only custom modes are known")
         sub = sub if math.isfinite(sub) else 0.0
         mode = self._flavour.requested(int(main), int(sub))
         if mode is None:
-            return Denial(mavlink.MAV_RESULT_DENIED, f"Mode refused: {main:.0f}, {sub:.0f} is not known")
+            return CommandRefusal(
+                mavlink.MAV_RESULT_DENIED, f"Mode refused: {main:.0f}, {sub:.0f} is not known"
+            )
         if mode is Mode.TAKEOFF:
             return self._commander.take_off(math.nan, None, order.now)
         return self._commander.enter(mode, order.now)

@@ -11,7 +11,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from sitl.autopilot.autonomous_modes import MODES, AutonomousModes
-from sitl.autopilot.firmware import Denial, Firmware, Mode, Status
+from sitl.autopilot.firmware import CommandRefusal, Firmware, Mode, Status
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.missions.itinerary import Event
 from sitl.autopilot.setpoint_reception import SetpointReception
@@ -42,7 +42,7 @@ class Commander:
         estimate: Callable[[], Estimate],
         home: Home,
         autonomous_modes: AutonomousModes,
-        voice: StatusReporter,
+        status_text: StatusReporter,
     ) -> None:
         """``estimate`` returns the present estimate."""
         self._config = config
@@ -52,7 +52,7 @@ class Commander:
         self._estimate = estimate
         self._home = home
         self._autonomous_modes = autonomous_modes
-        self._voice = voice
+        self._status_text = status_text
         self._takeoff_height = config.takeoff_height
         self._ready_at = 0 if config.start_height else round(config.ready_after * 1e6)
         self._touched_at: int | None = None
@@ -94,29 +94,31 @@ class Commander:
 
     # Requests
 
-    def arm(self, now: int, *, forced: bool) -> Denial | None:
+    def arm(self, now: int, *, forced: bool) -> CommandRefusal | None:
         """Allow the motors to turn. ``forced`` overrides every objection."""
         if self.armed:
             return None
         if not forced:
             if not self.ready:
-                return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Arming refused: no position yet")
-            reason = self._flavour.arming_denial(self.status(now))
+                return CommandRefusal(
+                    mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Arming refused: no position yet"
+                )
+            reason = self._flavour.arming_refusal(self.status(now))
             if doubts := [reason] if reason else self.doubts():
-                return Denial(mavlink.MAV_RESULT_FAILED, f"Arming refused: {doubts[0]}")
+                return CommandRefusal(mavlink.MAV_RESULT_FAILED, f"Arming refused: {doubts[0]}")
         self.armed = True
         self._postpone(now)
-        self._voice.inform("Armed")
+        self._status_text.inform("Armed")
         if self.mode is Mode.MISSION:
             self._autonomous_modes.begin(self.mode, self._estimate())
         if self.mode is Mode.TAKEOFF:
             self._guidance.takeoff(self._takeoff_height + self._home.height, self._estimate().pose)
         return None
 
-    def disarm(self, *, forced: bool) -> Denial | None:
+    def disarm(self, *, forced: bool) -> CommandRefusal | None:
         """Stop the motors; in flight only if ``forced``, and then the vehicle falls."""
         if self.armed and not self.landed and not forced:
-            return Denial(mavlink.MAV_RESULT_FAILED, "Disarming refused: flying")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Disarming refused: flying")
         if self.armed:
             self._stop("Disarmed")
         return None
@@ -141,10 +143,10 @@ class Commander:
         """Default horizontal speed (m/s)."""
         return self._config.waypoint_speed
 
-    def take_off(self, altitude: float, relative: bool | None, now: int) -> Denial | None:
+    def take_off(self, altitude: float, relative: bool | None, now: int) -> CommandRefusal | None:
         """Execute NAV_TAKEOFF (22); the arguments are those of ``Firmware.takeoff``."""
         verdict = self._flavour.takeoff(altitude, relative, self._home.altitude, self.status(now))
-        if isinstance(verdict, Denial):
+        if isinstance(verdict, CommandRefusal):
             return verdict
         self.mode, self._takeoff_height = verdict.mode, verdict.height
         self._lost = False
@@ -153,7 +155,7 @@ class Commander:
             self._guidance.takeoff(verdict.height + self._home.height, self._estimate().pose)
         return None
 
-    def enter(self, mode: Mode, now: int) -> Denial | None:
+    def enter(self, mode: Mode, now: int) -> CommandRefusal | None:
         """Change to ``mode``."""
         self._lost = False
         if mode is self.mode:
@@ -162,8 +164,8 @@ class Commander:
         if mode is Mode.MISSION:
             itinerary = self._autonomous_modes.itinerary
             status = status._replace(items=itinerary.total, takes_off=itinerary.takes_off)
-        if denial := self._flavour.mode_denial(mode, status):
-            return denial
+        if refusal := self._flavour.mode_denial(mode, status):
+            return refusal
         self._switch(mode, now)
         if not self.armed or self._flavour.armable_mode(mode):
             self._chosen = mode
@@ -176,7 +178,7 @@ class Commander:
         """
         if self.armed or not self._flavour.checks_mode:
             return None
-        return self._flavour.arming_denial(self.status(now))
+        return self._flavour.arming_refusal(self.status(now))
 
     @property
     def follows(self) -> bool:
@@ -209,7 +211,7 @@ class Commander:
         if guidance.timed_out:
             self._lose(now)
         elif self.mode in MODES:
-            self._journey(now)
+            self._autonomous_step(now)
         elif guidance.activity is Activity.TAKEOFF and guidance.reached:
             self.mode = self._chosen = self._flavour.after_takeoff
             guidance.settle()
@@ -218,19 +220,19 @@ class Commander:
         elif now >= self._disarm_at:
             self._stop("Disarmed: on the ground for too long")
 
-    def start_mission(self, now: int) -> Denial | None:
+    def start_mission(self, now: int) -> CommandRefusal | None:
         """Execute MISSION_START (300): enter the mission mode, and arm if this firmware does."""
-        denial = self.enter(Mode.MISSION, now)
-        if denial is None and self._flavour.start_arms:
+        refusal = self.enter(Mode.MISSION, now)
+        if refusal is None and self._flavour.start_arms:
             return self.arm(now, forced=False)
-        return denial
+        return refusal
 
-    def _journey(self, now: int) -> None:
+    def _autonomous_step(self, now: int) -> None:
         event = self._autonomous_modes.advance(self.mode, now, self._estimate())
         if event is Event.RETURNS:
             self._switch(Mode.RETURN, now)
         elif event is Event.FINISHED:
-            self._voice.inform("Mission finished")
+            self._status_text.inform("Mission finished")
             self.mode = self._chosen = self._flavour.after_mission
             self._guidance.hold()
 
@@ -259,7 +261,7 @@ class Commander:
 
     def _lose(self, now: int) -> None:
         self._guidance.timed_out = False
-        self._voice.warn("Set-points timed out")
+        self._status_text.warn("Set-points timed out")
         if self._flavour.after_loss is not self.mode:
             self._switch(self._flavour.after_loss, now)
             self._lost = self._flavour.keeps_choice
@@ -274,7 +276,7 @@ class Commander:
         if self._blind_since is None:
             self._blind_since = now
         if self.mode is not Mode.LAND and now - self._blind_since >= self._flavour.blind_patience:
-            self._voice.warn(self._flavour.blind_text)
+            self._status_text.warn(self._flavour.blind_text)
             self._switch(Mode.LAND, now)
 
     def _touch(self, now: int) -> None:
@@ -309,7 +311,7 @@ class Commander:
             self.mode = self._flavour.after_mission
         elif self.mode is Mode.TAKEOFF:
             self.mode = self._flavour.after_takeoff
-        self._voice.inform(why)
+        self._status_text.inform(why)
 
     def _postpone(self, now: int) -> None:
         self._disarm_at = now + round(self._config.disarm_delay * 1e6)

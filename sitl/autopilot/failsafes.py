@@ -9,7 +9,7 @@ from typing import Final
 from mavlink_bridge.messages import FenceStatus, Source
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.fences import Breach, Fences
-from sitl.autopilot.firmware import Firmware, Mode, Worry
+from sitl.autopilot.firmware import BatteryCondition, Firmware, Mode
 from sitl.estimation.sensors import Estimate
 from sitl.telemetry.status_text import StatusReporter
 from sitl.vehicle.battery import Battery, Charge
@@ -35,15 +35,15 @@ class Failsafes:
         fences: Fences,
         battery: Battery | None,
         estimate: Callable[[], Estimate],
-        voice: StatusReporter,
+        status_text: StatusReporter,
     ) -> None:
         self._flavour = flavour
         self._commander = commander
         self._fences = fences
         self._battery = battery
         self._estimate = estimate
-        self._voice = voice
-        self._worry = Worry(0)
+        self._status_text = status_text
+        self._worry = BatteryCondition(0)
         self._worse_since: int | None = None
         self._breach = Breach.NONE
         self._breached_at = 0
@@ -91,7 +91,7 @@ class Failsafes:
         """Send one text per objection to arming at ``now`` (µs)."""
         of_mode = self._commander.mode_doubt(now)
         for doubt in [*([of_mode] if of_mode else []), *self.doubts()]:
-            self._voice.warn(f"{self._flavour.doubt_prefix}{doubt}")
+            self._status_text.warn(f"{self._flavour.doubt_prefix}{doubt}")
 
     # Internals
 
@@ -99,19 +99,21 @@ class Failsafes:
         commander = self._commander
         if charge.remaining <= 0.0 and commander.armed:
             commander.cut("Battery empty: motors stopped")
-        worry = self._flavour.worry(charge)
-        if not commander.armed and worry.level < self._worry.level:
-            self._worry = worry
-        if worry.level <= self._worry.level:
+        condition = self._flavour.condition(charge)
+        if not commander.armed and condition.level < self._worry.level:
+            self._worry = condition
+        if condition.level <= self._worry.level:
             self._worse_since = None
             return
         if self._worse_since is None:
             self._worse_since = now
         if now - self._worse_since >= self._flavour.battery_patience:
-            self._worry, self._worse_since = worry, None
-            self._voice.warn(f"Battery {worry.word}: {charge.voltage:.1f} V, {100 * charge.remaining:.0f} %")
-            if worry.mode is not None:
-                commander.fail_safe(worry.mode, now)
+            self._worry, self._worse_since = condition, None
+            self._status_text.warn(
+                f"Battery {condition.word}: {charge.voltage:.1f} V, {100 * charge.remaining:.0f} %"
+            )
+            if condition.mode is not None:
+                commander.fail_safe(condition.mode, now)
 
     def _where(self) -> Breach:
         rules = self._flavour.fence_rules
@@ -130,7 +132,7 @@ class Failsafes:
         action = self._flavour.fence_rules.action
         if action == "nothing":
             return
-        self._voice.warn(f"Fence breached: {_WORDS[breach]}")
+        self._status_text.warn(f"Fence breached: {_WORDS[breach]}")
         if action == "terminate":
             self._commander.cut("Flight terminated")
         elif action in _ACTIONS:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import all as mavlink
 
 from sitl.autopilot.command_protocol import Handler, Order
-from sitl.autopilot.firmware import Denial
+from sitl.autopilot.firmware import CommandRefusal
 from sitl.autopilot.plant import Plant
 from sitl.config.autopilot import AutopilotConfig
 from sitl.vehicle.battery import Battery
@@ -28,10 +28,10 @@ class Failures:
         self._config = config
         self.commands: dict[int, Handler] = {mavlink.MAV_CMD_INJECT_FAILURE: self._inject}
 
-    def _inject(self, order: Order) -> Denial | None:
+    def _inject(self, order: Order) -> CommandRefusal | None:
         unit, kind, instance = order.params[:3]
         if self._config().failures == "refused":
-            return Denial(mavlink.MAV_RESULT_DENIED, "Failure refused: injection is off")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Failure refused: injection is off")
         off = kind == mavlink.FAILURE_TYPE_OFF
         if off or kind == mavlink.FAILURE_TYPE_OK:
             if unit == mavlink.FAILURE_UNIT_SENSOR_GPS:
@@ -43,7 +43,7 @@ class Failures:
                 self._battery.drain()
                 return None
         reason = f"Failure refused: unit {unit:.0f}, kind {kind:.0f} is not simulated"
-        return Denial(mavlink.MAV_RESULT_UNSUPPORTED, reason)
+        return CommandRefusal(mavlink.MAV_RESULT_UNSUPPORTED, reason)
 
     def _gps(self, *, off: bool) -> None:
         if off:
@@ -51,11 +51,11 @@ class Failures:
         else:
             self._plant.sensors.gps.regain()
 
-    def _motor(self, instance: float, left: float) -> Denial | None:
+    def _motor(self, instance: float, left: float) -> CommandRefusal | None:
         """Set the remaining speed of motor ``instance``: 1 is the first motor, 0 all."""
         count = len(self._plant.vehicle.config.rotors)
         if not math.isfinite(instance) or not 0 <= instance <= count:
-            return Denial(mavlink.MAV_RESULT_DENIED, f"Failure refused: there are {count} motors")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Failure refused: there are {count} motors")
         chosen = range(count) if instance == 0 else [int(instance) - 1]
         for index in chosen:
             self._plant.vehicle.fail_rotor(index, left)

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import SetGpsGlobalOrigin, SetHomePosition
 from sitl.autopilot.command_protocol import Handler, Order
-from sitl.autopilot.firmware import Denial
+from sitl.autopilot.firmware import CommandRefusal
 from sitl.estimation.sensors import Estimate
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
@@ -35,7 +35,7 @@ class HomeCommands:
         telemetry: Telemetry,
         estimate: Callable[[], Estimate],
         ready: Callable[[], bool],
-        voice: StatusReporter,
+        status_text: StatusReporter,
     ) -> None:
         """``ready`` returns whether there is a position."""
         self._home = home
@@ -43,21 +43,21 @@ class HomeCommands:
         self._telemetry = telemetry
         self._estimate = estimate
         self._ready = ready
-        self._voice = voice
+        self._status_text = status_text
         self.commands: dict[int, Handler] = {mavlink.MAV_CMD_DO_SET_HOME: self._set_home}
 
     def set_home(self, message: SetHomePosition, now: int) -> None:
         """Handle SET_HOME_POSITION (243)."""
-        denial = self._move(message.latitude, message.longitude, message.altitude)
-        if denial is not None:
-            self._voice.complain(denial.reason, now)
+        refusal = self._move(message.latitude, message.longitude, message.altitude)
+        if refusal is not None:
+            self._status_text.complain(refusal.reason, now)
 
     def set_origin(self, _message: SetGpsGlobalOrigin, now: int) -> None:
         """Handle SET_GPS_GLOBAL_ORIGIN (48): refuse it and report the present origin."""
-        self._voice.complain("Origin refused: it is set already", now)
+        self._status_text.complain("Origin refused: it is set already", now)
         self._telemetry.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 
-    def _set_home(self, order: Order) -> Denial | None:
+    def _set_home(self, order: Order) -> CommandRefusal | None:
         """Set home to the present position if parameter 1 is 1, else to parameters 5 to 7.
 
         These are in degrees and metres above mean sea level, unless the frame of a COMMAND_INT makes the
@@ -65,20 +65,22 @@ class HomeCommands:
         """
         if order.params[0] == 1.0:
             if not self._ready():
-                return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Home refused: no position yet")
+                return CommandRefusal(
+                    mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Home refused: no position yet"
+                )
             return self._move(*self._origin.geodetic(self._estimate().position))
         if order.integer and order.relative is None:
-            return Denial(mavlink.MAV_RESULT_DENIED, "Home refused: this frame is not known")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Home refused: this frame is not known")
         latitude, longitude, altitude = order.place
         if order.relative:
             altitude += self._home.altitude
         return self._move(latitude, longitude, altitude)
 
-    def _move(self, latitude: float, longitude: float, altitude: float) -> Denial | None:
+    def _move(self, latitude: float, longitude: float, altitude: float) -> CommandRefusal | None:
         if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and abs(altitude) <= _FAR):
-            return Denial(mavlink.MAV_RESULT_DENIED, "Home refused: no such place on the globe")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Home refused: no such place on the globe")
         if math.dist(self._origin.local(latitude, longitude, altitude), (0.0, 0.0, 0.0)) > _FAR:
-            return Denial(mavlink.MAV_RESULT_DENIED, "Home refused: more than 100 km from here")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Home refused: more than 100 km from here")
         self._home.move(latitude, longitude, altitude)
         self._telemetry.request(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
         return None

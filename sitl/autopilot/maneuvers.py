@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.commander import Commander
-from sitl.autopilot.firmware import Denial, Firmware, Mode
+from sitl.autopilot.firmware import CommandRefusal, Firmware, Mode
 from sitl.autopilot.following import Following
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.missions.itinerary import Itinerary
@@ -70,37 +70,39 @@ class Maneuvers:
                 mavlink.MAV_CMD_DO_PAUSE_CONTINUE: self._pause,
             }
 
-    def _loiter(self, order: Order) -> Denial | None:
+    def _loiter(self, order: Order) -> CommandRefusal | None:
         return self._commander.enter(self._flavour.loiter, order.now)
 
-    def _terminate(self, order: Order) -> Denial | None:
+    def _terminate(self, order: Order) -> CommandRefusal | None:
         if order.params[0] > 0.5:
             self._commander.cut("Flight terminated")
         return None
 
-    def _check(self, order: Order) -> Denial | None:
+    def _check(self, order: Order) -> CommandRefusal | None:
         # PX4 runs its checks in flight as well.
         if self._commander.armed and self._flavour.stops:
-            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Checks refused: armed")
+            return CommandRefusal(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Checks refused: armed")
         self._say_doubts(order.now)
         return None
 
-    def _follow(self, order: Order) -> Denial | None:
+    def _follow(self, order: Order) -> CommandRefusal | None:
         system = order.params[0]
         if not 1.0 <= system <= 255.0:
-            return Denial(mavlink.MAV_RESULT_DENIED, "Follow refused: the system id must be 1 to 255")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Follow refused: the system id must be 1 to 255")
         self._following.choose(int(system))
         return None
 
-    def _change_speed(self, order: Order) -> Denial | None:
+    def _change_speed(self, order: Order) -> CommandRefusal | None:
         """Change the horizontal speed until another mode is entered."""
         kind, speed = order.params[:2]
         if speed == _SAME:
             return None
         if kind in _VERTICAL:
-            return Denial(mavlink.MAV_RESULT_UNSUPPORTED, "Speed refused: only the level one can be changed")
+            return CommandRefusal(
+                mavlink.MAV_RESULT_UNSUPPORTED, "Speed refused: only the level one can be changed"
+            )
         if kind not in _LEVEL or not (speed == _USUAL or 0.0 < speed <= _FASTEST):
-            return Denial(mavlink.MAV_RESULT_DENIED, "Speed refused: 0 to 100 m/s of kind 0 or 1")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Speed refused: 0 to 100 m/s of kind 0 or 1")
         wanted = None if speed == _USUAL else speed
         self._speed = None if wanted is None else (self._commander.mode, wanted)
         if self._commander.mode is Mode.MISSION:
@@ -108,33 +110,37 @@ class Maneuvers:
         self._guidance.hasten(self._commander.level_speed if wanted is None else wanted)
         return None
 
-    def _pause(self, order: Order) -> Denial | None:
+    def _pause(self, order: Order) -> CommandRefusal | None:
         wish = order.params[0]
         if self._commander.mode not in (Mode.MISSION, Mode.GUIDED):
-            return Denial(mavlink.MAV_RESULT_DENIED, "Pause refused: neither in AUTO nor in GUIDED")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Pause refused: neither in AUTO nor in GUIDED")
         if wish == 0.0:
             if not self._guidance.pause():
-                return Denial(mavlink.MAV_RESULT_FAILED, "Pause refused: neither on the way nor holding")
+                return CommandRefusal(
+                    mavlink.MAV_RESULT_FAILED, "Pause refused: neither on the way nor holding"
+                )
         elif wish == 1.0:
             self._guidance.go_on()
         else:
-            return Denial(mavlink.MAV_RESULT_DENIED, "Pause refused: parameter 1 must be 0 or 1")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Pause refused: parameter 1 must be 0 or 1")
         return None
 
-    def _turn(self, order: Order) -> Denial | None:
+    def _turn(self, order: Order) -> CommandRefusal | None:
         """Execute CONDITION_YAW: parameter 1 angle (degrees), 3 direction, 4 whether it is relative."""
         angle, _, direction, relative = order.params[:4]
         if not (0.0 <= angle <= 360.0 and relative in (0.0, 1.0)):
-            return Denial(mavlink.MAV_RESULT_DENIED, "Yaw refused: the angle must be 0 to 360 degrees")
+            return CommandRefusal(
+                mavlink.MAV_RESULT_DENIED, "Yaw refused: the angle must be 0 to 360 degrees"
+            )
         if self._commander.mode is not Mode.GUIDED or self._guidance.activity is Activity.IDLE:
-            return Denial(mavlink.MAV_RESULT_FAILED, "Yaw refused: not flying in GUIDED")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Yaw refused: not flying in GUIDED")
         turn = math.radians(angle)
         if relative == 1.0:
             turn = self._guidance.yaw + (-turn if direction < 0.0 else turn)
         self._guidance.look(turn)
         return None
 
-    def _reposition(self, order: Order) -> Denial | None:
+    def _reposition(self, order: Order) -> CommandRefusal | None:
         """Execute DO_REPOSITION.
 
         Parameter 1 is the speed (m/s), bit 0 of parameter 2 whether the mode may change, parameter 4 the yaw
@@ -142,39 +148,43 @@ class Maneuvers:
         """
         commander, guided = self._commander, self._flavour.repositioning
         if not commander.ready:
-            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Reposition refused: no position yet")
+            return CommandRefusal(
+                mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Reposition refused: no position yet"
+            )
         target = self._target(order)
-        if isinstance(target, Denial):
+        if isinstance(target, CommandRefusal):
             return target
         flags = order.params[1]
         may_change = math.isfinite(flags) and int(flags) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         if commander.mode is not guided:
             if not may_change:
-                return Denial(mavlink.MAV_RESULT_DENIED, f"Reposition refused: not in {guided.name}")
-            if denial := commander.enter(guided, order.now):
-                return denial
+                return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Reposition refused: not in {guided.name}")
+            if refusal := commander.enter(guided, order.now):
+                return refusal
         if commander.armed and not commander.landed:
             here = self._estimate().pose
             self._guidance.go(target, self._leg_speed(order.params[0]), self._yaw(order.params[3]), here)
         return None
 
-    def _target(self, order: Order) -> tuple[float, float, float] | Denial:
+    def _target(self, order: Order) -> tuple[float, float, float] | CommandRefusal:
         """Return the target (m, local NED) or the denial. PX4 takes a NaN coordinate as "unchanged"."""
         latitude, longitude, altitude = order.place
         here = self._estimate().position
         if order.relative is None and self._flavour.stops:
-            return Denial(mavlink.MAV_RESULT_DENIED, "Reposition refused: this frame is not known")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Reposition refused: this frame is not known")
         if not self._flavour.stops and (order.nowhere or not math.isfinite(latitude + longitude)):
             x, y, level = here[0], here[1], 0.0
         elif not (abs(latitude) <= _LAST[0] and abs(longitude) <= _LAST[1]) or latitude == longitude == 0.0:
-            return Denial(mavlink.MAV_RESULT_DENIED, "Reposition refused: no such place on the globe")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Reposition refused: no such place on the globe")
         else:
             # Height of level ground there, which the Earth's curvature lowers.
             x, y, level = self._origin.local(latitude, longitude, self._origin.altitude)
         if not math.isfinite(altitude) and not self._flavour.stops:
             return x, y, here[2]
         if not abs(altitude) <= 10_000.0:
-            return Denial(mavlink.MAV_RESULT_DENIED, "Reposition refused: the altitude is out of range")
+            return CommandRefusal(
+                mavlink.MAV_RESULT_DENIED, "Reposition refused: the altitude is out of range"
+            )
         above = self._home.altitude if order.relative else 0.0
         return x, y, level - (altitude + above - self._origin.altitude)
 

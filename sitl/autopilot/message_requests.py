@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import Message, MessageInterval, RequestDataStream, Source
 from sitl.autopilot.command_protocol import Handler, Order
-from sitl.autopilot.firmware import Denial, Firmware
+from sitl.autopilot.firmware import CommandRefusal, Firmware
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.streams import members
 
@@ -64,33 +64,35 @@ class Requests:
         for message_id in members(stream):
             self._telemetry.set_interval(message_id, interval, now)
 
-    def _set_interval(self, order: Order) -> Denial | None:
+    def _set_interval(self, order: Order) -> CommandRefusal | None:
         message_id, interval = order.params[:2]
         if not (math.isfinite(message_id) and math.isfinite(interval)):
-            return Denial(mavlink.MAV_RESULT_DENIED, "Interval refused: not a number")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Interval refused: not a number")
         if 0.0 < interval < self._flavour.shortest_interval:
-            return Denial(mavlink.MAV_RESULT_FAILED, f"Interval refused: {interval:.0f} us is too short")
+            return CommandRefusal(
+                mavlink.MAV_RESULT_FAILED, f"Interval refused: {interval:.0f} us is too short"
+            )
         wanted = min(round(interval), _LONGEST)
         if not self._telemetry.set_interval(int(message_id), wanted, order.now):
-            return Denial(mavlink.MAV_RESULT_DENIED, f"Interval refused: no message {message_id:.0f}")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Interval refused: no message {message_id:.0f}")
         return None
 
-    def _get_interval(self, order: Order) -> Denial | None:
+    def _get_interval(self, order: Order) -> CommandRefusal | None:
         message_id = order.params[0]
         if not 0 <= message_id <= _LAST_ID:
-            return Denial(mavlink.MAV_RESULT_DENIED, "Interval refused: no such number")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Interval refused: no such number")
         interval = self._telemetry.interval(int(message_id))
         self._outbox.append(MessageInterval(self._source, interval, int(message_id)))
         return None
 
-    def _request(self, order: Order) -> Denial | None:
+    def _request(self, order: Order) -> CommandRefusal | None:
         message_id = order.params[0]
         if math.isfinite(message_id) and self._telemetry.request(int(message_id)):
             return None
-        return Denial(mavlink.MAV_RESULT_UNSUPPORTED, f"Request refused: no message {message_id:.0f}")
+        return CommandRefusal(mavlink.MAV_RESULT_UNSUPPORTED, f"Request refused: no message {message_id:.0f}")
 
-    def _always(self, message_id: int) -> Callable[[Order], Denial | None]:
-        def obey(_order: Order) -> Denial | None:
+    def _always(self, message_id: int) -> Callable[[Order], CommandRefusal | None]:
+        def obey(_order: Order) -> CommandRefusal | None:
             self._telemetry.request(message_id)
             return None
 

@@ -39,7 +39,7 @@ class Reception:
         self,
         source: Source,
         outbox: list[Message],
-        voice: StatusReporter,
+        status_text: StatusReporter,
         commander: Commander,
         orders: Orders,
         steering: SetpointReception,
@@ -54,7 +54,7 @@ class Reception:
         """
         self._source = source
         self._outbox = outbox
-        self._voice = voice
+        self._status_text = status_text
         self._commander = commander
         self._orders = orders
         self._steering = steering
@@ -96,13 +96,13 @@ class Reception:
         result, reason = self._orders.obey(message, now)
         self._outbox.append(CommandAck(self._source, message.command, result, 0, 0, *message.source))
         if reason:
-            self._voice.complain(reason, now)
+            self._status_text.complain(reason, now)
 
     def _change_mode(self, message: SetMode, now: int) -> None:
         result, reason = self._orders.set_mode(message.custom_mode, message.base_mode, now)
         self._outbox.append(CommandAck(self._source, self._set_mode_ack, result, 0, 0, *message.source))
         if reason:
-            self._voice.complain(reason, now)
+            self._status_text.complain(reason, now)
 
     def _serve(self, message: Message, now: int) -> None:
         handle = self._services.get(type(message))

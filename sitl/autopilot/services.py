@@ -24,7 +24,7 @@ from mavlink_bridge.messages import (
 from sitl.autopilot import files
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.failures import Failures
-from sitl.autopilot.firmware import Denial, Firmware
+from sitl.autopilot.firmware import CommandRefusal, Firmware
 from sitl.autopilot.home_commands import HomeCommands
 from sitl.autopilot.message_requests import Requests
 from sitl.autopilot.missions.service import MissionService
@@ -51,7 +51,7 @@ class Services:
         missions: MissionService,
         failures: Failures,
         outbox: list[Message],
-        voice: StatusReporter,
+        status_text: StatusReporter,
         configure: Callable[[], None],
     ) -> None:
         """``configure`` is called when a parameter has changed."""
@@ -64,7 +64,7 @@ class Services:
         self._now = 0
         self._missions = missions
         self.parameters = ParameterProtocol(
-            source, values, outbox, voice, self._changed, bytewise=flavour.bytewise
+            source, values, outbox, status_text, self._changed, bytewise=flavour.bytewise
         )
         self.handlers: dict[type[Any], Callable[[Any, int], None]] = {
             ParamRequestList: self.parameters.handle,
@@ -121,17 +121,17 @@ class Services:
         if answer is not None:
             self._outbox.append(answer)
 
-    def _enable_fence(self, order: Order) -> Denial | None:
+    def _enable_fence(self, order: Order) -> CommandRefusal | None:
         """Execute ArduPilot's DO_FENCE_ENABLE: parameter 1 is FENCE_ENABLE."""
         number = self._values.number("FENCE_ENABLE")
         if number is None or order.params[0] not in (0.0, 1.0):
-            return Denial(mavlink.MAV_RESULT_DENIED, "Fence refused: parameter 1 must be 0 or 1")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Fence refused: parameter 1 must be 0 or 1")
         self._values.set(number, order.params[0])
         self._now = order.now
         self._changed()
         return None
 
-    def _store(self, order: Order) -> Denial | None:
+    def _store(self, order: Order) -> CommandRefusal | None:
         """Execute PREFLIGHT_STORAGE: values are always kept; a reset restores the initial ones."""
         wish = order.params[0]
         if wish == mavlink.PARAM_RESET_FACTORY_DEFAULT:
@@ -141,4 +141,4 @@ class Services:
             return None
         if wish in (mavlink.PARAM_READ_PERSISTENT, mavlink.PARAM_WRITE_PERSISTENT):
             return None
-        return Denial(mavlink.MAV_RESULT_DENIED, "Storage refused: parameter 1 must be 0, 1 or 2")
+        return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Storage refused: parameter 1 must be 0, 1 or 2")

@@ -51,14 +51,14 @@ class SetpointReception:
     """Converter of set-point messages into set-points for the guidance."""
 
     def __init__(
-        self, flavour: Firmware, guidance: Guidance, origin: Origin, home: Home, voice: StatusReporter
+        self, flavour: Firmware, guidance: Guidance, origin: Origin, home: Home, status_text: StatusReporter
     ) -> None:
         """``origin`` and ``home`` are the references of global positions and heights."""
         self._flavour = flavour
         self._guidance = guidance
         self._origin = origin
         self._home = home
-        self._voice = voice
+        self._status_text = status_text
         self.stream = Stream()
 
     def steer(
@@ -74,17 +74,17 @@ class SetpointReception:
         """
         reading = self._read(message, here)
         if not isinstance(reading, Setpoint):
-            denial = self._flavour.steering_denial(status)
-            self._voice.complain(denial or reading.reason, now)
-            if isinstance(reading, Stop) and denial is None and self._guidance.activity is Activity.TRACK:
+            refusal = self._flavour.steering_denial(status)
+            self._status_text.complain(refusal or reading.reason, now)
+            if isinstance(reading, Stop) and refusal is None and self._guidance.activity is Activity.TRACK:
                 self._guidance.hold()
             return False
         self.stream = Stream(reading, now, self.stream.newest)
-        denial = self._flavour.steering_denial(status)
-        if denial is None:
+        refusal = self._flavour.steering_denial(status)
+        if refusal is None:
             self._follow(reading, here, now)
-        elif denial:
-            self._voice.complain(denial, now)
+        elif refusal:
+            self._status_text.complain(refusal, now)
         return True
 
     def resume(self, here: Pose, now: int) -> None:

@@ -27,14 +27,14 @@ class Trust:
         signing: Signing | None,
         setup: Literal["refused", "obeyed"],
         armed: Callable[[], bool],
-        voice: StatusReporter,
+        status_text: StatusReporter,
     ) -> None:
         """Without ``signing`` every message is accepted, and no key."""
         self._source = source
         self._signing = signing
         self._obeys = setup == "obeyed"
         self._armed = armed
-        self._voice = voice
+        self._status_text = status_text
         self._refused = 0
         self._next = 0
 
@@ -44,13 +44,13 @@ class Trust:
             return
         reason = self._reason(message)
         if reason is not None or self._signing is None:
-            self._voice.complain(f"Signing setup refused: {reason}", now)
+            self._status_text.complain(f"Signing setup refused: {reason}", now)
         elif message.key.blank:
             self._signing.use(None)
-            self._voice.inform("Signing is off")
+            self._status_text.inform("Signing is off")
         else:
             self._signing.use(message.key, message.since)
-            self._voice.inform("Signing is on")
+            self._status_text.inform("Signing is on")
 
     def _reason(self, message: SetupSigning) -> str | None:
         if not self._obeys or self._signing is None:
@@ -71,4 +71,4 @@ class Trust:
         refused = sum(signing.refused.values())
         if refused != self._refused:
             self._refused, self._next = refused, now + _PAUSE
-            self._voice.warn(f"Messages do not count: {signing.latest.value}")
+            self._status_text.warn(f"Messages do not count: {signing.latest.value}")

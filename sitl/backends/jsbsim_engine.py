@@ -95,7 +95,7 @@ class Engine:
         for name, code in _POSITIONS.items():
             self._set(name, code)
         self._begin(place, state, ground, motors)
-        self._stir(air)
+        self._set_turbulence(air)
         self._read()
         # JSBSim finds a latitude only to within 0.1 mm; the origin is set so that the start is where
         # requested.
@@ -164,7 +164,7 @@ class Engine:
         if not self._fdm.run_ic():
             raise BackendError(f"JSBSim does not take the start of {self._name}: {here}")
 
-    def _stir(self, air: Air) -> None:
+    def _set_turbulence(self, air: Air) -> None:
         """Set the turbulence, after the start, which resets the wind."""
         self._set("simulation/randomseed", float(air.seed))
         self._set("atmosphere/turb-type", _MILSPEC if air.w20 else 0.0)

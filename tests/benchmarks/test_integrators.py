@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.integrators import A_MAX, STEP, V_MAX, Array, Manner, fly, nearest, preferred
+from benchmarks.integrators import A_MAX, STEP, V_MAX, Array, FreeMotion, fly, nearest, preferred
 
-MANNERS = st.builds(Manner, st.floats(1.0, 1.8), st.floats(1.5, 3.0), st.floats(0.0, 0.4))
+MANNERS = st.builds(FreeMotion, st.floats(1.0, 1.8), st.floats(1.5, 3.0), st.floats(0.0, 0.4))
 
 
 class Wilful:
@@ -26,7 +26,7 @@ class Wilful:
 
 
 @given(MANNERS, st.floats(1.0, 40.0))
-def test_it_keeps_its_limits_and_takes_no_less_than_it_must(manner: Manner, length: float) -> None:
+def test_it_keeps_its_limits_and_takes_no_less_than_it_must(manner: FreeMotion, length: float) -> None:
     wilful = Wilful()
     way = length * np.array([[0.6, 0.8]])
     flown = fly(np.zeros((1, 2)), way, wilful, manner, 0.5, 60.0)
@@ -43,22 +43,23 @@ def test_it_keeps_its_limits_and_takes_no_less_than_it_must(manner: Manner, leng
 
 def test_who_does_not_give_way_collides() -> None:
     ends = np.array([[-4.0, 0.0], [4.0, 0.0]])
-    straight = fly(ends, -ends, Wilful(), Manner(1.6, 2.0, 0.0), 0.5, 60.0)
+    straight = fly(ends, -ends, Wilful(), FreeMotion(1.6, 2.0, 0.0), 0.5, 60.0)
     assert straight.separation_m == pytest.approx(0.0, abs=1e-6)
     assert straight.below_s > 0.0
-    aside = fly(ends, -ends, Wilful(), Manner(1.6, 2.0, 0.3), 0.5, 60.0)
+    aside = fly(ends, -ends, Wilful(), FreeMotion(1.6, 2.0, 0.3), 0.5, 60.0)
     assert aside.separation_m > 0.5
     assert aside.below_s == 0.0
 
 
 def test_who_has_no_time_does_not_converge() -> None:
     assert (
-        fly(np.zeros((1, 2)), np.ones((1, 2)), Wilful(), Manner(1.6, 2.0, 0.0), 0.5, 1.0).converged_s is None
+        fly(np.zeros((1, 2)), np.ones((1, 2)), Wilful(), FreeMotion(1.6, 2.0, 0.0), 0.5, 1.0).converged_s
+        is None
     )
 
 
 @given(MANNERS, st.floats(0.01, 30.0))
-def test_braking_is_as_it_is_said(manner: Manner, distance: float) -> None:
+def test_braking_is_as_it_is_said(manner: FreeMotion, distance: float) -> None:
     """v dv/dd is the deceleration."""
     near, far = (
         float(np.linalg.norm(preferred(np.array([[d, 0.0]]), manner))) for d in (distance, distance + 1e-4)
@@ -67,7 +68,7 @@ def test_braking_is_as_it_is_said(manner: Manner, distance: float) -> None:
 
 
 def test_right_is_right() -> None:
-    ((east, north),) = preferred(np.array([[0.0, 10.0]]), Manner(1.6, 2.0, 0.1))
+    ((east, north),) = preferred(np.array([[0.0, 10.0]]), FreeMotion(1.6, 2.0, 0.1))
     assert east > 0.0
     assert math.atan2(east, north) == pytest.approx(0.1)
 

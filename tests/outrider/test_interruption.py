@@ -11,7 +11,7 @@ import pytest
 
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import OutriderError
-from outrider.interruption import Came, insisted, interruptible, noted
+from outrider.interruption import ReceivedSignal, insisted, interruptible, noted
 from outrider.simulation.conductor import Stage
 from outrider.simulation.preparation import Prepared
 from outrider.swarm.command import fly
@@ -85,7 +85,9 @@ def test_what_comes_twice_in_a_moment_came_once() -> None:
         for _ in range(2):
             os.kill(os.getpid(), signal.SIGTERM)
     assert [one.which for one in came] == [signal.SIGTERM] * 2
-    first = Came(signal.SIGTERM, 100.0)
+    first = ReceivedSignal(signal.SIGTERM, 100.0)
     assert not insisted([])
-    assert not insisted([first, Came(signal.SIGTERM, 100.005), Came(signal.SIGHUP, 100.9)])
-    assert insisted([first, Came(signal.SIGTERM, 100.005), Came(signal.SIGTERM, 101.2)])
+    assert not insisted(
+        [first, ReceivedSignal(signal.SIGTERM, 100.005), ReceivedSignal(signal.SIGHUP, 100.9)]
+    )
+    assert insisted([first, ReceivedSignal(signal.SIGTERM, 100.005), ReceivedSignal(signal.SIGTERM, 101.2)])

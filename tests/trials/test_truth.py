@@ -14,7 +14,7 @@ from mavlink_bridge.links.endpoints import UdpIn
 from mavlink_bridge.messages import CommandLong, Heartbeat, HilState, SimulationState, Source
 from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
-from trials.ears import PortEar
+from trials.receivers import PortReceiver
 from trials.truth import TruthObserver
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
@@ -122,24 +122,24 @@ def test_what_others_say_counts_nowhere(rig) -> None:
 
 
 def test_a_port_tells_each_vehicle_only_what_is_for_it() -> None:
-    ear = PortEar(UdpIn("127.0.0.1", 0))
+    receiver = PortReceiver(UdpIn("127.0.0.1", 0))
     try:
         ends = {}
         for system in (1, 2):
             ends[system] = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            ends[system].connect(ear.address)
+            ends[system].connect(receiver.address)
             ends[system].settimeout(5.0)
             ends[system].send(beat(system, False))
         received: list[bytes] = []
         while len(received) < 2:
-            received += ear.receive()
-        ear.tell(2, b"two")
-        ear.tell(1, b"one")
-        ear.tell(3, b"nobody")
+            received += receiver.receive()
+        receiver.tell(2, b"two")
+        receiver.tell(1, b"one")
+        receiver.tell(3, b"nobody")
         assert (ends[1].recv(99), ends[2].recv(99)) == (b"one", b"two")
         with pytest.raises(InputError, match="End the ground station"):
-            PortEar(UdpIn("127.0.0.1", ear.address[1]))
+            PortReceiver(UdpIn("127.0.0.1", receiver.address[1]))
     finally:
-        ear.close()
+        receiver.close()
         for end in ends.values():
             end.close()

@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
-from benchmarks.recorded_flights import Array, RecordedFlight, Told
+from benchmarks.recorded_flights import Array, RecordedFlight, ReportedData
 from mavlink_bridge.messages import SetpointLocal
 
 _TRAJECTORY: Final[int] = (
@@ -90,7 +90,7 @@ def distances(flight: RecordedFlight, part: Part, track: Array) -> Array:
     return np.asarray(np.linalg.norm(here - there[:, 1:], axis=1))
 
 
-def turns(flight: RecordedFlight, part: Part, told: Told) -> Array:
+def turns(flight: RecordedFlight, part: Part, told: ReportedData) -> Array:
     """Return the differences (n,), rad, between the yaw of another flight and the recorded yaw."""
     there = during(flight, part, flight.told.headings)
     here = np.interp(there[:, 0], told.headings[:, 0], np.unwrap(told.headings[:, 1]))

@@ -25,7 +25,7 @@ _TOUCH = 1e-3
 """Tolerance (m) below d_min: ORCA aims at touching, and computes in single precision."""
 
 
-class Manner(NamedTuple):
+class FreeMotion(NamedTuple):
     """Motion of a vehicle without neighbours.
 
     ``braking``: m/s² before the goal, less than `A_MAX` to leave some for avoidance; ``gain``: 1/s, speed per
@@ -64,7 +64,7 @@ class Flown(NamedTuple):
 
 
 def fly(
-    starts: Array, goals: Array, avoidance: Avoidance, manner: Manner, d_min: float, cap_s: float
+    starts: Array, goals: Array, avoidance: Avoidance, manner: FreeMotion, d_min: float, cap_s: float
 ) -> Flown:
     """Fly from ``starts``, at rest, to ``goals`` (K, 2), m.
 
@@ -91,7 +91,7 @@ def fly(
     return Flown(None, least, below * STEP)
 
 
-def preferred(way: Array, manner: Manner) -> Array:
+def preferred(way: Array, manner: FreeMotion) -> Array:
     """Return velocities (K, 2), m/s, with which each would come to rest at the end of its ``way`` (K, 2), m.
 
     v = √(2 b (d − d₀)) far away and k d near, which meet where d = 2 d₀ = b / k² with one slope: the

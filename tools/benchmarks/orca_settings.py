@@ -6,7 +6,7 @@ import math
 from itertools import product
 from typing import NamedTuple
 
-from benchmarks.integrators import Manner
+from benchmarks.integrators import FreeMotion
 
 
 class Setting(NamedTuple):
@@ -23,9 +23,9 @@ class Setting(NamedTuple):
     gain: float
 
     @property
-    def manner(self) -> Manner:
+    def manner(self) -> FreeMotion:
         """Motion of a vehicle without neighbours."""
-        return Manner(self.braking, self.gain, math.radians(self.turned_deg))
+        return FreeMotion(self.braking, self.gain, math.radians(self.turned_deg))
 
 
 RADII, HORIZONS, TURNS = (0.25, 0.3, 0.35, 0.5), (0.5, 1.0, 2.0), (0.0, 10.0, 20.0)

@@ -69,7 +69,7 @@ class Landing(NamedTuple):
     landed_state: int
 
 
-class Told(NamedTuple):
+class ReportedData(NamedTuple):
     """Data that a vehicle reported during a flight."""
 
     acks: list[Ack]
@@ -96,7 +96,7 @@ class RecordedFlight(NamedTuple):
     system: int
     flavour: str
     sent: list[Sent]
-    told: Told
+    told: ReportedData
 
 
 def read_flight(path: Path) -> RecordedFlight:
@@ -120,12 +120,12 @@ def read_flight(path: Path) -> RecordedFlight:
     return RecordedFlight(own.system, FLAVOURS[beats[0].autopilot], sent, told)
 
 
-def tell(received: Iterable[tuple[float, Message]], begin: float = 0.0) -> Told:
+def tell(received: Iterable[tuple[float, Message]], begin: float = 0.0) -> ReportedData:
     """Collect the data that a vehicle reported, from its messages and their times of arrival (s).
 
     The vehicle's own time stamps count from ``begin`` (µs).
     """
-    told = Told([], [], [], np.empty(0), np.empty(0))
+    told = ReportedData([], [], [], np.empty(0), np.empty(0))
     track, headings = [], []
     for time, message in received:
         match message:
@@ -145,7 +145,7 @@ def tell(received: Iterable[tuple[float, Message]], begin: float = 0.0) -> Told:
     return told._replace(track=np.array(track), headings=np.array(headings))
 
 
-def fly(flight: RecordedFlight, vehicle: VehicleConfig, **settings: Any) -> Told:
+def fly(flight: RecordedFlight, vehicle: VehicleConfig, **settings: Any) -> ReportedData:
     """Return what the emulated autopilot reports when it receives the flight's messages.
 
     The messages arrive at the same simulated times. ``settings`` are fields of ``AutopilotConfig`` in

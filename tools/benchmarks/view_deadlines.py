@@ -18,14 +18,14 @@ from outrider.scenarios.options import Options
 from outrider.simulation.preparation import prepare
 from outrider.swarm import command as swarm
 from outrider.swarm.command import Pace
-from outrider.swarm.show import Show
+from outrider.swarm.show import FlightView
 from outrider.view.viewer_client import ViewerClient
 
 VEHICLES = 4
 FLIGHTS = ("without", "with")
 
 
-class Punctual(NamedTuple):
+class FlightPunctuality(NamedTuple):
     """Punctuality of one flight.
 
     It has the share of the companions' deadlines that were missed, and the 99th percentile of the lateness
@@ -36,7 +36,7 @@ class Punctual(NamedTuple):
     late_ms: float
 
 
-def flight(stack: ExitStack, options: set[str], view: bool, seed: int) -> Punctual:
+def flight(stack: ExitStack, options: set[str], view: bool, seed: int) -> FlightPunctuality:
     """Fly one flight, with a view or without."""
     prepared = prepare("antipodal", Options(vehicles=VEHICLES))
     directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -44,7 +44,7 @@ def flight(stack: ExitStack, options: set[str], view: bool, seed: int) -> Punctu
     if view:
         viewer = ViewerClient(port=18300)
         stack.callback(viewer.close)
-        show = Show(viewer, watched=False)
+        show = FlightView(viewer, watched=False)
         if "--browser" in options:
             _open(stack, viewer.url)
     pace = Pace(real_time=True, priority="--priority" in options)
@@ -52,7 +52,7 @@ def flight(stack: ExitStack, options: set[str], view: bool, seed: int) -> Punctu
     misses, steps, late = summary["deadline_misses"], summary["deadline_steps"], summary["lateness_ms"]
     if not (isinstance(misses, int) and isinstance(steps, int) and isinstance(late, dict)):
         raise TypeError(f"no deadlines in the summary: {summary}")
-    return Punctual(misses / max(steps, 1), float(late["p99"] or 0.0))
+    return FlightPunctuality(misses / max(steps, 1), float(late["p99"] or 0.0))
 
 
 def _open(stack: ExitStack, url: str) -> None:
@@ -71,7 +71,7 @@ def main() -> None:
     """Fly in turns and print the results."""
     rounds = next((int(word) for word in sys.argv[1:] if word.isdigit()), 3)
     options = set(sys.argv[1:])
-    found: dict[bool, list[Punctual]] = {False: [], True: []}
+    found: dict[bool, list[FlightPunctuality]] = {False: [], True: []}
     for seed in range(1, rounds + 1):
         for view in (False, True) if seed % 2 else (True, False):
             with ExitStack() as stack:

@@ -35,7 +35,7 @@ def interruptible(left: str) -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-class Came(NamedTuple):
+class ReceivedSignal(NamedTuple):
     """A received signal, and its time (s of the monotonic clock)."""
 
     which: int
@@ -43,12 +43,12 @@ class Came(NamedTuple):
 
 
 @contextmanager
-def noted(signals: Sequence[signal.Signals]) -> Iterator[list[Came]]:
+def noted(signals: Sequence[signal.Signals]) -> Iterator[list[ReceivedSignal]]:
     """Record those of ``signals`` that arrive instead of letting them end the process."""
-    came: list[Came] = []
+    came: list[ReceivedSignal] = []
 
     def note(which: int, _frame: FrameType | None) -> None:
-        came.append(Came(which, time.monotonic()))
+        came.append(ReceivedSignal(which, time.monotonic()))
 
     before = {which: signal.signal(which, note) for which in signals}
     try:
@@ -58,7 +58,7 @@ def noted(signals: Sequence[signal.Signals]) -> Iterator[list[Came]]:
             signal.signal(which, handler)
 
 
-def insisted(came: Sequence[Came]) -> bool:
+def insisted(came: Sequence[ReceivedSignal]) -> bool:
     """Return whether a stop was requested again.
 
     A signal to a group of processes may arrive twice within a moment; that counts as one request.

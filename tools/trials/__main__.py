@@ -132,7 +132,9 @@ def _keep(stage: Stage, directory: Path) -> None:
         }
         np.savez_compressed(directory / "tracks.npz", allow_pickle=False, **ways)
     events = [
-        {"vehicle": system, **event} for system, wingman in stage.wingmen.items() for event in wingman.events
+        {"vehicle": system, **event}
+        for system, companion in stage.companions.items()
+        for event in companion.events
     ]
     lines = [json.dumps(event) for event in sorted(events, key=lambda event: event["trial_s"])]
     (directory / "events.jsonl").write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")

@@ -20,12 +20,12 @@ _FAREWELL = 20.0
 
 
 class Emulation:
-    """Vehicles of ``plan``, which also send all telemetry to the endpoint ``ear``.
+    """Vehicles of ``plan``, which also send all telemetry to the endpoint ``receiver``.
 
     Raises OutriderError if they do not start.
     """
 
-    def __init__(self, plan: Plan, ear: str, directory: Path) -> None:
+    def __init__(self, plan: Plan, receiver: str, directory: Path) -> None:
         count = len(plan.systems)
         base = _free_base(plan.flavour, count)
         command = [sys.executable, "-m", "outrider", "sitl", "--json", f"--count={count}"]
@@ -37,7 +37,7 @@ class Emulation:
             command.append(f"--origin={place.latitude},{place.longitude},{place.altitude}")
         with (directory / "sitl.log").open("wb") as err:
             self._process = subprocess.Popen(
-                [*command, f"--to={ear}"], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=err
+                [*command, f"--to={receiver}"], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=err
             )
         assert self._process.stdout is not None
         line = self._process.stdout.readline()

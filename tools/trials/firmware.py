@@ -29,7 +29,7 @@ _LAST: Final = 300
 
 
 @dataclass(frozen=True)
-class Launch:
+class StartCommand:
     """Start parameters of a program: ``command``, with ``environment`` in addition to the inherited one.
 
     ``endpoint`` is the companion's; ``told`` is another one for the true state.
@@ -41,7 +41,7 @@ class Launch:
     told: str
 
 
-def launch(program: Program, system: int, fleet: FleetFrame) -> Launch:
+def launch(program: Program, system: int, fleet: FleetFrame) -> StartCommand:
     """Return the start parameters of vehicle ``system``, which stands in the row.
 
     The instance is ``system`` − 1, as PX4 derives its system id from it.
@@ -52,7 +52,7 @@ def launch(program: Program, system: int, fleet: FleetFrame) -> Launch:
         words = [f"-I{instance}", "--sysid", str(system), "-S", "--speedup", "1"]
         home = f"{latitude:.9f},{longitude:.9f},{altitude:.3f},0"
         first, told = (port + _STEP["ardupilot"] * instance for port in _TCP["ardupilot"][:2])
-        return Launch(
+        return StartCommand(
             (str(_program(program.path)), *words, "--home", home, *program.words),
             {},
             f"tcp:{HOST}:{first}",
@@ -62,7 +62,7 @@ def launch(program: Program, system: int, fleet: FleetFrame) -> Launch:
     settings = dict(word.split("=", 1) for word in program.words if "=" in word)
     more = [word for word in program.words if "=" not in word]
     place = {"PX4_HOME_LAT": latitude, "PX4_HOME_LON": longitude, "PX4_HOME_ALT": altitude}
-    return Launch(
+    return StartCommand(
         (str(binary), "-i", str(instance), "-d", str(data), *more),
         {
             "PX4_SIM_MODEL": "sihsim_quadx",

@@ -40,10 +40,10 @@ def _lose_the_target(stage: Stage) -> None:
 
 
 def _kill_the_pilot(stage: Stage) -> None:
-    wingman = stage.wingmen[KILLED]
+    companion = stage.companions[KILLED]
     stage.tell(f"SIGKILL to the process that flies vehicle {KILLED}")
     reports = Reports(stage)
-    wingman.kill_pilot()
+    companion.kill_pilot()
     reports.of([KILLED], "lost", "the companion is gone")
     # It holds; on a busy machine the autopilot's own time-out may come first.
     reports.of([KILLED], "last word", "the vehicle")
@@ -53,15 +53,15 @@ def _kill_the_pilot(stage: Stage) -> None:
 
 
 def _end_a_companion(stage: Stage) -> None:
-    wingman = stage.wingmen[ENDED]
+    companion = stage.companions[ENDED]
     others = [system for system in stage.plan.systems if system != ENDED]
     silent = f"Neighbour {ENDED} is not heard"
     stage.tell(f"SIGKILL to all of the companion of vehicle {ENDED}")
     reports = Reports(stage)
-    wingman.kill()
+    companion.kill()
     reports.of(others, "concern", silent)
     stage.tell("it is started anew")
-    wingman.start()
+    companion.start()
     reports.of([ENDED], "waiting", "the operator's go")
     reports.of(others, "over", silent)
     send(reports, [ENDED])

@@ -24,7 +24,7 @@ class Reports:
 
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
-        self._marks = {system: len(wingman.events) for system, wingman in stage.wingmen.items()}
+        self._marks = {system: len(companion.events) for system, companion in stage.companions.items()}
 
     def of(self, systems: Iterable[int], what: str, text: str, patience: float = PATIENCE) -> None:
         """Wait until all ``systems`` have recorded an event of kind ``what`` that contains ``text``."""
@@ -45,7 +45,7 @@ class Reports:
             if missing and time.monotonic() - asked >= _AGAIN:
                 asked = time.monotonic()
                 for system in missing:
-                    self._stage.wingmen[system].order("go")
+                    self._stage.companions[system].order("go")
             return not missing
 
         self._stage.until(taken, f"phase prepare of {wanted}")
@@ -61,7 +61,7 @@ class Reports:
 
     def events(self, system: int) -> list[dict[str, Any]]:
         """Return the events of ``system`` since the mark."""
-        return self._stage.wingmen[system].events[self._marks[system] :]
+        return self._stage.companions[system].events[self._marks[system] :]
 
 
 def wait_for_the_go(stage: Stage) -> None:
@@ -73,9 +73,9 @@ def wait_for_the_go(stage: Stage) -> None:
     reports = Reports(stage)
 
     def ready() -> bool:
-        for system, wingman in stage.wingmen.items():
-            if wingman.process.poll() is not None:
-                last = wingman.errors.strip().rpartition("\n")[2]
+        for system, companion in stage.companions.items():
+            if companion.process.poll() is not None:
+                last = companion.errors.strip().rpartition("\n")[2]
                 raise OutriderError(f"the companion of vehicle {system} ended: {last}")
         return all(reports.noted(system, "waiting", GO_AWAITED) for system in stage.plan.systems)
 
@@ -106,9 +106,9 @@ def come_back(stage: Stage) -> None:
     reports = Reports(stage)
     stage.walker.stop(stage.observer.clock.now())
     for system in everyone:
-        stage.wingmen[system].order("return")
+        stage.companions[system].order("return")
     reports.of(everyone, "phase", "return")
     reports.of(everyone, "phase", "done")
-    ended = [wingman.process for wingman in stage.wingmen.values()]
+    ended = [companion.process for companion in stage.companions.values()]
     stage.until(lambda: all(process.poll() is not None for process in ended), "the end of the companions")
     stage.until(lambda: stage.observer.grounded, "disarmed vehicles")

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from mavlink_bridge.frames import FleetFrame
 from outrider.errors import OutriderError
+from trials.companion_ports import CompanionPorts
+from trials.companion_process import CompanionProcess
 from trials.flown import Flown, flown
-from trials.hub import Hub
 from trials.observer import Observer
 from trials.plan import SORTIE, TARGET, Plan
 from trials.progress import Progress
@@ -23,7 +24,6 @@ from trials.separation import Nearest, longest_gap, nearest
 from trials.station import Station
 from trials.vehicles import vehicles
 from trials.walker import Circle, Walker, sortie_way
-from trials.wingman import Wingman
 
 Array = NDArray[np.float64]
 
@@ -56,12 +56,12 @@ class Stage:
             self.observer: Observer = self.vehicles.observer
             self.station = Station(plan.systems)
             files.callback(self.station.link.close)
-            self.swarm = Hub(plan.systems)
+            self.swarm = CompanionPorts(plan.systems)
             files.callback(self.swarm.close)
             self.walker = Walker(self.fleet, sortie_way() if plan.story == SORTIE else Circle())
             files.callback(self.walker.close)
             configs = plan.write(directory)
-            self.wingmen: dict[int, Wingman] = {}
+            self.companions: dict[int, CompanionProcess] = {}
             for system in plan.systems:
                 options = {
                     "autopilot": self.vehicles.endpoint(system),
@@ -71,9 +71,9 @@ class Stage:
                     "config": str(configs[plan.flavour_of(system)]),
                 }
                 words = [f"--{name}={value}" for name, value in options.items()]
-                wingman = Wingman(system, directory / f"vehicle-{system}", *words)
-                files.callback(wingman.close)
-                self.wingmen[system] = wingman
+                companion = CompanionProcess(system, directory / f"vehicle-{system}", *words)
+                files.callback(companion.close)
+                self.companions[system] = companion
             self._files = files.pop_all()
 
     @property
@@ -120,8 +120,8 @@ class Stage:
         wall = time.monotonic()
         if wall - self._looked >= _LOOK:
             self._looked = wall
-            for wingman in self.wingmen.values():
-                wingman.look(self.now)
+            for companion in self.companions.values():
+                companion.look(self.now)
             self._progress.look(self.now)
 
     def _walk(self) -> None:
@@ -146,7 +146,7 @@ class Stage:
         """Return the times (s) from which and until which the companion of ``system`` steered it."""
         phases = {
             event["text"]: event["trial_s"]
-            for event in self.wingmen[system].events
+            for event in self.companions[system].events
             if event["what"] == "phase"
         }
         return phases.get("escort", inf), phases.get("land", inf)

@@ -17,8 +17,8 @@ from mavlink_bridge.clocks.clock import Clock, WallClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandLong, Heartbeat, HilState, SimulationState
 from mavlink_bridge.wire.codec import Codec
-from trials.ears import Ear
 from trials.observer import AGAIN, OWN
+from trials.receivers import Receiver
 from trials.separation import Track
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ _READ: Final = frozenset(
 )
 
 
-class TrueSeen:
+class TruthRecord:
     """Record of one vehicle; ``rows``: wall time (µs), position (m, fleet frame), whether armed."""
 
     def __init__(self) -> None:
@@ -55,29 +55,29 @@ class TrueSeen:
 
 
 class TruthObserver:
-    """Observer of the vehicles of ``flavours``, by system id, through the receivers ``ears``."""
+    """Observer of the vehicles of ``flavours``, by system id, through the ``receivers``."""
 
     def __init__(
         self,
-        ears: Mapping[int, Ear],
+        receivers: Mapping[int, Receiver],
         flavours: Mapping[int, str],
         fleet: FleetFrame,
         clock: Clock | None = None,
     ) -> None:
-        self.seen = {system: TrueSeen() for system in flavours}
-        self._ears, self._flavours, self._fleet = ears, flavours, fleet
+        self.seen = {system: TruthRecord() for system in flavours}
+        self._receivers, self._flavours, self._fleet = receivers, flavours, fleet
         self._clock = WallClock() if clock is None else clock
         self._begin = self._clock.now()
         self._next = 0
         self._codecs = {
-            id(ear): Codec(
+            id(receiver): Codec(
                 lambda identifier, system, component: (
                     identifier in _READ
                     and system in self.seen
                     and component == mavlink.MAV_COMP_ID_AUTOPILOT1
                 )
             )
-            for ear in ears.values()
+            for receiver in receivers.values()
         }
 
     @property
@@ -122,9 +122,9 @@ class TruthObserver:
     def turn(self) -> None:
         """Process everything that has arrived, and request what is missing."""
         now = self._clock.now()
-        for ear in {id(ear): ear for ear in self._ears.values()}.values():
-            for data in ear.receive():
-                for message in self._codecs[id(ear)].feed(data, whole=True):
+        for receiver in {id(receiver): receiver for receiver in self._receivers.values()}.values():
+            for data in receiver.receive():
+                for message in self._codecs[id(receiver)].feed(data, whole=True):
                     one = self.seen[message.source.system]
                     if isinstance(message, SimulationState | HilState):
                         place = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
@@ -139,9 +139,9 @@ class TruthObserver:
 
     def _ask(self, now: int) -> None:
         for system, one in self.seen.items():
-            ear = self._ears[system]
-            codec = self._codecs[id(ear)]
-            ear.tell(system, codec.encode(_GROUND_STATION))
+            receiver = self._receivers[system]
+            codec = self._codecs[id(receiver)]
+            receiver.tell(system, codec.encode(_GROUND_STATION))
             if now - one.received > _SILENT:
                 wanted = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
                 if self._flavours[system] == _ARDUPILOT:
@@ -149,4 +149,4 @@ class TruthObserver:
                 params = (float(wanted), float(_PERIOD), 0.0, 0.0, 0.0, 0.0, 0.0)
                 whom = system, mavlink.MAV_COMP_ID_AUTOPILOT1
                 request = CommandLong(OWN, *whom, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, params)
-                ear.tell(system, codec.encode(request))
+                receiver.tell(system, codec.encode(request))

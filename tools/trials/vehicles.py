@@ -8,11 +8,11 @@ from typing import Any, Protocol
 
 from mavlink_bridge.frames import FleetFrame
 from trials.autopilots import Program, Running
-from trials.ears import open_ears
 from trials.emulation import Emulation
 from trials.firmware import Firmware
 from trials.observer import Observer, SitlObserver
 from trials.plan import Plan
+from trials.receivers import open_receivers
 from trials.station import listener
 from trials.truth import TruthObserver
 
@@ -45,11 +45,11 @@ class Emulated:
 
     def __init__(self, plan: Plan, fleet: FleetFrame, directory: Path) -> None:
         with ExitStack() as files:
-            ear, told = listener()
-            files.callback(ear.close)
+            receiver, told = listener()
+            files.callback(receiver.close)
             self._emulation = Emulation(plan, told, directory)
             files.callback(self._emulation.close)
-            self.observer: Observer = SitlObserver(ear, plan.systems, fleet)
+            self.observer: Observer = SitlObserver(receiver, plan.systems, fleet)
             self._files = files.pop_all()
 
     @property
@@ -89,11 +89,11 @@ class Real:
                 **{system: one.told for system, one in launches.items()},
                 **{system: one.told for system, one in running.items()},
             }
-            ears = open_ears(told)
-            for ear in ears.values():
-                files.callback(ear.close)
+            receivers = open_receivers(told)
+            for receiver in receivers.values():
+                files.callback(receiver.close)
             flavours = {system: one.flavour for system, one in flown.items()}
-            self.observer: Observer = TruthObserver(ears, flavours, fleet)
+            self.observer: Observer = TruthObserver(receivers, flavours, fleet)
             self._files = files.pop_all()
 
     @property

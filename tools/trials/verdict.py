@@ -30,7 +30,7 @@ def verdict(stage: Stage, trouble: str | None) -> dict[str, Any]:
     mates = [one for one in found if TARGET not in one.pair]
     guarded = [one for one in found if TARGET in one.pair]
     faults += _near(found, d_min, target_d_min) + blind(gap)
-    summaries: Said = {system: wingman.summary for system, wingman in stage.wingmen.items()}
+    summaries: Said = {system: companion.summary for system, companion in stage.companions.items()}
     if trouble is None:
         killed = KILLED if plan.story == MISHAPS else None
         for system, said in summaries.items():
@@ -70,7 +70,7 @@ def _counts(stage: Stage, summaries: Said) -> dict[str, Any]:
     """Return the counts and timings of all companions."""
     sums = [said for said in summaries.values() if said is not None]
     return {
-        "events": {str(system): len(wingman.events) for system, wingman in stage.wingmen.items()},
+        "events": {str(system): len(companion.events) for system, companion in stage.companions.items()},
         "texts": {str(system): len(texts) for system, texts in stage.station.texts.items()},
         "setpoints": sum(said.get("setpoints", {}).get("count", 0) for said in sums),
         "plan_ms": {

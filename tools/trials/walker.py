@@ -24,7 +24,7 @@ _MIDDLE = np.array([3.0, 1.5, 0.0])
 """Centre (m), that of the grid on which the vehicles start: the target never walks among them."""
 
 
-class Way(Protocol):
+class TargetPath(Protocol):
     """Path of a target over time (µs)."""
 
     def begin(self, now: int) -> None:
@@ -67,7 +67,7 @@ def sortie_way() -> Walk:
 class Walker:
     """Target that reports its position to all who receive at ``endpoint``; times are in µs."""
 
-    def __init__(self, fleet: FleetFrame, way: Way) -> None:
+    def __init__(self, fleet: FleetFrame, way: TargetPath) -> None:
         self.silent = False
         # A random group: several trials may run at the same time.
         group = f"239.255.{random.randrange(1, 250)}.{random.randrange(1, 250)}"

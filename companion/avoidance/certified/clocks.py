@@ -20,7 +20,7 @@ _NS = 1000
 """Nanoseconds in a µs; the last three digits of a request are its sender's system id, to find its reply."""
 
 
-class Ahead(NamedTuple):
+class ClockBounds(NamedTuple):
     """Bounds (µs) on how far another clock is ahead, at least and at most, as known at ``at`` (µs)."""
 
     least: int
@@ -37,7 +37,7 @@ class ClockWatch:
     def __init__(self, own: Source, bound: int) -> None:
         self._own, self._bound = own, bound
         self._next = 0
-        self.ahead: dict[int, Ahead] = {}
+        self.ahead: dict[int, ClockBounds] = {}
 
     def due(self, now: int) -> list[Timesync]:
         """Return the request if one is due."""
@@ -60,11 +60,13 @@ class ClockWatch:
         if system != self._own.system or not 0 <= now - asked <= 10 * _PERIOD:
             return []
         shown = message.tc1 // _NS
-        found = Ahead(shown - now, shown - asked, now)
+        found = ClockBounds(shown - now, shown - asked, now)
         before = self.ahead.get(message.source.system)
         if before is not None:
             slack = (now - before.at) * _DRIFT_PPM // 1_000_000 + 1
-            both = Ahead(max(found.least, before.least - slack), min(found.most, before.most + slack), now)
+            both = ClockBounds(
+                max(found.least, before.least - slack), min(found.most, before.most + slack), now
+            )
             # An empty interval means that the clock was set in between: the new answer alone counts.
             found = both if both.least <= both.most else found
         self.ahead[message.source.system] = found

@@ -29,7 +29,7 @@ The sum of the field is limited, not its parts (see ``companion.avoidance.field.
 """
 
 
-class Stranger(NamedTuple):
+class NonCooperativeVehicle(NamedTuple):
     """Non-cooperative vehicle as last received.
 
     Its ``position`` (3,), m, and ``velocity`` (3,), m/s; ``age``: time from then to the next epoch, s;
@@ -59,18 +59,20 @@ class NonCooperative:
         self._target = None if config.target_d_min is None else config.target_d_min + away
         self._seconds: Array = 1e-6 * own.dt_us * np.arange(steps + 1.0)
 
-    def seen(self, begins: int, members: Set[int], world: World) -> list[Stranger]:
+    def seen(self, begins: int, members: Set[int], world: World) -> list[NonCooperativeVehicle]:
         """Return the received vehicles except ``members``, for the epoch that begins at ``begins`` (µs)."""
         found = []
         for system, time, position, velocity in world.neighbours.last_received():
             if system not in members:
                 age = max(1e-6 * (begins - time), 0.0)
                 found.append(
-                    Stranger(position, velocity, age, *self._things.get(system, (self._vehicle, False)))
+                    NonCooperativeVehicle(
+                        position, velocity, age, *self._things.get(system, (self._vehicle, False))
+                    )
                 )
         return found
 
-    def balls(self, seen: list[Stranger], own: Array) -> list[tuple[Array, Array]]:
+    def balls(self, seen: list[NonCooperativeVehicle], own: Array) -> list[tuple[Array, Array]]:
         """Return centres (n, 3, 3) and least distances (n,) from them, m, for the vehicles ``seen``.
 
         ``own`` (n, 3, 3), m, are the control points of the own plan.
@@ -103,7 +105,7 @@ class NonCooperative:
         middle = 0.5 * (ends[:-1] + ends[1:])
         return [(np.stack([ends[:-1], middle, ends[1:]], axis=1), np.full(self._steps, self._target))]
 
-    def field(self, seen: list[Stranger], own: Array, sensed: Axes | None = None) -> Array:
+    def field(self, seen: list[NonCooperativeVehicle], own: Array, sensed: Axes | None = None) -> Array:
         """Return f (n, 3), m/s², after each step of the committed plan ``own`` (n, 3, 3): eqs. (9) and (10).
 
         It is the field of those ``seen``, which keep their velocity until they are near, and of what is

@@ -23,7 +23,7 @@ _KEPT = 4
 """Epochs of a sender that are kept; nothing older or further ahead is accepted."""
 
 
-class Filed(NamedTuple):
+class StoredPlan(NamedTuple):
     """Plan with its control points (n, 3, 3), m."""
 
     plan: WirePlan
@@ -31,7 +31,7 @@ class Filed(NamedTuple):
 
 
 @lru_cache(maxsize=512)
-def _read(payload: bytes) -> tuple[Filed, bool]:
+def _read(payload: bytes) -> tuple[StoredPlan, bool]:
     """Return a received plan, and whether it ends at rest; raises PlanWireError.
 
     Where many companions share a process, each payload is decoded once.
@@ -39,7 +39,7 @@ def _read(payload: bytes) -> tuple[Filed, bool]:
     plan = unpack(payload)
     points = controls(plan)
     points.flags.writeable = False
-    return Filed(plan, points), rests(plan)
+    return StoredPlan(plan, points), rests(plan)
 
 
 class PeerPlans:
@@ -55,13 +55,13 @@ class PeerPlans:
         self._own = own
         self._expected = expected - {own}
         self._steps, self._dt, self._epoch, self._origin = steps, dt, epoch, origin
-        self._plans: dict[int, dict[int, Filed]] = {}
+        self._plans: dict[int, dict[int, StoredPlan]] = {}
         self._rosters: dict[int, Roster] = {}
         # Epoch (µs) from which on each peer counts this vehicle, and the earliest epoch (µs) of rosters that
         # show it.
         self._counted: dict[int, int] = {}
         self._telling = 0
-        self._left: dict[int, Filed] = {}
+        self._left: dict[int, StoredPlan] = {}
         self._last: dict[int, bytes] = {}
         self._members: frozenset[int] | None = None
         self.refused = 0
@@ -167,15 +167,15 @@ class PeerPlans:
                 found.add(system)
         return found
 
-    def plans(self, epoch: int) -> dict[int, Filed]:
+    def plans(self, epoch: int) -> dict[int, StoredPlan]:
         """Return the plans of the present ``epoch`` (µs) by system id, of members and of those that left."""
         found = {system: filed[epoch] for system, filed in self._plans.items() if epoch in filed}
         for system, last in self._left.items():
             plan = carried_on(last.plan, (epoch - last.plan.epoch) // self._dt)
-            found[system] = Filed(plan, controls(plan))
+            found[system] = StoredPlan(plan, controls(plan))
         return dict(sorted(found.items()))
 
     @property
-    def left(self) -> dict[int, Filed]:
+    def left(self) -> dict[int, StoredPlan]:
         """Last plans of those that said farewell, by system id."""
         return dict(self._left)

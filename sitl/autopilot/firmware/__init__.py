@@ -62,7 +62,7 @@ class Status(NamedTuple):
     takes_off: bool = False
 
 
-class Worry(NamedTuple):
+class BatteryCondition(NamedTuple):
     """Severity of the battery's state (0: good), its name, and the mode that follows, if any."""
 
     level: int
@@ -77,7 +77,7 @@ class Takeoff(NamedTuple):
     mode: Mode
 
 
-class Denial(NamedTuple):
+class CommandRefusal(NamedTuple):
     """Refusal, temporary or final: a MAV_RESULT and the reason."""
 
     result: int
@@ -168,21 +168,21 @@ class Firmware(Protocol):
         """Return whether arming is allowed in ``mode``."""
         ...
 
-    def arming_denial(self, status: Status) -> str | None:
+    def arming_refusal(self, status: Status) -> str | None:
         """Return the reason against arming now, or None."""
         ...
 
-    def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
+    def mode_denial(self, mode: Mode, status: Status) -> CommandRefusal | None:
         """Return the reason against entering ``mode`` now, or None."""
         ...
 
-    def worry(self, charge: Charge, /) -> Worry:
+    def condition(self, charge: Charge, /) -> BatteryCondition:
         """Return the severity of the battery's state."""
         ...
 
     def takeoff(
         self, altitude: float, relative: bool | None, ground: float, status: Status, /
-    ) -> Takeoff | Denial:
+    ) -> Takeoff | CommandRefusal:
         """Decide on NAV_TAKEOFF (22) to ``altitude`` (m; NaN if not given).
 
         ``altitude`` is above home if ``relative`` is True, above mean sea level if False; None if the message

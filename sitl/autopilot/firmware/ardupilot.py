@@ -12,11 +12,11 @@ from sitl.autopilot.attitude_setpoints import climbing
 from sitl.autopilot.fences import Rules
 from sitl.autopilot.firmware import (
     ACTIONS,
-    Denial,
+    BatteryCondition,
+    CommandRefusal,
     Mode,
     Status,
     Takeoff,
-    Worry,
     limit,
 )
 from sitl.config.autopilot import AutopilotConfig
@@ -147,48 +147,48 @@ class ArduPilot:
         """Return whether arming is allowed in ``mode``."""
         return mode not in _NOT_ARMABLE
 
-    def arming_denial(self, status: Status) -> str | None:
+    def arming_refusal(self, status: Status) -> str | None:
         """Return the reason against arming in the present mode, or None."""
         name = _NAMES.get(status.mode, status.mode.name)
         return None if self.armable_mode(status.mode) else f"{name} mode is not armable"
 
-    def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
+    def mode_denial(self, mode: Mode, status: Status) -> CommandRefusal | None:
         """Return the reason against entering ``mode`` now, or None."""
         if mode is Mode.STANDBY and status.armed and not status.landed:
-            return Denial(mavlink.MAV_RESULT_FAILED, "STABILIZE in flight needs a pilot")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "STABILIZE in flight needs a pilot")
         if mode not in (Mode.STANDBY, Mode.LAND) and not status.ready:
-            return Denial(mavlink.MAV_RESULT_FAILED, "Mode change failed: requires position")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Mode change failed: requires position")
         if mode is Mode.FOLLOW and not self._follows:
-            return Denial(mavlink.MAV_RESULT_FAILED, "Mode change to FOLLOW failed: FOLL_ENABLE is 0")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Mode change to FOLLOW failed: FOLL_ENABLE is 0")
         if mode is Mode.MISSION and not status.items:
-            return Denial(mavlink.MAV_RESULT_FAILED, "Mode change to AUTO failed: no mission")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Mode change to AUTO failed: no mission")
         if mode is Mode.MISSION and status.armed and status.landed and not status.takes_off:
-            return Denial(mavlink.MAV_RESULT_FAILED, "Auto: Missing Takeoff Cmd")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Auto: Missing Takeoff Cmd")
         return None
 
-    def worry(self, charge: Charge, /) -> Worry:
+    def condition(self, charge: Charge, /) -> BatteryCondition:
         """Return the severity of the battery's state, by voltage."""
         battery = self._battery
         if charge.voltage < battery.critical_voltage:
-            return Worry(2, "critical", ACTIONS[battery.critical_action])
+            return BatteryCondition(2, "critical", ACTIONS[battery.critical_action])
         if charge.voltage < battery.low_voltage:
-            return Worry(1, "low", ACTIONS[battery.low_action])
-        return Worry(0)
+            return BatteryCondition(1, "low", ACTIONS[battery.low_action])
+        return BatteryCondition(0)
 
     def takeoff(
         self, altitude: float, relative: bool | None, _ground: float, status: Status, /
-    ) -> Takeoff | Denial:
+    ) -> Takeoff | CommandRefusal:
         """Decide on NAV_TAKEOFF (22) to ``altitude`` (m above home)."""
         if relative is False:
-            return Denial(mavlink.MAV_RESULT_DENIED, "Takeoff needs an altitude above home")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Takeoff needs an altitude above home")
         if not math.isfinite(altitude) or altitude <= 0.0:
-            return Denial(mavlink.MAV_RESULT_FAILED, "Takeoff needs a positive altitude")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Takeoff needs a positive altitude")
         if status.mode is not Mode.GUIDED:
-            return Denial(mavlink.MAV_RESULT_FAILED, "Takeoff needs GUIDED mode")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Takeoff needs GUIDED mode")
         if not status.armed:
-            return Denial(mavlink.MAV_RESULT_FAILED, "Takeoff needs armed motors")
+            return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Takeoff needs armed motors")
         if not status.landed and not status.taking_off:
-            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Takeoff refused: already flying")
+            return CommandRefusal(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Takeoff refused: already flying")
         return Takeoff(altitude, Mode.GUIDED)
 
     def read(self, message: SetpointLocal, here: Pose) -> Reading:

@@ -12,11 +12,11 @@ from sitl.autopilot.attitude_setpoints import thrusting
 from sitl.autopilot.fences import Rules
 from sitl.autopilot.firmware import (
     ACTIONS,
-    Denial,
+    BatteryCondition,
+    CommandRefusal,
     Mode,
     Status,
     Takeoff,
-    Worry,
     limit,
 )
 from sitl.config.autopilot import AutopilotConfig
@@ -127,44 +127,48 @@ class Px4:
         """Return whether arming is allowed in ``mode``."""
         return mode not in (Mode.FOLLOW, Mode.RETURN, Mode.LAND)
 
-    def arming_denial(self, status: Status) -> str | None:
+    def arming_refusal(self, status: Status) -> str | None:
         """Return the reason against arming now, or None."""
         if status.mode is Mode.GUIDED and not _streaming(status):
             return "no offboard signal"
         return None if self.armable_mode(status.mode) else f"{status.mode.name} mode is not armable"
 
-    def mode_denial(self, mode: Mode, status: Status) -> Denial | None:
+    def mode_denial(self, mode: Mode, status: Status) -> CommandRefusal | None:
         """Return the reason against entering ``mode`` now, or None."""
         # Any mode can be chosen while disarmed; the stream is then checked at arming.
         if mode is Mode.GUIDED and status.armed and not _streaming(status):
-            return Denial(
+            return CommandRefusal(
                 mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "OFFBOARD needs set-points at more than 2 Hz"
             )
         if not status.ready and (status.landed or mode is not Mode.LAND):
-            return Denial(
+            return CommandRefusal(
                 mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Mode change refused: no position estimate"
             )
         if mode is Mode.MISSION and not status.items:
-            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Mode change refused: no valid mission")
+            return CommandRefusal(
+                mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Mode change refused: no valid mission"
+            )
         return None
 
-    def worry(self, charge: Charge, /) -> Worry:
+    def condition(self, charge: Charge, /) -> BatteryCondition:
         """Return the severity of the battery's state, by its remaining charge."""
         battery = self._battery
         if charge.remaining < battery.emergency:
-            return Worry(3, "at its end", None if battery.action == "warn" else Mode.LAND)
+            return BatteryCondition(3, "at its end", None if battery.action == "warn" else Mode.LAND)
         if charge.remaining < battery.critical:
-            return Worry(2, "critical", ACTIONS[battery.action])
-        return Worry(1, "low") if charge.remaining < battery.low else Worry(0)
+            return BatteryCondition(2, "critical", ACTIONS[battery.action])
+        return BatteryCondition(1, "low") if charge.remaining < battery.low else BatteryCondition(0)
 
     def takeoff(
         self, altitude: float, relative: bool | None, ground: float, status: Status, /
-    ) -> Takeoff | Denial:
+    ) -> Takeoff | CommandRefusal:
         """Decide on NAV_TAKEOFF (22) to ``altitude`` (m above home if ``relative``, else above sea level)."""
         if not status.ready:
-            return Denial(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Takeoff refused: no position estimate")
+            return CommandRefusal(
+                mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Takeoff refused: no position estimate"
+            )
         if math.isinf(altitude):
-            return Denial(mavlink.MAV_RESULT_DENIED, "Takeoff altitude is not finite")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Takeoff altitude is not finite")
         height = altitude if relative else altitude - ground
         if not status.landed and not status.taking_off:
             height = height if height > status.height else status.height

@@ -26,7 +26,7 @@ from mavlink_bridge.messages import (
 )
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.commander import Commander
-from sitl.autopilot.firmware import Denial, Mode
+from sitl.autopilot.firmware import CommandRefusal, Mode
 from sitl.autopilot.missions.items import Type
 from sitl.autopilot.missions.itinerary import Itinerary, Phase
 from sitl.autopilot.missions.plans import Plans
@@ -49,7 +49,7 @@ class MissionService:
         commander: Commander,
         telemetry: Telemetry,
         outbox: list[Message],
-        voice: StatusReporter,
+        status_text: StatusReporter,
         *,
         asks_int: bool,
     ) -> None:
@@ -59,8 +59,8 @@ class MissionService:
         self._commander = commander
         self._telemetry = telemetry
         self._outbox = outbox
-        self._voice = voice
-        self.transfer = Transfer(source, plans, outbox, voice, asks_int=asks_int)
+        self._status_text = status_text
+        self.transfer = Transfer(source, plans, outbox, status_text, asks_int=asks_int)
         plans.changed = itinerary.replaced
         transfer = self.transfer
         self.handlers: dict[type[Any], Callable[[Any, int], None]] = {
@@ -110,10 +110,10 @@ class MissionService:
 
     def _set_current(self, message: MissionSetCurrent, now: int) -> None:
         if not self._itinerary.select(message.seq):
-            self._voice.complain(f"No mission item {message.seq}", now)
+            self._status_text.complain(f"No mission item {message.seq}", now)
         self._telemetry.request(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
 
-    def _order_current(self, order: Order) -> Denial | None:
+    def _order_current(self, order: Order) -> CommandRefusal | None:
         """Execute DO_SET_MISSION_CURRENT.
 
         Parameter 1 is the item, −1 for no change; parameter 2 is 1 to begin anew.
@@ -122,12 +122,12 @@ class MissionService:
         if anew == 1.0:
             self._itinerary.rewind()
         if seq != -1.0 and not (math.isfinite(seq) and self._itinerary.select(int(seq))):
-            return Denial(mavlink.MAV_RESULT_DENIED, f"No mission item {seq:.0f}")
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"No mission item {seq:.0f}")
         self._telemetry.request(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
         return None
 
-    def _start(self, order: Order) -> Denial | None:
+    def _start(self, order: Order) -> CommandRefusal | None:
         return self._commander.start_mission(order.now)
 
-    def _return(self, order: Order) -> Denial | None:
+    def _return(self, order: Order) -> CommandRefusal | None:
         return self._commander.enter(Mode.RETURN, order.now)

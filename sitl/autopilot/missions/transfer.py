@@ -60,12 +60,18 @@ class Transfer:
     """
 
     def __init__(
-        self, source: Source, plans: Plans, outbox: list[Message], voice: StatusReporter, *, asks_int: bool
+        self,
+        source: Source,
+        plans: Plans,
+        outbox: list[Message],
+        status_text: StatusReporter,
+        *,
+        asks_int: bool,
     ) -> None:
         self._source = source
         self._plans = plans
         self._outbox = outbox
-        self._voice = voice
+        self._status_text = status_text
         self._asks_int = asks_int
         self._upload: _Upload | None = None
         self.next_due = _NEVER
@@ -140,7 +146,7 @@ class Transfer:
         if upload is None:
             self.next_due = _NEVER
         elif upload.tries >= _TRIES:
-            self._voice.warn("Mission upload timed out")
+            self._status_text.warn("Mission upload timed out")
             self._end(mavlink.MAV_MISSION_OPERATION_CANCELLED)
         else:
             self._ask(now)

@@ -58,7 +58,7 @@ class Parameter(NamedTuple):
         """Return ``value`` as the type stores it: float32, or the nearest whole number."""
         return float(_FLOAT.unpack(_FLOAT.pack(value))[0]) if self.kind is Kind.REAL32 else round(value)
 
-    def denial(self, value: float) -> str | None:
+    def refusal(self, value: float) -> str | None:
         """Return the reason against ``value`` (a result of ``fitted``, or not finite), or None."""
         if not math.isfinite(value):
             return f"{self.name}: not a number"

@@ -40,7 +40,7 @@ class ParameterProtocol:
         source: Source,
         values: Values,
         outbox: list[Message],
-        voice: StatusReporter,
+        status_text: StatusReporter,
         changed: Callable[[], None],
         *,
         bytewise: bool,
@@ -49,7 +49,7 @@ class ParameterProtocol:
         self._source = source
         self._values = values
         self._outbox = outbox
-        self._voice = voice
+        self._status_text = status_text
         self._changed = changed
         self._bytewise = bytewise
         self._next = 0
@@ -97,7 +97,7 @@ class ParameterProtocol:
         if number is not None:
             self._outbox.append(self._named(number))
         elif self._bytewise:
-            self._voice.complain(f"unknown parameter {message.name}", now)
+            self._status_text.complain(f"unknown parameter {message.name}", now)
 
     def _set(self, message: ParamSet, now: int) -> None:
         values = self._values
@@ -108,18 +108,18 @@ class ParameterProtocol:
             return
         number = values.number(message.name)
         if number is None:
-            self._voice.complain(f"unknown parameter {message.name}", now)
+            self._status_text.complain(f"unknown parameter {message.name}", now)
             return
         parameter = values.table[number]
         if self._bytewise and message.type != parameter.kind.value:
-            denial: str | None = f"{parameter.name}: wrong type"
+            refusal: str | None = f"{parameter.name}: wrong type"
         else:
             old = values.value(number)
-            denial = values.set(number, decoded(message.raw, parameter.kind, bytewise=self._bytewise))
-            if denial is None and values.value(number) != old:
+            refusal = values.set(number, decoded(message.raw, parameter.kind, bytewise=self._bytewise))
+            if refusal is None and values.value(number) != old:
                 self._changed()
-        if denial:
-            self._voice.complain(denial, now)
+        if refusal:
+            self._status_text.complain(refusal, now)
         self._outbox.append(self._named(number))
 
     def _named(self, number: int) -> ParamValue:

@@ -28,7 +28,7 @@ class Values:
         self._digest: int | None = None
         for name, value in saved.items():
             number = self._numbers.get(name)
-            if number is not None and self.table[number].denial(value) is None:
+            if number is not None and self.table[number].refusal(value) is None:
                 self._values[number] = self.table[number].fitted(value)
 
     def __len__(self) -> int:
@@ -51,11 +51,11 @@ class Values:
         parameter = self.table[number]
         if math.isfinite(value) and abs(value) <= 3e38:
             value = parameter.fitted(value)
-        denial = parameter.denial(value)
-        if denial is None:
+        refusal = parameter.refusal(value)
+        if refusal is None:
             self._values[number] = value
             self._digest = None
-        return denial
+        return refusal
 
     def reset(self) -> None:
         """Restore all initial values."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from companion.config.estimation import TrackConfig
 from companion.estimation.estimator import Estimator
 from companion.estimation.out_of_sequence import OutOfSequenceBuffer
-from companion.estimation.sender_clock import Dated
+from companion.estimation.sender_clock import TrackTime
 from companion.estimation.tracks import Track
 from tests.companion.rig import LAWS, QUICK, numbers, vectors
 
@@ -107,7 +107,7 @@ def test_any_order_of_insertion_within_the_window(data, x):
         rewind = OutOfSequenceBuffer(Estimator(CONFIG), WINDOW)
         for time in turn:
             z = (*(x + (TELEPORT if time in far else 0.0)).tolist(), 0.0, 0.0, 0.0)
-            rewind.put(Dated(1000 * time, True), z)
+            rewind.put(TrackTime(1000 * time, True), z)
         results.append(rewind.belief)
     one, other = results
     assert one == other
@@ -118,14 +118,14 @@ def test_any_order_of_insertion_within_the_window(data, x):
 def test_older_than_the_window_is_refused_and_counted(late, x):
     rewind = OutOfSequenceBuffer(Estimator(CONFIG), WINDOW)
     for k in range(60):
-        rewind.put(Dated(k * 100_000, True), STILL)
+        rewind.put(TrackTime(k * 100_000, True), STILL)
     before = rewind.belief
     newest = 59 * 100_000
-    assert not rewind.put(Dated(newest - WINDOW - late, True), (*x.tolist(), *x.tolist()))
+    assert not rewind.put(TrackTime(newest - WINDOW - late, True), (*x.tolist(), *x.tolist()))
     assert rewind.too_late == 1
     assert rewind.belief is before
     # The last one that still counts.
-    assert rewind.put(Dated(newest - WINDOW + 1, True), STILL)
+    assert rewind.put(TrackTime(newest - WINDOW + 1, True), STILL)
     assert rewind.too_late == 1
 
 
@@ -136,7 +136,7 @@ def test_a_late_message_can_be_the_first_of_all():
     for order in ((0, 1, 2), (1, 2, 0), (2, 1, 0)):
         rewind = OutOfSequenceBuffer(Estimator(CONFIG), WINDOW)
         for k in order:
-            assert rewind.put(Dated(k * 100_000, True), z[k])
+            assert rewind.put(TrackTime(k * 100_000, True), z[k])
         beliefs.append(rewind.belief)
     assert beliefs[0] == beliefs[1] == beliefs[2]
 
@@ -145,7 +145,10 @@ def test_a_late_message_can_be_the_first_of_all():
 def test_a_late_message_can_be_the_oldest_that_is_remembered(missing):
     """What was believed before the window is what it is taken after."""
     random = np.random.default_rng(3)
-    measured = [Dated(k * 100_000, True) for k in range(60)], random.normal(scale=0.02, size=(60, 6)).tolist()
+    measured = (
+        [TrackTime(k * 100_000, True) for k in range(60)],
+        random.normal(scale=0.02, size=(60, 6)).tolist(),
+    )
     in_order, late = (OutOfSequenceBuffer(Estimator(CONFIG), WINDOW) for _ in range(2))
     for k, (dated, z) in enumerate(zip(*measured, strict=True)):
         in_order.put(dated, tuple(z))
@@ -176,7 +179,7 @@ def test_the_memory_stays_within_two_windows_whatever_comes(seed, window, spread
     newest = None
     for k in range(100):
         time = int(k * 100_000 + spread * random.uniform(-1.0, 1.0))
-        rewind.put(Dated(time, True), tuple(random.normal(size=6).tolist()))
+        rewind.put(TrackTime(time, True), tuple(random.normal(size=6).tolist()))
         newest = time if newest is None else max(time, newest)
         assert rewind._times == sorted(set(rewind._times))
         assert rewind._times[-1] == newest

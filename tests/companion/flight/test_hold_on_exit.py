@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.flight.autopilots import Profile
 from companion.flight.autopilots.ardupilot import ARDUPILOT
 from companion.flight.autopilots.px4 import PX4
-from companion.flight.hold_on_exit import LastWord
+from companion.flight.hold_on_exit import HoldOnExit
 from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
@@ -31,7 +31,7 @@ class Talk:
     """A last word of 10 ms steps, and what is said to it."""
 
     def __init__(self, heartbeat: Heartbeat | None, *, steered: bool = True) -> None:
-        self.node = LastWord(4, heartbeat, steered=steered)
+        self.node = HoldOnExit(4, heartbeat, steered=steered)
         self.now = 1_000_000
         self._codec, self._ear = Codec(), Codec()
 

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.config import CompanionConfig
 from companion.config.obstacles import Post, ProximityConfig
 from companion.obstacles.proximity import Proximity, returns
-from companion.obstacles.sensed import Sensed, Stance
+from companion.obstacles.sensed import Sensed, SensorPose
 from companion.obstacles.static import FixedObstacles
 from companion.telemetry.reception import accepts
 from companion.world import World
@@ -48,7 +48,7 @@ def scan(distances, frame=mavlink.MAV_FRAME_BODY_FRD, increment=STEP, offset=0.0
 def sensed(message, place, yaw, north=math.pi / 2, known=NOBODY, now=START):
     """What a vehicle at ``place`` (3,) with its nose to ``yaw`` (ENU) knows after one message."""
     found = Sensed(CompanionConfig(proximity=CONFIG), FLEET)
-    found.receive_distances(now, message, Stance(now, np.asarray(place, float), yaw, north), known)
+    found.receive_distances(now, message, SensorPose(now, np.asarray(place, float), yaw, north), known)
     return found
 
 
@@ -153,7 +153,7 @@ def test_what_is_seen_again_keeps_its_name():
     """Or a vehicle would not remember on which side it goes round."""
     found = sensed(scan({0: 5.0, 20: 7.0}), (0, 0, HEIGHT), 0.0)
     first = posts(found, (0, 0, HEIGHT))
-    again = Stance(START + 100_000, np.array([0.1, 0.0, HEIGHT]), 0.0, math.pi / 2)
+    again = SensorPose(START + 100_000, np.array([0.1, 0.0, HEIGHT]), 0.0, math.pi / 2)
     found.receive_distances(START + 100_000, scan({0: 5.0, 20: 7.0}), again, NOBODY)
     later = posts(found, (0, 0, HEIGHT), START + 100_000)
     assert sorted(later.ids) == sorted(first.ids)

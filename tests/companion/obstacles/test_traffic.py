@@ -202,6 +202,7 @@ def test_without_a_receiver_it_stays():
 
 @LAWS
 @example(goal=np.zeros(3), own=np.array([1.0, 0, 0]), place=np.array([1.0, 0, 51]), course=0.0, clear=1.0)
+@example(goal=np.array([0, -25.0, 0]), own=np.zeros(3), place=np.array([1.0, 0, 0]), course=2.0, clear=1.0)
 @given(
     goal=vectors(60.0),
     own=vectors(60.0),

@@ -7,7 +7,7 @@ import socket
 import pytest
 
 from mavlink_bridge.clocks.clock import SimulatedClock
-from mavlink_bridge.links.demultiplexer import Dealer
+from mavlink_bridge.links.demultiplexer import Demultiplexer
 from mavlink_bridge.links.endpoints import TcpIn
 from mavlink_bridge.links.link import BURST, memory_pair
 from mavlink_bridge.links.tcp import TcpListener
@@ -32,7 +32,7 @@ def test_all_that_waits_is_forgotten(read: bool) -> None:
     """More than one read brings."""
     own, far = memory_pair()
     ear = Listening()
-    dealer = Dealer(own, {"one": lambda _header: True, "other": lambda _header: True}, ear)
+    dealer = Demultiplexer(own, {"one": lambda _header: True, "other": lambda _header: True}, ear)
     for k in range(3 * BURST):
         far.send(frame(k))
     if read:
@@ -50,7 +50,7 @@ def test_all_that_waits_is_forgotten(read: bool) -> None:
 def test_who_has_called_and_spoken_before_anybody_read_is_forgotten_too() -> None:
     """Calls are answered one at a time, and long ago said is said long ago by whomever."""
     listener = TcpListener(TcpIn(HOST, 0), SimulatedClock())
-    dealer = Dealer(listener, {"only": lambda _header: True})
+    dealer = Demultiplexer(listener, {"only": lambda _header: True})
     callers = [socket.create_connection(listener.address[:2]) for _ in range(3)]
     for caller in callers:
         caller.sendall(b"".join(frame(k) for k in range(600)))

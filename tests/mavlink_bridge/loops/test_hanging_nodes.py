@@ -17,7 +17,7 @@ PERIOD = 2 * TICK
 NAMES = "abc"
 
 
-class Crew:
+class Nodes:
     """Three that talk: a and b every other tick, c every third, by a clock that is fast."""
 
     def __init__(self, buffer: int = 256, faults: Faults | None = None, reverse: bool = False) -> None:
@@ -41,7 +41,7 @@ class Crew:
 
 
 def test_who_hangs_is_not_called_and_goes_on_with_all_that_waited() -> None:
-    crew, free = Crew(), Crew()
+    crew, free = Nodes(), Nodes()
     crew.run(100 * TICK)
     crew.loop.freeze("a")
     crew.run(200 * TICK)
@@ -88,7 +88,7 @@ def test_a_full_buffer_drops_the_newest(buffer: int, length: int) -> None:
 
 
 def test_who_vanishes_is_silent_and_deaf_for_ever() -> None:
-    crew, free = Crew(), Crew()
+    crew, free = Nodes(), Nodes()
     for one in (crew, free):
         one.run(50 * TICK)
         one.loop.freeze("c")
@@ -113,7 +113,7 @@ def test_who_vanishes_is_silent_and_deaf_for_ever() -> None:
 
 
 def test_to_vanish_is_to_hang_for_ever_without_a_buffer() -> None:
-    gone, hung = Crew(), Crew(0)
+    gone, hung = Nodes(), Nodes(0)
     for crew in (gone, hung):
         crew.run(60 * TICK)
     gone.loop.vanish("b")
@@ -136,7 +136,7 @@ events = st.lists(
 
 
 def flight(what: list[tuple[int, str, str]], reverse: bool) -> tuple[object, ...]:
-    crew = Crew(5, Faults(3000, 9000, 0.1, 0.1, 0.1), reverse)
+    crew = Nodes(5, Faults(3000, 9000, 0.1, 0.1, 0.1), reverse)
     for tick, action, name in sorted(what):
         crew.run(tick * TICK)
         getattr(crew.loop, action)(name)
@@ -151,7 +151,7 @@ def test_whatever_fails_the_order_of_nodes_changes_nothing(what: list[tuple[int,
 
 
 def test_to_freeze_twice_or_thaw_who_does_not_hang_is_harmless() -> None:
-    crew, free = Crew(), Crew()
+    crew, free = Nodes(), Nodes()
     crew.loop.thaw("a")
     crew.loop.freeze("b")
     crew.loop.freeze("b")
@@ -164,4 +164,4 @@ def test_to_freeze_twice_or_thaw_who_does_not_hang_is_harmless() -> None:
 @pytest.mark.parametrize("action", ["freeze", "thaw", "vanish"])
 def test_only_nodes_of_the_run_can_hang(action: str) -> None:
     with pytest.raises(ScheduleError, match="'x'; there are a, b, c"):
-        getattr(Crew().loop, action)("x")
+        getattr(Nodes().loop, action)("x")

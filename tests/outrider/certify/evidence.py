@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from companion.avoidance.certified.committed import carried_on, controls, resting
 from companion.values.horizon import Array
 from mavlink_bridge.wire.plan import Integers, WirePlan
-from outrider.certify.evidence import Evidence, Log, Sighting, Terms, Word
+from outrider.certify.evidence import Evidence, FarewellChange, Log, LoggedPlan, Terms
 
 DT = EPOCH = 200_000
 """µs."""
@@ -43,14 +43,14 @@ def turned(plan: WirePlan, accelerations: Sequence[Integers]) -> WirePlan:
 def evidence(
     sent: Mapping[int, Sequence[WirePlan]],
     terms: Terms = TERMS,
-    words: Mapping[int, Sequence[Word]] | None = None,
+    words: Mapping[int, Sequence[FarewellChange]] | None = None,
 ) -> Evidence:
     """Every plan of every vehicle is told half an epoch before it begins, and heard by all."""
     said = words or {}
     logs = []
     for owner in sent:
         sightings = [
-            Sighting(owner, sender, plan, plan.epoch - EPOCH // 2, COPIES)
+            LoggedPlan(owner, sender, plan, plan.epoch - EPOCH // 2, COPIES)
             for sender, plans in sent.items()
             for plan in plans
         ]

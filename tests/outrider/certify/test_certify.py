@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.wire.plan import Integers, WirePlan, pack, unpack
-from outrider.certify.evidence import Evidence, Garbled, Log, Word
+from outrider.certify.evidence import Evidence, FarewellChange, Log, UnreadablePayloads
 from outrider.certify.histories import Kind
 from outrider.certify.verdict import Verdict, judge
 from tests.outrider.certify.evidence import (
@@ -191,7 +191,7 @@ def test_an_acceleration_beyond_the_limits_is_found_once(most: int) -> None:
 def test_strangers_and_nonsense_are_found_but_not_moving_obstacles() -> None:
     whole = evidence({11: [A], 12: [B], 190: [standing(FAR)], 77: [standing(FAR)]})
     logs = [log for log in whole.logs if log.owner < 77]
-    logs[1] = logs[1]._replace(garbled=(Garbled(12, 11, BEGAN, 3),))
+    logs[1] = logs[1]._replace(garbled=(UnreadablePayloads(12, 11, BEGAN, 3),))
     terms = TERMS._replace(apart=frozenset({190}))
     verdict = judge(Evidence(terms, tuple(logs)))
     assert sorted(finding.who for finding in verdict.findings) == [(11, 12), (77,)]
@@ -293,13 +293,13 @@ def test_who_is_silent_goes_on_as_told() -> None:
 def test_whoever_said_farewell_is_no_longer_checked_until_it_is_back() -> None:
     over = standing((0.5, 0.0, 5.0))
     sent = {11: [on(A, k) for k in range(8)], 12: [B, on(B), on(B, 2)]}
-    said = Word(BEGAN + EPOCH // 2, True)
+    said = FarewellChange(BEGAN + EPOCH // 2, True)
     document = judge(evidence(sent, words={12: [said]})).document()
     assert document["certified"]
     assert (document["pairs"], document["unchecked"]["farewell"], document["farewells"]) == (1, 7, 1)
     # It comes back nearer than that, which is where it begins anew.
     back = over._replace(epoch=BEGAN + 5 * EPOCH)
-    again = Word(back.epoch - EPOCH, False)
+    again = FarewellChange(back.epoch - EPOCH, False)
     sent[12] = [B, on(B), back, on(back), on(back, 2)]
     verdict = judge(evidence(sent, words={12: [said, again]}))
     assert verdict.certified

@@ -126,7 +126,7 @@ def test_whatever_arrives_it_asks_nothing_but_what_is_harmless(arriving: list[by
 def test_a_flood_of_senders_is_bounded() -> None:
     records = [(k, Heartbeat(Source(1 + k % 250, k // 250 % 250), 2, 3, 0, 0, 3)) for k in range(1000)]
     examination = received(records)
-    assert len(examination.hearing.speakers) == MOST
+    assert len(examination.hearing.senders) == MOST
     assert found(examination.verdict(), f"more than {MOST} senders").severity is Severity.WARNING
 
 

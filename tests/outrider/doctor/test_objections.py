@@ -16,7 +16,7 @@ from outrider.doctor.consultation import Consultation
 from outrider.doctor.finding import Severity, Verdict
 from outrider.doctor.objections import Objections
 from outrider.doctor.px4_events import CRC_EXTRA, EVENT, LAYOUT, event_id, reason
-from outrider.doctor.speaker import Speaker
+from outrider.doctor.sender_record import SenderRecord
 from tests.outrider.doctor.bench import TICK, Bench, autopilot, found
 from tests.sitl.autopilot_rig import FLAVOURS, SET_MODE
 
@@ -112,7 +112,7 @@ def test_who_is_armed_or_passes_is_neither_asked_nor_waited_for() -> None:
     codec = Codec()
 
     def left(*said: Message) -> tuple[int, int]:
-        vehicle, objections = Speaker(ME), Objections()
+        vehicle, objections = SenderRecord(ME), Objections()
         for now, message in enumerate(said):
             vehicle.tell(now, framed(codec.encode(message)), message)
         return len(objections.due(vehicle, DOCTOR, 10)), objections.left(vehicle, 10)
@@ -221,7 +221,7 @@ def test_the_emulated_px4_in_offboard_is_named_too() -> None:
 
 
 def test_an_objection_that_is_not_repeated_counts_no_more() -> None:
-    vehicle, codec = Speaker(ME), Codec()
+    vehicle, codec = SenderRecord(ME), Codec()
     for seconds, why in (
         (1, "RC not found"),
         (1, "Compass not healthy"),

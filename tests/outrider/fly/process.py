@@ -131,7 +131,7 @@ class Flying:
         return self.process.returncode, json.loads(out)
 
 
-class Ear:
+class Receiver:
     """Hears the modes that a vehicle of the SITL tells, by another of its ports."""
 
     def __init__(self, link: Link) -> None:
@@ -148,7 +148,7 @@ class Ear:
 @contextmanager
 def flight(
     tmp_path: Path, flavour: str, speed: float, *options: str, clock: str = "autopilot"
-) -> Iterator[tuple[Flying, Ear]]:
+) -> Iterator[tuple[Flying, Receiver]]:
     """One vehicle of the SITL, its companion, a target, and an ear."""
     with ExitStack() as files:
         base = free_base(flavour, 1)
@@ -163,7 +163,7 @@ def flight(
         (tmp_path / "own.yaml").write_text(yaml.safe_dump(document | {"system": 1, "clock": clock}))
         config = f"--config={tmp_path / 'own.yaml'}"
         flying = Flying(tmp_path, f"--autopilot={autopilot}", f"--swarm={group}", config, *options)
-        ear = Ear(received)
+        ear = Receiver(received)
         flying.pump += [Target(said, speed).pump, ear.mode]
         try:
             yield flying, ear

@@ -19,7 +19,7 @@ from companion.values.phase import Phase
 from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.links.demultiplexer import Dealer
+from mavlink_bridge.links.demultiplexer import Demultiplexer
 from mavlink_bridge.links.link import memory_pair
 from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Message, Source, StatusText
 from mavlink_bridge.node import Datagram
@@ -46,7 +46,7 @@ class Air:
         self.clock = SimulatedClock(SECOND)
         self.duplicates = DuplicateIds(1, self.clock)
         own, self.far = memory_pair()
-        dealer = Dealer(own, {"swarm": lambda _header: True}, self.duplicates)
+        dealer = Demultiplexer(own, {"swarm": lambda _header: True}, self.duplicates)
         self.end = dealer.ends["swarm"]
         self._codec, self._other = Codec(), Codec()
 

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from companion.flight.autopilots.ardupilot import ARDUPILOT
-from companion.flight.hold_on_exit import LastWord
+from companion.flight.hold_on_exit import HoldOnExit
 from companion.node import Companion
 from companion.values.phase import Phase
 from mavlink_bridge.clocks.clock import SimulatedClock
@@ -46,7 +46,7 @@ def test_it_is_said_even_in_a_hurry() -> None:
     """Whoever signals twice is heard, after the vehicle was asked."""
     here, there = memory_pair()
     clock = SimulatedClock(5_000_000)
-    word = LastWord(1, BEAT)
+    word = HoldOnExit(1, BEAT)
     farewell(word, here, clock, lambda: True)
     received = [message for data in there.receive() for message in Codec().feed(data)]
     assert len([m for m in received if isinstance(m, CommandLong) and m.command == 176]) >= 2
@@ -56,7 +56,7 @@ def test_it_is_said_even_in_a_hurry() -> None:
 def test_it_takes_its_time_otherwise() -> None:
     here, there = memory_pair()
     clock = SimulatedClock(5_000_000)
-    word = LastWord(1, BEAT)
+    word = HoldOnExit(1, BEAT)
 
     def hurry() -> bool:
         if clock.now() > 6_000_000 and not word.over:

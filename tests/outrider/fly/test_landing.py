@@ -57,7 +57,7 @@ class Said:
 def test_what_the_process_that_flew_measured_is_what_is_reported(
     landing, ended, fault, tmp_path, monkeypatch
 ):
-    class Crew:
+    class Companions:
         status, sentinel = None, -1
 
     def at_once(_ends, _timeout):
@@ -68,7 +68,7 @@ def test_what_the_process_that_flew_measured_is_what_is_reported(
     event_log = EventLog(tmp_path, lambda: 0.0)
     typed = type("Typed", (), {"lines": lambda self: []})()
     flight = Flight(Request(CONFIG, "px4", {}), None, tmp_path, event_log, typed, (), lambda: None)
-    flight._look_after(said, Crew())
+    flight._look_after(said, Companions())
     assert flight._over()
     assert (flight.ended, flight._elsewhere) == (ended, fault)
     assert flight.landing == Landing(**landing)

@@ -23,7 +23,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 from outrider.logs.timeline import on_one_line
 from outrider.replay.telemetry import TELEMETRY, Forwarder, paced
-from outrider.shadow.roles import Cast, Part, survey
+from outrider.shadow.roles import Part, Roles, survey
 from outrider.shadow.setpoints import facts
 from outrider.shadow.shadow_run import STEP, shadow_flight, steps
 from outrider.simulation.preparation import Prepared
@@ -80,7 +80,7 @@ def test_a_companion_listens_to_a_flight_of_others(log: Path, run: Run, tmp_path
 
 
 def test_the_same_log_gives_the_same_set_points(log: Path) -> None:
-    config, cast = CompanionConfig(), Cast(11)
+    config, cast = CompanionConfig(), Roles(11)
     seen = survey(read_tlog(log), 11, "log")
     once, again = (shadow_flight(config, cast, seen, read_tlog(log)) for _ in range(2))
     assert once == again
@@ -89,7 +89,7 @@ def test_the_same_log_gives_the_same_set_points(log: Path) -> None:
 
 def test_what_a_log_lacks_is_put_in(log: Path, tmp_path: Path) -> None:
     """Without GPS_GLOBAL_ORIGIN, or without LOCAL_POSITION_NED, nearly the same is said."""
-    config, cast = CompanionConfig(), Cast(11)
+    config, cast = CompanionConfig(), Roles(11)
     whole = shadow_flight(config, cast, survey(read_tlog(log), 11, "log"), read_tlog(log))
     for missing in ({49}, {32, 49}):
         path = tmp_path / f"without-{len(missing)}.tlog"
@@ -110,7 +110,7 @@ def test_logs_of_real_autopilots_give_sound_set_points(name: str, own: int) -> N
     if not path.exists():
         pytest.skip("the shared logs are not beside this checkout")
     config = CompanionConfig()
-    found = shadow_flight(config, Cast(own), survey(read_tlog(path), own, name), read_tlog(path))
+    found = shadow_flight(config, Roles(own), survey(read_tlog(path), own, name), read_tlog(path))
     continuous(found.would, config)
     assert len(found.sent) >= 2000
 
@@ -290,13 +290,13 @@ def test_a_file_of_anything_is_refused_in_a_line(data: bytes) -> None:
 
 def test_parts_are_given_by_who_speaks() -> None:
     codec = Codec()
-    cast = Cast(7, frozenset({8}), 9)
+    cast = Roles(7, frozenset({8}), 9)
     parts = {
         system: cast.part(codec.encode(Heartbeat(Source(system, 1), 2, 3, 0, 0, 4)))
         for system in (7, 8, 9, 10)
     }
     assert parts == {7: Part.AUTOPILOT, 8: Part.SWARM, 9: Part.TARGET, 10: Part.NOTHING}
-    assert Cast(7).part(codec.encode(Heartbeat(Source(10, 1), 2, 3, 0, 0, 4))) is Part.SWARM
+    assert Roles(7).part(codec.encode(Heartbeat(Source(10, 1), 2, 3, 0, 0, 4))) is Part.SWARM
 
 
 PIECE = Path(__file__).resolve().parents[2] / "data" / "logs" / "copter-whole.tlog"
@@ -325,7 +325,7 @@ def test_a_damaged_log_is_listened_to_all_the_same(damage: list[tuple[int, bytes
             seen = survey(read_tlog(path), 9, "damaged")
         except (InputError, LogError):
             return
-        found = facts(shadow_flight(config, Cast(9), seen, read_tlog(path)).would)
+        found = facts(shadow_flight(config, Roles(9), seen, read_tlog(path)).would)
     assert found.finite
     assert (found.max_speed_m_s or 0.0) <= np.linalg.norm(config.limits.v_max)
     assert (found.max_acceleration_m_s2 or 0.0) <= config.limits.a_total + 1e-3

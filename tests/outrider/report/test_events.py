@@ -12,8 +12,8 @@ from mavlink_bridge.tlog.log import TlogReport
 from outrider.report.command import make
 from outrider.report.distances import encounters
 from outrider.report.events import Event, together
-from outrider.report.log_events import Saying, command, sayings
-from outrider.report.run import Log, Motions, Said, Stream, Utterance
+from outrider.report.log_events import LogEvent, command, sayings
+from outrider.report.run import EventMessage, Log, Motions, Said, Stream
 from tests.outrider.report.runs import BEFORE, leave
 from tests.outrider.shipped import scenario
 
@@ -23,7 +23,7 @@ NONE = np.empty(0, dtype=np.int64)
 
 def log_of(*said: Said) -> Log:
     sent = Stream(NONE, NONE, NONE)
-    uttered = tuple(Utterance(1000 * n, one) for n, one in enumerate(said))
+    uttered = tuple(EventMessage(1000 * n, one) for n, one in enumerate(said))
     report = TlogReport(len(said), 0, 0, 0, 0, False)
     return Log(11, 0, 1000, sent, {}, NONE, np.empty((0, 3)), uttered, report)
 
@@ -102,9 +102,9 @@ def test_commands_by_their_names() -> None:
 
 def test_a_long_text_is_put_together() -> None:
     pieces = [StatusText(AUTOPILOT, 2, "x" * 50), StatusText(AUTOPILOT, 2, "end")]
-    uttered = tuple(Utterance(0, piece) for piece in pieces)
+    uttered = tuple(EventMessage(0, piece) for piece in pieces)
     log = log_of()._replace(utterances=uttered)
-    assert list(sayings(log)) == [Saying(0, "text", f"critical: {'x' * 50}end", bad=True)]
+    assert list(sayings(log)) == [LogEvent(0, "text", f"critical: {'x' * 50}end", bad=True)]
 
 
 def motions_of(apart: np.ndarray) -> Motions:

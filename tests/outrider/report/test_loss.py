@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from outrider.report import clocks
-from outrider.report.loss import Ledger, Losses, Way, unwrapped
+from outrider.report.loss import LossComparison, Losses, LossRate, unwrapped
 from outrider.report.reading import read
 from outrider.report.run import Log, Run, Stream
 from tests.outrider.report.runs import Lost, leave
@@ -25,13 +25,13 @@ def judged(run: Run) -> Losses:
 
 def in_order(run: Run, logs: Iterable[Log]) -> Losses:
     assert run.motions is not None
-    peers = Ledger()
+    peers = LossComparison()
     for log in logs:
         peers.take(log, clocks.offset(log, run.motions))
     return peers.close()
 
 
-def ways(run: Run) -> dict[tuple[int, int], Way]:
+def ways(run: Run) -> dict[tuple[int, int], LossRate]:
     return {(way.sender, way.receiver): way for way in judged(run).ways}
 
 

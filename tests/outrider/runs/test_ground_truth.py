@@ -15,7 +15,7 @@ from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.node import Datagram
 from outrider.runs.ground_truth import SAMPLE, Encounters, GroundTruth, Limits
 from outrider.scenarios.scenario import FixedTarget
-from outrider.simulation.targets import Standing
+from outrider.simulation.targets import StandingTarget
 from outrider.simulation.truth_observer import TruthObserver
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
@@ -154,7 +154,7 @@ def watch(
     at: Any = (0.0, 0.0, 0.0),
 ) -> list[int]:
     """Times at which a sample was taken, the target being ``at`` (m)."""
-    target = Standing(FixedTarget(kind="fixed", at=at), FLEET)
+    target = StandingTarget(FixedTarget(kind="fixed", at=at), FLEET)
     seen = TruthObserver(cast("list[Autopilot]", list(vehicles)), target, truth)
     taken = []
     for now in range(tick, round(seconds * 1e6) + 1, tick):
@@ -239,7 +239,7 @@ def test_samples_can_be_had_for_a_time() -> None:
 def test_nothing_is_seen_twice() -> None:
     vehicles = [OnRails(lambda _: (0.0, 0.0, 5.0)), OnRails(lambda _: (0.1, 0.0, 5.0))]
     seen = truth(vehicles)
-    target = Standing(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET)
+    target = StandingTarget(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET)
     observer = TruthObserver(cast("list[Autopilot]", vehicles), target, seen)
     for vehicle in vehicles:
         vehicle.move(0, 5_000)
@@ -267,7 +267,7 @@ def test_the_emulated_autopilot_is_watched_at_every_physics_step() -> None:
     autopilot = Autopilot(config, FIREFLY, FLEET, 1)
     seen = GroundTruth(1, Limits(LEAST, 1.0))
     observer = TruthObserver(
-        [autopilot], Standing(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET), seen
+        [autopilot], StandingTarget(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET), seen
     )
     inbox: list[Datagram] = []
     taken = []

@@ -12,7 +12,7 @@ from mavlink_bridge.frames import FleetFrame
 from outrider.runs.ground_truth import SAMPLE
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import starts
-from outrider.simulation.conductor import HOLD, Conductor, Sight, Stage
+from outrider.simulation.conductor import HOLD, Conductor, Observation, Stage
 from outrider.simulation.operator import Operator
 from tests.outrider.shipped import scenario
 
@@ -41,7 +41,9 @@ class Run:
             velocities = np.zeros((len(positions), 3))
             velocities[0, 0] = speed
             waiting = () if ready else ("companion-11 waits for a heartbeat",)
-            sight = Sight(self.now, np.asarray(positions), velocities, self.target, ready, waiting, armed)
+            sight = Observation(
+                self.now, np.asarray(positions), velocities, self.target, ready, waiting, armed
+            )
             over = self.conductor.see(sight)
             if over:
                 break

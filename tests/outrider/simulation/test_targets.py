@@ -17,7 +17,7 @@ from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
 from outrider.scenarios.scenario import TARGET_SYSTEM, FixedTarget, RecordedTarget
-from outrider.simulation.targets import LINK, SHORT, Recorded, Standing, load
+from outrider.simulation.targets import LINK, SHORT, Recorded, StandingTarget, load
 from tests.outrider.shipped import LOGS, scenario
 
 ESCORT = scenario("escort")
@@ -220,7 +220,7 @@ def test_a_log_that_cannot_be_used_is_one_line(
 # Standing
 
 
-def places(target: Standing, ticks: int, begin_at: int | None = None) -> list[tuple[int, np.ndarray]]:
+def places(target: StandingTarget, ticks: int, begin_at: int | None = None) -> list[tuple[int, np.ndarray]]:
     codec = Codec()
     out = []
     for k in range(ticks):
@@ -239,7 +239,7 @@ def places(target: Standing, ticks: int, begin_at: int | None = None) -> list[tu
 
 @pytest.mark.parametrize("rate", [1.0, 5.0, 20.0])
 def test_a_standing_target_says_where_it_is_at_its_rate(rate: float) -> None:
-    target = Standing(FixedTarget(kind="fixed", at=(3.0, -4.0, 1.0), rate_hz=rate), FLEET)
+    target = StandingTarget(FixedTarget(kind="fixed", at=(3.0, -4.0, 1.0), rate_hz=rate), FLEET)
     said = places(target, 400)
     assert [time for time, _ in said] == [round(k * 1e6 / rate) for k in range(len(said))]
     assert len(said) == round(4.0 * rate)
@@ -248,7 +248,7 @@ def test_a_standing_target_says_where_it_is_at_its_rate(rate: float) -> None:
 
 def test_it_jumps_at_the_goal_event_and_says_so_at_once() -> None:
     config = FixedTarget(kind="fixed", at=(-8.0, 0.0, 0.0), jump_to=(8.0, 0.0, 0.0))
-    target = Standing(config, FLEET)
+    target = StandingTarget(config, FLEET)
     said = places(target, 100, begin_at=33)
     west = [time for time, place in said if place[0] < 0.0]
     east = [time for time, place in said if place[0] > 0.0]
@@ -261,6 +261,6 @@ def test_it_jumps_at_the_goal_event_and_says_so_at_once() -> None:
 
 def test_without_a_jump_the_goal_event_changes_nothing() -> None:
     config = FixedTarget(kind="fixed", at=(1.0, 2.0, 3.0))
-    same = [places(Standing(config, FLEET), 100, begin_at=begin) for begin in (None, 33)]
+    same = [places(StandingTarget(config, FLEET), 100, begin_at=begin) for begin in (None, 33)]
     assert [time for time, _ in same[0]] == [time for time, _ in same[1]]
     assert all(np.array_equal(a[1], b[1]) for a, b in zip(*same, strict=True))

@@ -28,7 +28,7 @@ from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
 from outrider.swarm.command import LOCK_STEP
 from outrider.swarm.lockstep_view import LockStepView
-from outrider.swarm.show import Show
+from outrider.swarm.show import FlightView
 from outrider.view.viewer_client import ViewerClient
 from tests.outrider.shipped import FIREFLY, scenario
 from tests.outrider.view.flights import logs
@@ -70,7 +70,7 @@ class Waits(LockStepView):
         super().__call__(flight, now)
 
 
-class Waiting(Show):
+class Waiting(FlightView):
     """Shows a flight that waits."""
 
     def __init__(self, viewer: ViewerClient) -> None:

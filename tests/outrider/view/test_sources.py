@@ -30,14 +30,14 @@ from outrider.swarm import command as swarm
 from outrider.view.listener import Listener
 from outrider.view.player import Player, load
 from outrider.view.recorded import Record
-from tests.outrider.report.runs import Made, leave
+from tests.outrider.report.runs import ReportPage, leave
 from tests.outrider.said import Run
 from tests.outrider.shipped import FIREFLY, LOGS
 from tests.outrider.view.flights import small
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+def made(tmp_path_factory: pytest.TempPathFactory) -> ReportPage:
     return leave(tmp_path_factory.mktemp("view") / "run")
 
 
@@ -45,7 +45,7 @@ def seen(player: Player, wall: float) -> list[Snapshot]:
     return [one for one in player.poll(wall) if isinstance(one, Snapshot)]
 
 
-def test_a_run_is_played_as_it_was(made: Made) -> None:
+def test_a_run_is_played_as_it_was(made: ReportPage) -> None:
     player = load(made.directory)
     first, *_ = player.poll(0.0)
     assert isinstance(first, Scene)
@@ -59,7 +59,7 @@ def test_a_run_is_played_as_it_was(made: Made) -> None:
         np.testing.assert_allclose(np.linalg.norm(moment.attitude, axis=1), 1.0, atol=1e-6)
 
 
-def test_pause_step_speed_and_a_time_that_is_chosen(made: Made) -> None:
+def test_pause_step_speed_and_a_time_that_is_chosen(made: ReportPage) -> None:
     player = load(made.directory)
     player.poll(0.0)
     player.command(ViewCommands(paused=True), None)
@@ -129,7 +129,7 @@ def test_what_is_no_run_is_said_in_one_line(tmp_path: Path, run: Run) -> None:
 
 
 def test_without_the_extra_it_says_what_to_install(
-    run: Run, monkeypatch: pytest.MonkeyPatch, made: Made
+    run: Run, monkeypatch: pytest.MonkeyPatch, made: ReportPage
 ) -> None:
     import sys
 
@@ -144,7 +144,7 @@ def test_without_the_extra_it_says_what_to_install(
     assert not Path("runs").exists()
 
 
-def test_a_run_becomes_one_file(run: Run, made: Made, tmp_path: Path) -> None:
+def test_a_run_becomes_one_file(run: Run, made: ReportPage, tmp_path: Path) -> None:
     page = tmp_path / "out.html"
     ended = run("view", str(made.directory), "--html", str(page))
     assert (ended.status, ended.out) == (0, f"{page}\n")
@@ -156,7 +156,7 @@ def test_a_run_becomes_one_file(run: Run, made: Made, tmp_path: Path) -> None:
     assert "is there already" in again.err
 
 
-class Ear:
+class Receiver:
     """A link on which things arrive, and nothing may be sent."""
 
     def __init__(self) -> None:
@@ -181,7 +181,7 @@ class Ear:
 class Overhears:
     """What is said on the swarm's and target's links and by autopilots, for a view; and the truth."""
 
-    def __init__(self, flight: Flight, ear: Ear, listener: Listener) -> None:
+    def __init__(self, flight: Flight, ear: Receiver, listener: Listener) -> None:
         self._flight, self._ear, self._listener = flight, ear, listener
         self._last = 0
         self.shown: list[tuple[Any, Snapshot]] = []
@@ -203,7 +203,7 @@ class Overhears:
 
 
 def overheard(of: Any) -> Overhears:
-    ear = Ear()
+    ear = Receiver()
     listener = Listener([ear], [True], 10, "")
     flight = Flight(of, FIREFLY, 1, LOGS, stopwatch=lambda: 0)
     found = Overhears(flight, ear, listener)
@@ -239,7 +239,7 @@ def test_who_listens_sees_the_flight_and_is_silent(avoidance: str) -> None:
 
 @pytest.mark.parametrize("armed", [True, False])
 def test_who_listens_sees_no_plan_of_who_is_disarmed(armed: bool) -> None:
-    ear, codec, own = Ear(), Codec(), Source(1, 1)
+    ear, codec, own = Receiver(), Codec(), Source(1, 1)
     place = GlobalPosition(own, 1, 47.4, 8.5, 500.0, 10.0, (0.0, 0.0, 0.0), 0.0)
     plan = pack(quantise(0, 100_000, np.zeros(3), np.zeros(3), np.zeros((16, 3)), 1))
     said = [
@@ -256,7 +256,7 @@ def test_who_listens_sees_no_plan_of_who_is_disarmed(armed: bool) -> None:
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
 def test_whatever_is_heard_harms_nobody(received: list[bytes]) -> None:
-    ear = Ear()
+    ear = Receiver()
     listener = Listener([ear], [True], 10, "")
     ear.arrived = list(received)
     assert listener.poll(0.0) == ()

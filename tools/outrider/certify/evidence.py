@@ -27,7 +27,7 @@ class Terms(NamedTuple):
     upright: bool
 
 
-class Sighting(NamedTuple):
+class LoggedPlan(NamedTuple):
     """Plan of ``sender`` in the log of ``owner``.
 
     ``time``: of its first copy (µs, the owner's clock); ``copies``: their number.
@@ -40,7 +40,7 @@ class Sighting(NamedTuple):
     copies: int
 
 
-class Garbled(NamedTuple):
+class UnreadablePayloads(NamedTuple):
     """Payloads of the type of plans or rosters that cannot be read; the first one at ``time`` (µs)."""
 
     owner: int
@@ -49,7 +49,7 @@ class Garbled(NamedTuple):
     copies: int
 
 
-class Word(NamedTuple):
+class FarewellChange(NamedTuple):
     """Change at ``time`` (µs): from then on the owner's rosters say farewell, or no longer do."""
 
     time: int
@@ -60,9 +60,9 @@ class Log(NamedTuple):
     """Contents of one vehicle's tlog; ``damaged``: number of records that could not be read."""
 
     owner: int
-    sightings: tuple[Sighting, ...]
-    garbled: tuple[Garbled, ...]
-    words: tuple[Word, ...]
+    sightings: tuple[LoggedPlan, ...]
+    garbled: tuple[UnreadablePayloads, ...]
+    words: tuple[FarewellChange, ...]
     damaged: int
 
 

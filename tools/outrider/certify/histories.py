@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from companion.avoidance.certified.committed import carried_on, rests
 from mavlink_bridge.wire.plan import WirePlan, pack
-from outrider.certify.evidence import Finding, Log, Sighting, Terms
+from outrider.certify.evidence import Finding, Log, LoggedPlan, Terms
 
 _FAR = 4
 """Largest interval between the start of a plan and its reception (epochs).
@@ -39,7 +39,7 @@ class Step(NamedTuple):
     kind: Kind
 
 
-class Leave(NamedTuple):
+class Absence(NamedTuple):
     """Farewell at ``said`` (µs), and the epoch (µs) of the first plan after its withdrawal, if any."""
 
     said: int
@@ -51,7 +51,7 @@ class History(NamedTuple):
 
     system: int
     steps: tuple[Step, ...]
-    leaves: tuple[Leave, ...]
+    leaves: tuple[Absence, ...]
 
     def left(self, epoch: int) -> bool:
         """Return whether the vehicle had said farewell before ``epoch`` (µs) began.
@@ -64,7 +64,7 @@ class History(NamedTuple):
 def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, list[Finding]]:
     """Return the plans that ``system`` sent, according to all ``logs``, and what is wrong with them."""
     own = next((log for log in logs if log.owner == system), None)
-    by_epoch: dict[int, list[Sighting]] = {}
+    by_epoch: dict[int, list[LoggedPlan]] = {}
     for log in logs:
         for sighting in log.sightings:
             if sighting.sender == system:
@@ -92,7 +92,7 @@ def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, li
     return History(system, steps, leaves), findings
 
 
-def _disagreements(system: int, found: Sequence[Sighting], *, logged: bool) -> list[Finding]:
+def _disagreements(system: int, found: Sequence[LoggedPlan], *, logged: bool) -> list[Finding]:
     """Return differences among the plans sent, and between those sent and received; all are of one epoch."""
     epoch = found[0].plan.epoch
     sent = list(dict.fromkeys(sighting.plan for sighting in found if sighting.owner == system))
@@ -138,16 +138,16 @@ def _flaw(plan: WirePlan, terms: Terms, seen: Sequence[int]) -> tuple[str, str] 
     return None
 
 
-def _leaves(own: Log, plans: Sequence[WirePlan]) -> Iterable[Leave]:
+def _leaves(own: Log, plans: Sequence[WirePlan]) -> Iterable[Absence]:
     """Yield each farewell, with the first of ``plans`` that was sent after the farewell was withdrawn."""
     sent = {sighting.plan: sighting.time for sighting in own.sightings if sighting.sender == own.owner}
     for word, following in zip_longest(own.words, own.words[1:]):
         if word.farewell:
             again = [] if following is None else [p.epoch for p in plans if sent.get(p, 0) >= following.time]
-            yield Leave(word.time, min(again, default=None))
+            yield Absence(word.time, min(again, default=None))
 
 
-def _steps(plans: Sequence[WirePlan], leaves: Sequence[Leave]) -> Iterable[Step]:
+def _steps(plans: Sequence[WirePlan], leaves: Sequence[Absence]) -> Iterable[Step]:
     """Yield the relation of each plan to the one before.
 
     In a gap the one before goes on: no vehicle can have received another one.

@@ -17,7 +17,7 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import unpack as unpack_plan
 from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 from mavlink_bridge.wire.roster import unpack as unpack_roster
-from outrider.certify.evidence import Evidence, Garbled, Log, Sighting, Terms, Word
+from outrider.certify.evidence import Evidence, FarewellChange, Log, LoggedPlan, Terms, UnreadablePayloads
 from outrider.errors import Fault, InputError
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION, resolved
@@ -87,8 +87,8 @@ class _Tally:
     def __init__(self, owner: int) -> None:
         self._owner = owner
         self._plans: dict[tuple[int, bytes], tuple[int, int]] = {}
-        self._garbled: dict[int, Garbled] = {}
-        self._words: list[Word] = []
+        self._garbled: dict[int, UnreadablePayloads] = {}
+        self._words: list[FarewellChange] = []
         self._roster = b""
 
     def add(self, time: int, message: Tunnel) -> None:
@@ -105,10 +105,10 @@ class _Tally:
                 self._garble(sender, time, 1)
                 return
             if farewell != (bool(self._words) and self._words[-1].farewell):
-                self._words.append(Word(time, farewell))
+                self._words.append(FarewellChange(time, farewell))
 
     def _garble(self, sender: int, time: int, copies: int) -> None:
-        bad = self._garbled.get(sender, Garbled(self._owner, sender, time, 0))
+        bad = self._garbled.get(sender, UnreadablePayloads(self._owner, sender, time, 0))
         self._garbled[sender] = bad._replace(copies=bad.copies + copies)
 
     def log(self, damaged: int) -> Log:
@@ -116,7 +116,7 @@ class _Tally:
         sightings = []
         for (sender, payload), (time, copies) in self._plans.items():
             try:
-                sightings.append(Sighting(self._owner, sender, unpack_plan(payload), time, copies))
+                sightings.append(LoggedPlan(self._owner, sender, unpack_plan(payload), time, copies))
             except PlanWireError:
                 self._garble(sender, time, copies)
         return Log(self._owner, tuple(sightings), tuple(self._garbled.values()), tuple(self._words), damaged)

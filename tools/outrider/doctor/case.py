@@ -8,7 +8,7 @@ from companion.flight.autopilots import Profile
 from mavlink_bridge.messages import ParamValue, Source
 from mavlink_bridge.wire.param_value import number_of
 from outrider.doctor.hearing import Hearing
-from outrider.doctor.speaker import Speaker
+from outrider.doctor.sender_record import SenderRecord
 
 
 class Case(NamedTuple):
@@ -19,7 +19,7 @@ class Case(NamedTuple):
     """
 
     hearing: Hearing
-    vehicle: Speaker
+    vehicle: SenderRecord
     log: bool
     me: Source | None
     baud: int | None = None

@@ -11,7 +11,7 @@ from outrider.doctor import agility, clocks, health, identity, place, positionin
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity, Verdict
 from outrider.doctor.hearing import Hearing
-from outrider.doctor.speaker import Speaker
+from outrider.doctor.sender_record import SenderRecord
 from outrider.doctor.streams import streams
 
 _CHECKS: Final[tuple[Callable[[Case], Iterator[Finding]], ...]] = (
@@ -50,7 +50,7 @@ class Examination:
         """Number of requests by the doctor for each message id."""
 
     @property
-    def vehicle(self) -> Speaker | None:
+    def vehicle(self) -> SenderRecord | None:
         """Examined vehicle, None before it is received."""
         return self.hearing.vehicle(self.system, lowest=not self.log)
 

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import BY_ID, Source
 from mavlink_bridge.wire.framing import Frame
-from outrider.doctor.speaker import Speaker
+from outrider.doctor.sender_record import SenderRecord
 
 MOST: Final = 128
 """Maximum number of senders that are recorded: a flood of invented ones must not fill the memory."""
@@ -31,7 +31,7 @@ class Hearing:
     """
 
     def __init__(self) -> None:
-        self.speakers: dict[Source, Speaker] = {}
+        self.senders: dict[Source, SenderRecord] = {}
         self.begin: int | None = None
         self.end = 0
         self.frames = self.octets = self.bad = self.skipped_bytes = self.unreceived = self.refused = 0
@@ -43,14 +43,14 @@ class Hearing:
         self.frames += 1
         self.octets += len(frame.data)
         source = Source(frame.system, frame.component)
-        speaker = self.speakers.get(source)
-        if speaker is None:
-            if len(self.speakers) >= MOST:
+        sender = self.senders.get(source)
+        if sender is None:
+            if len(self.senders) >= MOST:
                 self.unreceived += 1
                 return
-            speaker = self.speakers[source] = Speaker(source)
+            sender = self.senders[source] = SenderRecord(source)
         row = BY_ID.get(frame.message_id)
-        speaker.tell(now, frame, None if row is None else row.parse(source, frame.payload))
+        sender.tell(now, frame, None if row is None else row.parse(source, frame.payload))
 
     def wait(self, now: int) -> int:
         """Advance the time to ``now`` (µs), with or without a frame; return the time that counts."""
@@ -64,13 +64,11 @@ class Hearing:
         return 0.0 if self.begin is None else (self.end - self.begin) * 1e-6
 
     @property
-    def autopilots(self) -> list[Speaker]:
+    def autopilots(self) -> list[SenderRecord]:
         """Senders that are autopilots, by system id."""
-        return [
-            self.speakers[source] for source in sorted(self.speakers) if self.speakers[source].is_autopilot
-        ]
+        return [self.senders[source] for source in sorted(self.senders) if self.senders[source].is_autopilot]
 
-    def vehicle(self, system: int | None = None, *, lowest: bool = False) -> Speaker | None:
+    def vehicle(self, system: int | None = None, *, lowest: bool = False) -> SenderRecord | None:
         """Return the autopilot of ``system``, or the one with the most messages.
 
         ``lowest`` selects the lowest id instead, which does not change while messages arrive.

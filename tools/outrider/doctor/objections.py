@@ -11,7 +11,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import CommandLong, Message, Source, SysStatus
-from outrider.doctor.speaker import Speaker
+from outrider.doctor.sender_record import SenderRecord
 
 _LISTEN: Final = 35_000_000
 """µs; ArduPilot sends its texts every 30 s even without a request."""
@@ -33,7 +33,7 @@ class Objections:
         self._first: int | None = None
         self._last = self._times = 0
 
-    def due(self, vehicle: Speaker, me: Source, now: int) -> list[Message]:
+    def due(self, vehicle: SenderRecord, me: Source, now: int) -> list[Message]:
         """Return the messages to send at ``now`` (µs)."""
         if not self._open(vehicle) or self._known(vehicle) or self._times >= _TRIES:
             return []
@@ -45,7 +45,7 @@ class Objections:
         system, component = vehicle.source
         return [CommandLong(me, system, component, mavlink.MAV_CMD_RUN_PREARM_CHECKS, 0, (0.0,) * 7)]
 
-    def left(self, vehicle: Speaker, now: int) -> int:
+    def left(self, vehicle: SenderRecord, now: int) -> int:
         """Return the longest time (µs) left to wait; 0 when there is nothing to wait for."""
         if not self._open(vehicle):
             return 0
@@ -54,10 +54,10 @@ class Objections:
         listen = _LISTEN_PX4 if vehicle.is_px4 else _LISTEN
         return listen if self._first is None else max(self._first + listen - now, 0)
 
-    def _open(self, vehicle: Speaker) -> bool:
+    def _open(self, vehicle: SenderRecord) -> bool:
         fails = vehicle.latest(SysStatus) is not None and not vehicle.vehicle.healthy
         return fails and not vehicle.vehicle.armed and (vehicle.tells_checks or vehicle.is_px4)
 
-    def _known(self, vehicle: Speaker) -> bool:
+    def _known(self, vehicle: SenderRecord) -> bool:
         """Return whether the vehicle was asked and has named a reason, possibly before the request."""
         return bool(vehicle.objections) and self._first is not None

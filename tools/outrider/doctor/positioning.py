@@ -26,7 +26,9 @@ def estimator(case: Case) -> Iterator[Finding]:
             "Nobody asked for it in this log." if case.log else "It was asked for and did not come.",
         )
         return
-    if reported.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS and not reported.flags & mavlink.EKF_UNINITIALIZED:
+    # The same bit means a GPS glitch in PX4's ESTIMATOR_STATUS.
+    waits = not case.px4 and reported.flags & mavlink.EKF_UNINITIALIZED
+    if reported.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS and not waits:
         yield Finding(
             "the estimator has an absolute position",
             Severity.OK,

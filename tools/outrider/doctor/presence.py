@@ -10,7 +10,7 @@ from companion.values.components import COMPONENT
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 from outrider.doctor.hearing import MOST, SETPOINTS, Hearing
-from outrider.doctor.speaker import Speaker
+from outrider.doctor.sender_record import SenderRecord
 from outrider.logs.words import enumerated
 
 
@@ -51,7 +51,7 @@ def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
             f"Say --system {present[0]}, or set the vehicle's id to {system} (SYSID_THISMAV; MAV_SYS_ID "
             "with PX4).",
         )
-    others = ", ".join(f"{one.source.system}/{one.source.component}" for one in hearing.speakers.values())
+    others = ", ".join(f"{one.source.system}/{one.source.component}" for one in hearing.senders.values())
     return Finding(
         f"no autopilot's HEARTBEAT; only {others[:80]} can be heard",
         severity,
@@ -77,9 +77,9 @@ def company(case: Case) -> Iterator[Finding]:
             "Give each companion a link of its own, or be sure of its system id (--system ID examines "
             "another).",
         )
-    for speaker in case.hearing.speakers.values():
-        if speaker is not case.vehicle and speaker.source != case.me:
-            yield from _about(case, speaker)
+    for sender in case.hearing.senders.values():
+        if sender is not case.vehicle and sender.source != case.me:
+            yield from _about(case, sender)
     if case.hearing.unreceived:
         yield Finding(
             f"more than {MOST} senders",
@@ -89,11 +89,11 @@ def company(case: Case) -> Iterator[Finding]:
         )
 
 
-def _about(case: Case, speaker: Speaker) -> Iterator[Finding]:
-    system, component = speaker.source
+def _about(case: Case, sender: SenderRecord) -> Iterator[Finding]:
+    system, component = sender.source
     own = system == case.vehicle.source.system
     name = f"{system}/{component}"
-    steers = sum(stream.count for number, stream in speaker.streams.items() if number in SETPOINTS)
+    steers = sum(stream.count for number, stream in sender.streams.items() if number in SETPOINTS)
     if steers:
         yield Finding(
             f"{name} sends set-points ({steers})",
@@ -110,14 +110,14 @@ def _about(case: Case, speaker: Speaker) -> Iterator[Finding]:
             "A second one with the same id would be taken for it.",
             "" if case.log else "Use it, or end it before starting another.",
         )
-    elif speaker.is_ground_station:
+    elif sender.is_ground_station:
         yield Finding(
             f"a ground station: {name}",
             Severity.NOTE,
             "It may take the vehicle over at any time, and keeps it then.",
         )
-    elif speaker.heartbeat is not None and speaker.heartbeat.autopilot == mavlink.MAV_AUTOPILOT_INVALID:
-        kind = (enumerated("MAV_TYPE", speaker.heartbeat.type) or "").removeprefix("MAV_TYPE_").lower()
+    elif sender.heartbeat is not None and sender.heartbeat.autopilot == mavlink.MAV_AUTOPILOT_INVALID:
+        kind = (enumerated("MAV_TYPE", sender.heartbeat.type) or "").removeprefix("MAV_TYPE_").lower()
         yield Finding(
             f"another component: {name}, {kind.replace('_', ' ')}", Severity.NOTE, "It does not disturb."
         )

@@ -14,8 +14,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from mavlink_bridge.messages import CommandLong, Heartbeat, Message, ParamRequestRead, Source
 from outrider.doctor.examination import Examination
 from outrider.doctor.objections import Objections
+from outrider.doctor.sender_record import SenderRecord
 from outrider.doctor.settings import names
-from outrider.doctor.speaker import Speaker
 
 COMPONENT: Final[int] = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER3
 """Component id of the doctor.
@@ -113,18 +113,18 @@ class Questions:
         vehicle = self._examination.vehicle
         return 0 if vehicle is None else self._objections.left(vehicle, now)
 
-    def _wanted(self, vehicle: Speaker, now: int) -> tuple[int | str, ...]:
+    def _wanted(self, vehicle: SenderRecord, now: int) -> tuple[int | str, ...]:
         px4 = vehicle.is_px4
         wanted: tuple[int | str, ...] = _ONCE + names(px4=px4)
         if self._met is not None and now - self._met >= _LISTEN:
             wanted += (*_FLOWING, _ESTIMATOR[px4])
         return wanted
 
-    def _is_open(self, key: int | str, vehicle: Speaker, now: int) -> bool:
+    def _is_open(self, key: int | str, vehicle: SenderRecord, now: int) -> bool:
         times, last = self._asked.get(key, _Asked(0, 0))
         return not _answered(key, vehicle) and times < _TRIES and (times == 0 or now - last >= _PATIENCE)
 
-    def _ask(self, key: int | str, vehicle: Speaker, now: int) -> Message:
+    def _ask(self, key: int | str, vehicle: SenderRecord, now: int) -> Message:
         times, _ = self._asked.get(key, _Asked(0, 0))
         self._asked[key] = _Asked(times + 1, now)
         system, component = vehicle.source
@@ -135,5 +135,5 @@ class Questions:
         return CommandLong(self.me, system, component, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, params)
 
 
-def _answered(key: int | str, vehicle: Speaker) -> bool:
+def _answered(key: int | str, vehicle: SenderRecord) -> bool:
     return key in vehicle.parameters if isinstance(key, str) else key in vehicle.streams

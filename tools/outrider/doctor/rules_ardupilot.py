@@ -5,20 +5,20 @@ from __future__ import annotations
 from typing import Final
 
 from outrider.doctor.case import Case
-from outrider.doctor.rule import NOTE, OK, WARNING, Rule, Said, fence, low_battery, number
+from outrider.doctor.rule import NOTE, OK, WARNING, Meaning, Rule, fence, low_battery, number
 
 _BRIEF, _STOCK = 1.0, 3.0
 """GUID_TIMEOUT (s): the recommended value, and the firmware's default."""
 
 
-def _guided_timeout(value: float, _case: Case) -> Said:
+def _guided_timeout(value: float, _case: Case) -> Meaning:
     if value < 0.3:
-        return Said(WARNING, "A short break of the link makes it brake.", "Set GUID_TIMEOUT to 1 s.")
+        return Meaning(WARNING, "A short break of the link makes it brake.", "Set GUID_TIMEOUT to 1 s.")
     flies_on = f"When set-points stop it flies on as last told for {value:g} s, then brakes"
     if value <= _BRIEF:
-        return Said(OK, f"{flies_on}.")
+        return Meaning(OK, f"{flies_on}.")
     saved = value - _BRIEF
-    return Said(
+    return Meaning(
         WARNING if value > _STOCK else NOTE,
         f"{flies_on}: with 3 s ArduCopter 4.6.3 settled 4.6 to 5.7 m off when both processes of fly were "
         f"killed. 1 s saves {saved:g} s of that, {2.0 * saved:g} m at 2 m/s, and others need less room "
@@ -28,19 +28,19 @@ def _guided_timeout(value: float, _case: Case) -> Said:
     )
 
 
-def _ground_failsafe(value: float, case: Case) -> Said:
+def _ground_failsafe(value: float, case: Case) -> Meaning:
     if value == 0:
-        return Said(NOTE, "It flies on when the ground station is lost: the companion alone sees to it.")
+        return Meaning(NOTE, "It flies on when the ground station is lost: the companion alone sees to it.")
     station = case.parameter("SYSID_MYGCS")
-    there = {one.source.system for one in case.hearing.speakers.values() if one.is_ground_station}
+    there = {one.source.system for one in case.hearing.senders.values() if one.is_ground_station}
     if station is None or station in there:
-        return Said(
+        return Meaning(
             NOTE,
             "When the ground station's HEARTBEAT is lost it returns or lands, escort or not.",
             "Keep that station on.",
         )
     seen = ", ".join(map(str, sorted(there))) or "none"
-    return Said(
+    return Meaning(
         WARNING,
         f"It watches for ground station {station:g} (SYSID_MYGCS), and here is {seen}: once seen and "
         "lost, it returns or lands.",
@@ -48,29 +48,29 @@ def _ground_failsafe(value: float, case: Case) -> Said:
     )
 
 
-def _station(value: float, case: Case) -> Said:
+def _station(value: float, case: Case) -> Meaning:
     if value == case.vehicle.source.system:
-        return Said(WARNING, "It takes itself for its ground station.", "Set SYSID_MYGCS to 255.")
-    return Said(
+        return Meaning(WARNING, "It takes itself for its ground station.", "Set SYSID_MYGCS to 255.")
+    return Meaning(
         OK,
         "Whose HEARTBEAT FS_GCS_ENABLE watches. A companion speaks with the vehicle's own id and never "
         "counts as it.",
     )
 
 
-def _arming(value: float, _case: Case) -> Said:
+def _arming(value: float, _case: Case) -> Meaning:
     if value == 0:
-        return Said(WARNING, "It arms without any check.", "Set ARMING_CHECK to 1.")
-    return Said(
+        return Meaning(WARNING, "It arms without any check.", "Set ARMING_CHECK to 1.")
+    return Meaning(
         OK if int(value) & 1 else NOTE,
         "It checks itself before it arms." if int(value) & 1 else "Some checks are left out.",
     )
 
 
-def _estimator_failsafe(value: float, _case: Case) -> Said:
+def _estimator_failsafe(value: float, _case: Case) -> Meaning:
     if value == 0:
-        return Said(WARNING, "It flies on when its estimator fails.", "Set FS_EKF_ACTION to 1 (land).")
-    return Said(OK, "It lands, or holds its height, when its estimator fails.")
+        return Meaning(WARNING, "It flies on when its estimator fails.", "Set FS_EKF_ACTION to 1 (land).")
+    return Meaning(OK, "It lands, or holds its height, when its estimator fails.")
 
 
 ARDUPILOT_RULES: Final = (

@@ -5,83 +5,85 @@ from __future__ import annotations
 from typing import Final
 
 from outrider.doctor.case import Case
-from outrider.doctor.rule import BLOCKING, NOTE, OK, WARNING, Rule, Said, fence, low_battery, number
+from outrider.doctor.rule import BLOCKING, NOTE, OK, WARNING, Meaning, Rule, fence, low_battery, number
 
 
-def _loss_action(value: float, _case: Case) -> Said:
+def _loss_action(value: float, _case: Case) -> Meaning:
     said = {
-        0: Said(
+        0: Meaning(
             WARNING,
             "When set-points stop it changes to Position mode and, without a pilot, sinks at 0.6 m/s: "
             "its default.",
             "Set COM_OBL_RC_ACT to 5 (hold).",
         ),
-        3: Said(
+        3: Meaning(
             NOTE,
             "When set-points stop it returns home, across whatever is between.",
             "5 (hold) keeps it clear of others.",
         ),
-        4: Said(NOTE, "When set-points stop it lands where it is.", "5 (hold) keeps it clear of others."),
-        5: Said(OK, "When set-points stop it holds, after 3 to 4 m of drift from 2 m/s."),
+        4: Meaning(NOTE, "When set-points stop it lands where it is.", "5 (hold) keeps it clear of others."),
+        5: Meaning(OK, "When set-points stop it holds, after 3 to 4 m of drift from 2 m/s."),
     }
     if value in said:
         return said[int(value)]
     if value in (1, 2):
-        return Said(
+        return Meaning(
             WARNING, "When set-points stop it goes to a mode that a pilot has to fly.", "Set it to 5 (hold)."
         )
     if value in (6, 7):
-        return Said(BLOCKING, "When set-points stop it stops its motors in the air.", "Set it to 5 (hold).")
-    return Said(WARNING, "What that means is not known here.", "Set it to 5 (hold).")
+        return Meaning(
+            BLOCKING, "When set-points stop it stops its motors in the air.", "Set it to 5 (hold)."
+        )
+    return Meaning(WARNING, "What that means is not known here.", "Set it to 5 (hold).")
 
 
-def _loss_time(value: float, _case: Case) -> Said:
+def _loss_time(value: float, _case: Case) -> Meaning:
     if value < 0.3:
-        return Said(WARNING, "A short break of the link ends OFFBOARD.", "Set COM_OF_LOSS_T to 1 s.")
+        return Meaning(WARNING, "A short break of the link ends OFFBOARD.", "Set COM_OF_LOSS_T to 1 s.")
     if value > 2.0:
-        return Said(
+        return Meaning(
             WARNING, f"For {value:g} s it keeps on going as last told, blind.", "Set COM_OF_LOSS_T to 1 s."
         )
-    return Said(OK, f"OFFBOARD ends {value:g} s after the last set-point.")
+    return Meaning(OK, f"OFFBOARD ends {value:g} s after the last set-point.")
 
 
-def _remote_lost(value: float, _case: Case) -> Said:
+def _remote_lost(value: float, _case: Case) -> Meaning:
     if int(value) & 4:
-        return Said(OK, "OFFBOARD goes on without remote control.")
-    return Said(
+        return Meaning(OK, "OFFBOARD goes on without remote control.")
+    return Meaning(
         NOTE,
         "Once a remote control was there and is lost, NAV_RCL_ACT ends OFFBOARD.",
         "COM_RCL_EXCEPT with bit 2 (value 4) keeps OFFBOARD; leave it if a pilot stands by.",
     )
 
 
-def _failures(value: float, _case: Case) -> Said:
+def _failures(value: float, _case: Case) -> Meaning:
     if value == 0:
-        return Said(OK, "Nobody can make its sensors or motors fail by a command.")
-    return Said(
+        return Meaning(OK, "Nobody can make its sensors or motors fail by a command.")
+    return Meaning(
         WARNING, "A command can make its sensors and motors fail, as tests do.", "Set SYS_FAILURE_EN to 0."
     )
 
 
-def _ground_lost(value: float, _case: Case) -> Said:
+def _ground_lost(value: float, _case: Case) -> Meaning:
     if value == 0:
-        return Said(NOTE, "It flies on when the ground station is lost: the companion alone sees to it.")
-    return Said(
+        return Meaning(NOTE, "It flies on when the ground station is lost: the companion alone sees to it.")
+    return Meaning(
         NOTE,
         "When the ground station is lost the autopilot acts by itself (hold 1, return 2, land 3, …).",
         "See that a ground station stays connected, or set NAV_DLL_ACT to 0.",
     )
 
 
-def _own_jerk(value: float, _case: Case) -> Said:
+def _own_jerk(value: float, _case: Case) -> Meaning:
     if value < 4.0:
-        return Said(
+        return Meaning(
             WARNING,
             f"Its own modes, such as HOLD when set-points stop, change acceleration by {value:g} m/s³ at "
             "most, stock by 4: it drifts further.",
             "Set MPC_JERK_AUTO to 4.",
         )
-    return Said(OK, "How fast its own modes change acceleration, m/s³: not lower than stock.")
+    return Meaning(OK, "How fast its own modes change acceleration, m/s³: not lower than stock.")
 
 
 PX4_RULES: Final = (

@@ -15,7 +15,7 @@ _ASKED: Final = {number: 1e6 / each for number, each in STREAMS.items()}
 """Requested rates (Hz) by message id."""
 
 
-class Need(NamedTuple):
+class StreamRequirement(NamedTuple):
     """Requirement for one message.
 
     ``wanted``: rate (Hz) that ``fly`` requests; ``least``: rate that suffices; ``essential``: an escort is
@@ -31,7 +31,7 @@ class Need(NamedTuple):
 
 
 NEEDS: Final = (
-    Need(
+    StreamRequirement(
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
         "LOCAL_POSITION_NED",
         _ASKED[mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED],
@@ -39,7 +39,7 @@ NEEDS: Final = (
         True,
         "Every plan begins where this says that it is.",
     ),
-    Need(
+    StreamRequirement(
         mavlink.MAVLINK_MSG_ID_ATTITUDE,
         "ATTITUDE",
         _ASKED[mavlink.MAVLINK_MSG_ID_ATTITUDE],
@@ -47,7 +47,7 @@ NEEDS: Final = (
         True,
         "It says where the nose points when set-points begin.",
     ),
-    Need(
+    StreamRequirement(
         mavlink.MAVLINK_MSG_ID_SYS_STATUS,
         "SYS_STATUS",
         _ASKED[mavlink.MAVLINK_MSG_ID_SYS_STATUS],
@@ -55,7 +55,7 @@ NEEDS: Final = (
         True,
         "It has the pre-arm check and the battery.",
     ),
-    Need(
+    StreamRequirement(
         mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
         "EXTENDED_SYS_STATE",
         _ASKED[mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE],
@@ -63,7 +63,7 @@ NEEDS: Final = (
         False,
         "It says whether an armed vehicle stands or flies.",
     ),
-    Need(
+    StreamRequirement(
         mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
         "GLOBAL_POSITION_INT",
         1.0,
@@ -84,7 +84,7 @@ def streams(case: Case, asked: dict[int, int]) -> Iterator[Finding]:
         yield _judge(case, need, asked.get(need.message_id, 0))
 
 
-def _judge(case: Case, need: Need, asked: int) -> Finding:
+def _judge(case: Case, need: StreamRequirement, asked: int) -> Finding:
     stream = case.vehicle.streams.get(need.message_id)
     name = need.name
     order = f"SET_MESSAGE_INTERVAL {need.message_id} at {1e6 / need.wanted:.0f} µs"

@@ -19,7 +19,7 @@ _WANTED: Final = 2500.0
 
 def wire(case: Case) -> Iterator[Finding]:
     """Yield findings on the link: unique ids, refused and damaged frames, load."""
-    yield from _namesakes(case)
+    yield from _shared_ids(case)
     if case.hearing.refused:
         yield Finding(
             f"{case.hearing.refused} frames do not count: {case.hearing.refusal}",
@@ -31,7 +31,7 @@ def wire(case: Case) -> Iterator[Finding]:
     yield from _load(case)
 
 
-def _namesakes(case: Case) -> Iterator[Finding]:
+def _shared_ids(case: Case) -> Iterator[Finding]:
     vehicle = case.vehicle
     number = vehicle.source.system
     if vehicle.clock.doubled or len(vehicle.identities) > 1:

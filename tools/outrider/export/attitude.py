@@ -8,14 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from outrider.logs.message_stream import Spoken
+from outrider.logs.message_stream import LogMessage
 from outrider.runs.arrays import Array, Motion
 
 SAID: Final = "ATTITUDE"
 _AUTOPILOT_LINK = 0
 
 
-def leanings(messages: Iterable[Spoken], owner: int) -> tuple[Array, Array]:
+def leanings(messages: Iterable[LogMessage], owner: int) -> tuple[Array, Array]:
     """Return the lean of a vehicle as reported in the ATTITUDE messages of the owner's autopilot.
 
     The result is Unix µs (n,), in order of time, and the horizontal part (n, 2), east and north, of the unit

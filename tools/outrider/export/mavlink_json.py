@@ -13,7 +13,7 @@ from outrider.export import foxglove, foxglove_schemas, json_schema
 from outrider.export.json_schema import Node, Schema
 from outrider.export.mcap_file import Entry, entry
 from outrider.logs.dialect import Field, Kind
-from outrider.logs.message_stream import Log, Spoken
+from outrider.logs.message_stream import Log, LogMessage
 
 POSITION, WORDS = "GLOBAL_POSITION_INT", "STATUSTEXT"
 _AUTOPILOT_LINK = 0
@@ -21,7 +21,7 @@ _LEVELS: Final = (5, 5, 5, 4, 3, 2, 2, 1)
 """Foxglove's levels for MAV_SEVERITY 0…7: emergency, alert and critical all map to fatal."""
 
 
-def entries(log: Log, messages: Iterable[Spoken]) -> Iterator[Entry]:
+def entries(log: Log, messages: Iterable[LogMessage]) -> Iterator[Entry]:
     """Yield every message on ``/mavlink/SYSTEM/COMPONENT/NAME``, and positions and texts in Foxglove's types.
 
     In a run the topic is ``/mavlink/vehicle-OWNER/SYSTEM/COMPONENT/NAME``: the messages that the companion of
@@ -78,7 +78,7 @@ _FORMATS: Final = {"float": ".9g", "double": ".17g"}
 _template = lru_cache(maxsize=None)(_Template)
 
 
-def encode(spoken: Spoken) -> bytes:
+def encode(spoken: LogMessage) -> bytes:
     """Return the fields of a message as JSON.
 
     JSON has neither NaN nor infinity: a field that is not finite, or an array that has such an item, is
@@ -97,7 +97,7 @@ def encode(spoken: Spoken) -> bytes:
     return json.dumps(values, separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode()
 
 
-def _fix(spoken: Spoken) -> Entry:
+def _fix(spoken: LogMessage) -> Entry:
     values = spoken.kind.read(spoken.payload)
     fix = {
         "timestamp": foxglove.stamp(spoken.time),
@@ -111,7 +111,7 @@ def _fix(spoken: Spoken) -> Entry:
     return entry(spoken.time, f"/fix/{spoken.system}", foxglove_schemas.LOCATION_FIX, fix)
 
 
-def _text(spoken: Spoken) -> Entry:
+def _text(spoken: LogMessage) -> Entry:
     values = spoken.kind.read(spoken.payload)
     severity = values["severity"]
     said = {

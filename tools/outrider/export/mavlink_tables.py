@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from outrider.export.table_files import Column, Part
 from outrider.logs.dialect import Field, Kind, text
-from outrider.logs.message_stream import Spoken
+from outrider.logs.message_stream import LogMessage
 
 HEAD: Final = ("time_us", "log", "link", "system", "component")
 """Columns before the fields.
@@ -41,7 +41,7 @@ class Heap:
         self._waiting: dict[tuple[int, Kind], list[bytes]] = defaultdict(list)
         self._bytes = 0
 
-    def add(self, owner: int, spoken: Spoken) -> Iterator[Part]:
+    def add(self, owner: int, spoken: LogMessage) -> Iterator[Part]:
         """Add a message, and yield the parts that are due to be written."""
         key = spoken.system, spoken.kind
         rows = self._waiting[key]
@@ -61,7 +61,7 @@ class Heap:
             yield _part(system, kind, rows)
 
 
-def parts(logs: Iterable[tuple[int, Iterable[Spoken]]]) -> Iterator[Part]:
+def parts(logs: Iterable[tuple[int, Iterable[LogMessage]]]) -> Iterator[Part]:
     """Yield the tables' parts of ``logs``, pairs of an owner and its messages, one log after the other."""
     heap = Heap()
     for owner, messages in logs:

@@ -20,7 +20,7 @@ from outrider.export.px4_topics import TOPICS, Px4Topics
 from outrider.export.ulog_file import Topic, UlogFile
 from outrider.export.written import Written
 from outrider.logs.dialect import Kind
-from outrider.logs.message_stream import Log, Spoken, Watch, watched
+from outrider.logs.message_stream import Log, LogMessage, Watch, watched
 from outrider.runs.source import Run
 
 SECOND: Final = 1_000_000
@@ -29,7 +29,7 @@ _SURVEYED = 0.3
 _HEAD = (("uint8_t", "link"), ("uint8_t", "system"), ("uint8_t", "component"))
 
 
-class Survey(NamedTuple):
+class LogContents(NamedTuple):
     """Contents of a log: its first time (Unix µs), its message types, and the system ids of vehicles.
 
     A vehicle is a system with an autopilot.
@@ -58,7 +58,7 @@ def write(run: Run, folder: Path, watch: Watch) -> Written:
     return Written(*(sum(column) for column in zip(*parts, strict=True)))
 
 
-def survey(messages: Iterable[Spoken]) -> Survey:
+def survey(messages: Iterable[LogMessage]) -> LogContents:
     """Read a log once and return its contents."""
     first, kinds, vehicles = -1, set(), set()
     for spoken in messages:
@@ -66,27 +66,29 @@ def survey(messages: Iterable[Spoken]) -> Survey:
         kinds.add(spoken.kind)
         if _is_vehicle(spoken):
             vehicles.add(spoken.system)
-    return Survey(max(first, 0), frozenset(kinds), frozenset(vehicles))
+    return LogContents(max(first, 0), frozenset(kinds), frozenset(vehicles))
 
 
-def _is_vehicle(spoken: Spoken) -> bool:
+def _is_vehicle(spoken: LogMessage) -> bool:
     """Return whether the message is the heartbeat of an autopilot."""
     if spoken.kind.name != "HEARTBEAT" or spoken.component != mavlink.MAV_COMP_ID_AUTOPILOT1:
         return False
     return bool(spoken.kind.read(spoken.payload)["autopilot"] != mavlink.MAV_AUTOPILOT_INVALID)
 
 
-def _vehicles(log: Log, found: Survey) -> list[int]:
+def _vehicles(log: Log, found: LogContents) -> list[int]:
     """Return the vehicles that get a file: the owner of a log in a run, otherwise every vehicle in it."""
     return sorted(found.vehicles) if log.owner is None else [log.owner]
 
 
-def _write(log: Log, found: Survey, messages: Iterable[Spoken], folder: Path, zero: int) -> list[Written]:
+def _write(
+    log: Log, found: LogContents, messages: Iterable[LogMessage], folder: Path, zero: int
+) -> list[Written]:
     vehicles = _vehicles(log, found)
     kinds = sorted(found.kinds, key=lambda kind: kind.id)
     with ExitStack() as files:
         books = {
-            system: _Book(
+            system: _VehicleConverter(
                 files.enter_context(_file(folder, system, zero, kinds)), system, zero, log.owner is not None
             )
             for system in vehicles
@@ -112,7 +114,7 @@ def _file(folder: Path, system: int, zero: int, kinds: list[Kind]) -> UlogFile:
     return UlogFile(folder / f"vehicle-{system}.ulg", 0, information, topics)
 
 
-class _Book:
+class _VehicleConverter:
     """Converter of messages to the file of one vehicle.
 
     ``by_link`` sets whether links are distinguished: in a log outside a run the low bits of the time stamps
@@ -124,7 +126,7 @@ class _Book:
         self._system, self._zero, self._by_link = system, zero, by_link
         self._px4 = Px4Topics(system, mavlink.MAV_COMP_ID_AUTOPILOT1)
 
-    def add(self, spoken: Spoken) -> None:
+    def add(self, spoken: LogMessage) -> None:
         """Write a message, its conversion to PX4's topics, and its text if it is a STATUSTEXT."""
         kind, payload, time = spoken.kind, spoken.payload, spoken.time - self._zero
         link = spoken.link if self._by_link else 0

@@ -25,7 +25,7 @@ from outrider.fly.request import Request
 from outrider.fly.screen import Screen
 from outrider.fly.terminal import Terminal
 from outrider.fly.wiring import Wiring, wire
-from outrider.interruption import Came, noted
+from outrider.interruption import ReceivedSignal, noted
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION
 from outrider.runs.directories import new_directory
@@ -80,7 +80,9 @@ def _live(asked: Request) -> int:
     return FAULT if flight.fault else 0
 
 
-def _flown(asked: Request, directory: Path, event_log: EventLog, stops: list[Came], wiring: Wiring) -> Flight:
+def _flown(
+    asked: Request, directory: Path, event_log: EventLog, stops: list[ReceivedSignal], wiring: Wiring
+) -> Flight:
     """Fly with a live display on a terminal, otherwise with one line per event."""
     console = Console(stderr=True)
     with typing(console.is_terminal) as typed:

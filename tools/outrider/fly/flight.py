@@ -19,7 +19,7 @@ from typing import Any, Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.dry_run import ONLOOKER
-from companion.flight.hold_on_exit import LastWord
+from companion.flight.hold_on_exit import HoldOnExit
 from companion.flight.landing import Landing
 from companion.flight.readiness import OPERATORS_GO
 from companion.values.components import COMPONENT
@@ -40,7 +40,7 @@ from outrider.fly.status import State
 from outrider.fly.watchdog import Watchdog
 from outrider.fly.wiring import Wiring
 from outrider.fly.worker import Worker
-from outrider.interruption import Came, insisted
+from outrider.interruption import ReceivedSignal, insisted
 
 LOOK: Final = 0.05
 """Time between two polls (s)."""
@@ -66,7 +66,7 @@ class Flight:
         directory: Path,
         event_log: EventLog,
         typed: LineInput,
-        stops: Sequence[Came],
+        stops: Sequence[ReceivedSignal],
         look: Callable[[], None],
     ) -> None:
         self.asked, self.event_log = asked, event_log
@@ -166,7 +166,7 @@ class Flight:
             desk.beat(time.monotonic())
             self._obey(desk)
             self._look()
-            self._hear(desk)
+            self._receive(desk)
             if self._left or child.status is not None:
                 ended = "gave up" if child.status is None else f"ended with status {child.status}"
                 self._lose(f"its process {ended}")
@@ -197,7 +197,7 @@ class Flight:
         if len(self.restarts) >= MOST and now - self.restarts[-MOST][0] < WITHIN and not self.ended:
             self.ended, self.fault = why, True
 
-    def _hear(self, desk: Channel) -> None:
+    def _receive(self, desk: Channel) -> None:
         for news in desk.news():
             self._watchdog.received(time.monotonic())
             kind = news.pop("kind")
@@ -269,7 +269,7 @@ class Flight:
                 self._say_last_word()
             finally:
                 child.join()
-        self._hear(desk)
+        self._receive(desk)
         desk.close()
 
     def _dismiss(self, desk: Channel, child: ChildProcess) -> None:
@@ -285,7 +285,7 @@ class Flight:
                 self.event_log.note("process", "the companion's process does not end: killed")
                 return
             wait([desk.fileno(), child.sentinel], _QUICK)
-            self._hear(desk)
+            self._receive(desk)
 
     def _at_once(self) -> bool:
         return insisted(self._stops)
@@ -298,7 +298,7 @@ class Flight:
         beat = Heartbeat(Source(self.asked.system, mavlink.MAV_COMP_ID_AUTOPILOT1), *state.beat)
         if self._signing is not None:
             self._signing.resume(state.stamp)
-        word = LastWord(self.asked.system, beat, self._signing, steered=state.ours)
+        word = HoldOnExit(self.asked.system, beat, self._signing, steered=state.ours)
         farewell(word, self._wiring.ends["autopilot"], self._wall, self._at_once)
         self.last_word, self._failed = word.said, word.failed
         self.event_log.note("last word", f"the vehicle: {word.said or 'asked to hold, no answer yet'}")

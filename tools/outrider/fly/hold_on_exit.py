@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from companion.flight.hold_on_exit import LastWord
+from companion.flight.hold_on_exit import HoldOnExit
 from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.node import Datagram
@@ -15,7 +15,7 @@ _HURRIED: Final = 300_000
 """Minimum duration of the request even in a hurry (µs)."""
 
 
-def farewell(word: LastWord, link: Link, clock: Clock, hurry: Callable[[], bool]) -> None:
+def farewell(word: HoldOnExit, link: Link, clock: Clock, hurry: Callable[[], bool]) -> None:
     """Run ``word`` over ``link``, the autopilot's, on the wall's ``clock`` until it is over.
 
     If ``hurry()`` returns true, it ends as soon as 0.3 s have passed.

@@ -21,7 +21,7 @@ from outrider.fly.setpoint_check import gauge_for
 from outrider.fly.trajectory_comparison import likeness
 from outrider.runs.directories import new_directory
 from outrider.shadow.findings import document_of, leave
-from outrider.shadow.roles import Cast, Survey, survey
+from outrider.shadow.roles import OwnRecords, Roles, survey
 from outrider.shadow.shadow_run import ShadowRun, shadow_flight
 from outrider.terminal.lines import say
 from outrider.terminal.share_progress import share_progress
@@ -48,7 +48,7 @@ def dry_run_of_log(asked: Request, log: Path) -> int:
 
             found = shadow_flight(
                 config.settings,
-                Cast(config.system, None, target),
+                Roles(config.system, None, target),
                 seen,
                 read_tlog(log),
                 reported,
@@ -133,7 +133,7 @@ def _profile(asked: Request, log: Path, autopilots: dict[int, int]) -> Profile:
     )
 
 
-def _check_origin(asked: Request, log: Path, seen: Survey) -> None:
+def _check_origin(asked: Request, log: Path, seen: OwnRecords) -> None:
     system, (latitude, longitude, _) = asked.system, seen.place
     if not (latitude or longitude):
         raise InputError(

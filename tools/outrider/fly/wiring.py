@@ -12,7 +12,7 @@ from companion.telemetry.reception import accepts
 from companion.values.components import COMPONENT
 from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.errors import LinkError, LogError
-from mavlink_bridge.links.demultiplexer import Dealer, DealtLink, Wants
+from mavlink_bridge.links.demultiplexer import DemultiplexedLink, Demultiplexer, Wants
 from mavlink_bridge.links.endpoints import Endpoint
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
@@ -41,8 +41,8 @@ class Wiring(NamedTuple):
     observes all of them.
     """
 
-    ends: dict[str, DealtLink]
-    dealers: list[Dealer]
+    ends: dict[str, DemultiplexedLink]
+    dealers: list[Demultiplexer]
     duplicates: DuplicateIds
 
     def physical(self, name: str) -> Link:
@@ -115,7 +115,7 @@ def wire(
     with ExitStack() as opened:
         dealers = []
         duplicates = DuplicateIds(system, clock)
-        ends: dict[str, DealtLink] = {}
+        ends: dict[str, DemultiplexedLink] = {}
         for endpoint in dict.fromkeys(endpoints.values()):
             names = [name for name, other in endpoints.items() if other == endpoint]
             try:
@@ -124,7 +124,7 @@ def wire(
                 raise InputError(f"--{names[0]}: {error}") from None
             opened.callback(link.close)
             deal = {name: wants(name, system, target, config) for name in names}
-            dealers.append(Dealer(link, deal, duplicates))
+            dealers.append(Demultiplexer(link, deal, duplicates))
             ends |= dealers[-1].ends
         opened.pop_all()
     return Wiring(ends, dealers, duplicates)

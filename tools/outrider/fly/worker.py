@@ -101,13 +101,13 @@ class Worker:
             self._orders.tell(kind="event", at=0.0, what="priority", text=ask_for_priority().told)
         else:
             sharpen_timers()
-        with Log(self._directory, self._asked.system, self._lament) as log:
+        with Log(self._directory, self._asked.system, self._report_error) as log:
             status = self._flown(log)
             # From here on the parent sends the hold request; writing files takes time.
             self._orders.tell(kind="left")
         sys.exit(status)
 
-    def _lament(self, text: str) -> None:
+    def _report_error(self, text: str) -> None:
         self._orders.tell(kind="event", at=None, what="concern", text=text)
 
     def _flown(self, log: Log) -> int:

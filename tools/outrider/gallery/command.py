@@ -9,7 +9,7 @@ from outrider.errors import InputError
 from outrider.gallery import figures
 from outrider.gallery.flying import RUN
 from outrider.gallery.page import TITLE, page
-from outrider.gallery.showings import Showing, cells_of, chosen, scenarios, showings
+from outrider.gallery.showings import GalleryPanel, cells_of, chosen, scenarios, showings
 from outrider.runs import whole_file
 from outrider.sweep import directory as places
 from outrider.sweep.cells import scenario_of, task
@@ -70,7 +70,7 @@ def _check(folder: Path) -> None:
 
 
 def _panels(
-    name: str, shown: tuple[Showing, ...], keys: dict[Showing, str], entries: Flown
+    name: str, shown: tuple[GalleryPanel, ...], keys: dict[GalleryPanel, str], entries: Flown
 ) -> list[figures.Panel]:
     panels: list[figures.Panel] = []
     for showing in shown:

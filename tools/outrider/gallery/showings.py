@@ -14,7 +14,7 @@ WAYS = ("baseline", "swivel", "approach_angle", "tangential", "certified")
 """Methods, and the certified avoidance that replaces them."""
 
 
-class Showing(NamedTuple):
+class GalleryPanel(NamedTuple):
     """One panel: a scenario flown in one of ``WAYS``."""
 
     scenario: str
@@ -35,12 +35,12 @@ def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names)) or known
 
 
-def showings(names: tuple[str, ...]) -> tuple[Showing, ...]:
+def showings(names: tuple[str, ...]) -> tuple[GalleryPanel, ...]:
     """Return each scenario in each of ``WAYS``."""
-    return tuple(Showing(name, way) for name in names for way in WAYS)
+    return tuple(GalleryPanel(name, way) for name in names for way in WAYS)
 
 
-def cells_of(shown: tuple[Showing, ...]) -> list[Cell]:
+def cells_of(shown: tuple[GalleryPanel, ...]) -> list[Cell]:
     """Return the cell of each panel: the scenario as shipped, started in the air."""
     found = []
     for number, (scenario, way) in enumerate(shown, 1):

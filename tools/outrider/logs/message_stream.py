@@ -21,7 +21,7 @@ _OFTEN: Final = 2048
 Watch = Callable[[str, float], None]
 
 
-class Spoken(NamedTuple):
+class LogMessage(NamedTuple):
     """A message of a log.
 
     ``time`` Unix µs, its ``link`` (0…3), its sender, and its complete payload.
@@ -62,7 +62,7 @@ class Log:
         """Raise LogError if the log is missing, unreadable or without MAVLink."""
         read_tlog(self.path)
 
-    def __iter__(self) -> Iterator[Spoken]:
+    def __iter__(self) -> Iterator[LogMessage]:
         """Yield every message once, in the order of the file, without SETUP_SIGNING, which holds a key.
 
         Afterwards ``loss`` holds what else was left out.
@@ -80,14 +80,16 @@ class Log:
             if frame.message_id == mavlink.MAVLINK_MSG_ID_SETUP_SIGNING:
                 continue
             known = kind(frame.message_id)
-            yield Spoken(
+            yield LogMessage(
                 record.time, record.link, frame.system, frame.component, known, known.whole(frame.payload)
             )
         report = reader.report
         self.loss = Loss(report.bad + report.truncated + late, report.unknown)
 
 
-def watched(logs: list[Log], watch: Watch, share: tuple[float, float] = (0.0, 1.0)) -> list[Iterator[Spoken]]:
+def watched(
+    logs: list[Log], watch: Watch, share: tuple[float, float] = (0.0, 1.0)
+) -> list[Iterator[LogMessage]]:
     """Return the messages of each log, with progress reports.
 
     ``watch`` is called with the share of all logs that has been read, scaled to the range ``share``.
@@ -95,7 +97,7 @@ def watched(logs: list[Log], watch: Watch, share: tuple[float, float] = (0.0, 1.
     total = max(sum(log.size for log in logs), 1)
     low, high = share
 
-    def of(log: Log) -> Iterator[Spoken]:
+    def of(log: Log) -> Iterator[LogMessage]:
         for number, spoken in enumerate(log):
             if number % _OFTEN == 0:
                 done = min(sum(one.done for one in logs) / total, 1.0)

@@ -44,15 +44,15 @@ def count(path: Path, progress: Callable[[float], None]) -> Census | None:
 class _Stream:
     """One message of one component in one version of MAVLink."""
 
-    __slots__ = ("count", "frame", "speaker")
+    __slots__ = ("count", "frame", "sender")
 
-    def __init__(self, speaker: _Speaker) -> None:
-        self.speaker = speaker
+    def __init__(self, sender: _System) -> None:
+        self.sender = sender
         self.count = 0
         self.frame = b""
 
 
-class _Speaker:
+class _System:
     """One system id.
 
     ``silences`` counts those that may be gaps, by the bit length of their µs, so that memory does not grow
@@ -86,7 +86,7 @@ class _Tally:
 
     def __init__(self) -> None:
         self._streams: dict[bytes, _Stream] = {}
-        self._speakers: dict[int, _Speaker] = {}
+        self._senders: dict[int, _System] = {}
 
     def add(self, records: Iterable[Record]) -> None:
         """Count ``records``, in the order of the log."""
@@ -100,37 +100,37 @@ class _Tally:
             stream = known(key) or self._meet(key, time)
             stream.count += 1
             stream.frame = frame
-            speaker = stream.speaker
-            if time != speaker.before:
-                self._pass_time(speaker, time)
-            if link not in speaker.links:
-                speaker.links.add(link)
+            sender = stream.sender
+            if time != sender.before:
+                self._pass_time(sender, time)
+            if link not in sender.links:
+                sender.links.add(link)
             if signed:
-                speaker.signed += 1
+                sender.signed += 1
 
     def _meet(self, key: bytes, time: int) -> _Stream:
-        speaker = self._speakers.setdefault(key[0], _Speaker(time))
-        self._streams[key] = stream = _Stream(speaker)
+        sender = self._senders.setdefault(key[0], _System(time))
+        self._streams[key] = stream = _Stream(sender)
         return stream
 
-    def _pass_time(self, speaker: _Speaker, time: int) -> None:
-        silence = time - speaker.before
-        speaker.before = time
-        if time > speaker.last:
-            speaker.last = time
-        elif time < speaker.first:
-            speaker.first = time
+    def _pass_time(self, sender: _System, time: int) -> None:
+        silence = time - sender.before
+        sender.before = time
+        if time > sender.last:
+            sender.last = time
+        elif time < sender.first:
+            sender.first = time
         if silence > SHORTEST_GAP:
             # A silence of exactly a power of two belongs below it.
-            speaker.silences[(silence - 1).bit_length()] += 1
-            speaker.longest = max(speaker.longest, silence)
+            sender.silences[(silence - 1).bit_length()] += 1
+            sender.longest = max(sender.longest, silence)
 
     def vehicles(self) -> tuple[Vehicle, ...]:
         """Return all systems so far."""
-        return tuple(self._vehicle(system) for system in sorted(self._speakers))
+        return tuple(self._vehicle(system) for system in sorted(self._senders))
 
     def _vehicle(self, system: int) -> Vehicle:
-        speaker = self._speakers[system]
+        sender = self._senders[system]
         streams = {key: stream for key, stream in self._streams.items() if key[0] == system}
         counts: Counter[int] = Counter()
         for key, stream in streams.items():
@@ -140,7 +140,7 @@ class _Tally:
             for key, stream in sorted(streams.items())
             if _message_id(key) == mavlink.MAVLINK_MSG_ID_HEARTBEAT
         ]
-        beat = _spokesman(beats)
+        beat = _representative(beats)
         return Vehicle(
             system,
             tuple(sorted({key[1] for key in streams})),
@@ -148,11 +148,11 @@ class _Tally:
             None if beat is None else beat.autopilot,
             tuple(sorted(counts.items(), key=lambda one: (-one[1], one[0]))),
             tuple(sorted({1 if len(key) == 3 else 2 for key in streams})),
-            tuple(sorted(speaker.links)),
-            speaker.signed,
-            speaker.first,
-            speaker.last,
-            speaker.gaps(counts.total()),
+            tuple(sorted(sender.links)),
+            sender.signed,
+            sender.first,
+            sender.last,
+            sender.gaps(counts.total()),
         )
 
 
@@ -160,7 +160,7 @@ def _message_id(key: bytes) -> int:
     return int.from_bytes(key[2:], "little")
 
 
-def _spokesman(frames: list[bytes]) -> Heartbeat | None:
+def _representative(frames: list[bytes]) -> Heartbeat | None:
     """Return the autopilot's heartbeat, or else that of the lowest component id; None without any."""
     beats = [message for frame in frames for message in Codec().feed(frame) if isinstance(message, Heartbeat)]
     return min(

@@ -28,12 +28,12 @@ from outrider.realtime.traces import Moved, Trace, put_together
 from outrider.realtime.view import RealTimeView, Seen
 from outrider.realtime.view_page import Window
 from outrider.realtime.wiring import wire
-from outrider.realtime.workers import Remains
+from outrider.realtime.workers import ProcessResults
 from outrider.runs import names
 from outrider.runs.ground_truth import SAMPLE, Array
 from outrider.runs.outcome import Messages, Outcome, Punctuality
 from outrider.scenarios.scenario import Scenario
-from outrider.simulation.conductor import PREPARE_CAP, Conductor, Sight, Stage
+from outrider.simulation.conductor import PREPARE_CAP, Conductor, Observation, Stage
 from outrider.simulation.disturbances import Event, events, strike_computer
 from outrider.simulation.fleet import Fleet
 from outrider.simulation.flight import Progress, truth_of
@@ -135,7 +135,7 @@ class RealTimeFlight:
         scratch: Path,
         conductor: Conductor,
         moves: Sequence[tuple[int, Array]],
-        remains: Mapping[str, Remains],
+        remains: Mapping[str, ProcessResults],
         operators: Messages,
     ) -> Outcome:
         scenario, systems = self.scenario, self.fleet.systems
@@ -221,7 +221,7 @@ class _Leader:
         )
         armed = bool((board.armed & (board.gone == 0)).any())
         place = self._target.position(now)
-        over = conductor.see(Sight(now, positions, velocities, place, not waiting, waiting, armed))
+        over = conductor.see(Observation(now, positions, velocities, place, not waiting, waiting, armed))
         if start is None and conductor.clock_start is not None:
             board.goal = now
             self._target.begin(now)
@@ -296,7 +296,7 @@ def _nothing(conductor: Conductor, why: str) -> str:
     return f"{said}{why}: there is no truth about its vehicle"
 
 
-def _punctuality(companions: Collection[Remains]) -> Punctuality:
+def _punctuality(companions: Collection[ProcessResults]) -> Punctuality:
     lateness = Histogram()
     for found in companions:
         lateness.include(found.lateness)

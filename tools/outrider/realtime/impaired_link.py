@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from mavlink_bridge.loops.lockstep import Direction, Tap
+from mavlink_bridge.loops.lockstep import Direction, StepObserver
 from mavlink_bridge.network.simulated import Channel, SimulatedNetwork
 from mavlink_bridge.node import Datagram, Node
 from mavlink_bridge.wire.header import sending_system
@@ -40,7 +40,7 @@ class ImpairedLink:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Step the node with what has passed the simulated network by ``now``."""
         for datagram in inbox:
-            sender = self._senders.get(datagram.link) or self._speaker(datagram)
+            sender = self._senders.get(datagram.link) or self._sender(datagram)
             if (sender, datagram.link) in self._known:
                 self.network.send(now, sender, [datagram])
         delivered = self.network.receive(now, self.node.name)
@@ -49,7 +49,7 @@ class ImpairedLink:
         self._last = now, delivered, leaving
         return leaving
 
-    def show(self, taps: Sequence[Tap]) -> None:
+    def show(self, taps: Sequence[StepObserver]) -> None:
         """Pass the last step of the node, with what passed the network, to ``taps``; once."""
         if self._last is None:
             return
@@ -61,7 +61,7 @@ class ImpairedLink:
                 for datagram in box:
                     tap(now, self.name, direction, datagram)
 
-    def _speaker(self, datagram: Datagram) -> str:
+    def _sender(self, datagram: Datagram) -> str:
         """Return the name of the node with the system id in the header."""
         system = sending_system(datagram.data)
         moving = names.moving(system)

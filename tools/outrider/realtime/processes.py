@@ -9,7 +9,7 @@ from pathlib import Path
 from outrider.processes.children import Children
 from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.wiring import Wiring
-from outrider.realtime.workers import Remains, Worker
+from outrider.realtime.workers import ProcessResults, Worker
 
 _FAREWELL = 10.0
 """s that a process has to write its results."""
@@ -27,7 +27,7 @@ class Processes(Children):
         for worker in self._workers:
             self.start(worker.rough.name, _child, worker, self._wiring, self._scratch, priority)
 
-    def results(self) -> dict[str, Remains]:
+    def results(self) -> dict[str, ProcessResults]:
         """End all processes, kill those that do not end in time, and return their results by name."""
         self._board.stop = True
         self.join(_FAREWELL)
@@ -40,10 +40,10 @@ def _child(worker: Worker, wiring: Wiring, scratch: Path, priority: bool) -> Non
     worker.main(scratch, priority)
 
 
-def _remains(path: Path) -> Remains:
+def _remains(path: Path) -> ProcessResults:
     """Return the results of a process; empty ones if it was killed."""
     try:
         found = pickle.loads(path.read_bytes())
     except (OSError, EOFError, pickle.UnpicklingError):
-        return Remains()
-    return found if isinstance(found, Remains) else Remains()
+        return ProcessResults()
+    return found if isinstance(found, ProcessResults) else ProcessResults()

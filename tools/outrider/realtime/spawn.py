@@ -13,7 +13,7 @@ from mavlink_bridge.node import Node
 from outrider.realtime.impaired_link import ImpairedLink
 from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.wiring import Wiring
-from outrider.realtime.workers import AutopilotWorker, CompanionWorker, PlayedWorker, Seat, Worker
+from outrider.realtime.workers import AutopilotWorker, CompanionWorker, NodeEnvironment, PlayedWorker, Worker
 from outrider.runs import names
 from outrider.scenarios.links import PartitionPart
 from outrider.simulation.disturbances import events
@@ -42,7 +42,9 @@ def spawn(
         every = Scheduled(behind, timing.autopilot_us, first)
         trace = scratch / f"trace-{system}"
         workers.append(
-            AutopilotWorker(k, autopilot, trace, Seat(behind, every, wiring.autopilots[k], clock, board), own)
+            AutopilotWorker(
+                k, autopilot, trace, NodeEnvironment(behind, every, wiring.autopilots[k], clock, board), own
+            )
         )
         senders = {
             "autopilot": autopilot.name,
@@ -54,7 +56,12 @@ def spawn(
         every = Scheduled(behind, timing.companion_us, phase, its_clock)
         workers.append(
             CompanionWorker(
-                k, companion, system, logs, Seat(behind, every, wiring.companions[k], clock, board), cuts
+                k,
+                companion,
+                system,
+                logs,
+                NodeEnvironment(behind, every, wiring.companions[k], clock, board),
+                cuts,
             )
         )
     for index, k in enumerate(fleet.with_backup):
@@ -63,13 +70,13 @@ def spawn(
         behind = rough(fleet, backup_node, {"autopilot": names.companion(fleet.systems[k]), "swarm": None})
         turn = start + staggered(2 * len(fleet.systems) + index, _slots(fleet), timing.companion_us)
         every = Scheduled(behind, timing.companion_us, turn, fleet.clock(k, start))
-        workers.append(Worker(Seat(behind, every, wiring.backup_nodes[index], clock, board)))
+        workers.append(Worker(NodeEnvironment(behind, every, wiring.backup_nodes[index], clock, board)))
     phase = start + staggered(_slots(fleet) - 2, _slots(fleet), timing.companion_us)
     played: list[Target | MovingObstacle] = [fleet.target(), *fleet.moving()]
     for node, links in zip(played, [wiring.target, *wiring.moving], strict=True):
         behind = rough(fleet, node, {})
         every = Scheduled(behind, timing.companion_us, phase)
-        workers.append(PlayedWorker(node, Seat(behind, every, links, clock, board)))
+        workers.append(PlayedWorker(node, NodeEnvironment(behind, every, links, clock, board)))
     return workers
 
 

@@ -32,7 +32,7 @@ class Seen(NamedTuple):
     moving: Sequence[Array]
 
 
-class Shown(Protocol):
+class ViewedNode(Protocol):
     """State that companions and vehicles provide for a view.
 
     ``attitudes`` (K, 4) FRD in NED, ``plans`` (K, KNOTS, 6), K ``states``.
@@ -62,7 +62,7 @@ class RealTimeView:
         self._next = 0
         self.orders = Orders()
 
-    def show(self, now: int, seen: Seen, shown: Shown) -> None:
+    def show(self, now: int, seen: Seen, shown: ViewedNode) -> None:
         """Send the snapshot at ``now`` (µs), unless the previous one is too recent."""
         if now < self._next:
             return

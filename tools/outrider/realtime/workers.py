@@ -24,7 +24,7 @@ from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.loops.garbage import IdleCollector
 from mavlink_bridge.loops.histogram import Histogram
-from mavlink_bridge.loops.lockstep import Scheduled, Tap
+from mavlink_bridge.loops.lockstep import Scheduled, StepObserver
 from mavlink_bridge.loops.priority import LEVEL, ask_for_priority, sharpen_timers
 from mavlink_bridge.loops.realtime import RealTime
 from outrider.realtime.impaired_link import ImpairedLink
@@ -46,7 +46,7 @@ TOLERANCE = 1_000
 
 
 @dataclass
-class Remains:
+class ProcessResults:
     """Results that a process leaves behind.
 
     ``deadlines`` that passed, from the first step to the last; ``misses`` of them had no step within the
@@ -65,7 +65,7 @@ class Remains:
     error: str = ""
 
 
-class Seat(NamedTuple):
+class NodeEnvironment(NamedTuple):
     """Environment of a node: its impaired links, schedule, open links, clock and board."""
 
     rough: ImpairedLink
@@ -81,13 +81,13 @@ class Worker:
     above = 0
     """Levels of real-time priority above that of the others."""
 
-    def __init__(self, slot: Seat, events: Iterable[Event] = ()) -> None:
+    def __init__(self, slot: NodeEnvironment, events: Iterable[Event] = ()) -> None:
         self.rough, self._scheduled, self.links, self._clock, self.board = slot
-        self.remains = Remains()
+        self.remains = ProcessResults()
         self._parent = os.getpid()
         self._events = deque(events)
         self._goal_seen = False
-        self._taps: list[Tap] = []
+        self._taps: list[StepObserver] = []
 
     def over(self) -> bool:
         """Return whether to end: it was requested, or the parent is gone."""
@@ -128,7 +128,7 @@ class Worker:
         self.leave(directory / self.rough.name)
         sys.exit(status)
 
-    def taps(self, files: ExitStack) -> list[Tap]:
+    def taps(self, files: ExitStack) -> list[StepObserver]:
         """Return the observers of the datagrams; they are closed with ``files``."""
         return []
 
@@ -173,7 +173,9 @@ class AutopilotWorker(Worker):
 
     above = 1
 
-    def __init__(self, k: int, node: Autopilot, trace: Path, slot: Seat, events: Iterable[Event]) -> None:
+    def __init__(
+        self, k: int, node: Autopilot, trace: Path, slot: NodeEnvironment, events: Iterable[Event]
+    ) -> None:
         super().__init__(slot, events)
         self._k, self._node = k, node
         self._trace = TraceWriter(node)
@@ -205,7 +207,7 @@ class CompanionWorker(Worker):
     """A companion; it writes its vehicle's tlog to ``logs``."""
 
     def __init__(
-        self, k: int, node: Companion, system: int, logs: Path, slot: Seat, events: Iterable[Event]
+        self, k: int, node: Companion, system: int, logs: Path, slot: NodeEnvironment, events: Iterable[Event]
     ) -> None:
         super().__init__(slot, events)
         self._k, self._node = k, node
@@ -265,7 +267,7 @@ class CompanionWorker(Worker):
         self.remains.plan_log = self._node.plan_log
         super().leave(path)
 
-    def taps(self, files: ExitStack) -> list[Tap]:
+    def taps(self, files: ExitStack) -> list[StepObserver]:
         """Return the recorder of the vehicle's tlog."""
         return [Recorder(self._logs, [self._system], files)]
 
@@ -273,7 +275,7 @@ class CompanionWorker(Worker):
 class PlayedWorker(Worker):
     """A node that the harness plays: the target, or a moving obstacle."""
 
-    def __init__(self, node: Target | MovingObstacle, slot: Seat) -> None:
+    def __init__(self, node: Target | MovingObstacle, slot: NodeEnvironment) -> None:
         super().__init__(slot)
         self._node = node
         self._moves = 0

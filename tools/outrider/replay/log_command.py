@@ -20,7 +20,7 @@ from outrider.runs import names
 from outrider.runs.directories import new_directory
 from outrider.scenarios.scenario import FIRST_SYSTEM, Scenario
 from outrider.shadow.findings import document_of, leave
-from outrider.shadow.roles import Cast, check, survey
+from outrider.shadow.roles import Roles, check, survey
 from outrider.shadow.shadow_run import ShadowRun, shadow_flight
 from outrider.simulation.console import progress
 from outrider.swarm.command import fly
@@ -31,7 +31,7 @@ Pacing = Callable[[Iterable[Record]], Iterable[Record]]
 """Filter that passes records on when they are due."""
 
 
-def replay_log(log: Path, cast: Cast, like: str, out: Path | None, as_json: bool, pacing: Pacing) -> int:
+def replay_log(log: Path, cast: Roles, like: str, out: Path | None, as_json: bool, pacing: Pacing) -> int:
     """Run a companion over ``log`` with the settings of scenario ``like``, report, and return 0.
 
     The report says what it would have sent. ``setpoints.csv``, ``replay.json`` and ``replay.png`` are written

@@ -17,7 +17,7 @@ from outrider.errors import InputError
 from outrider.replay.command import replay as reenacting
 from outrider.replay.log_command import Pacing, chasing, replay_log
 from outrider.replay.telemetry import Forwarder, paced
-from outrider.shadow.roles import Cast
+from outrider.shadow.roles import Roles
 from outrider.terminal.share_progress import share_progress
 
 _ASKED = "allowed: --list, --own ID, --target ID, --to ENDPOINT, or the directory of a run"
@@ -56,7 +56,7 @@ class Request(NamedTuple):
                 raise InputError(f"replay {self.log}: what for is not said; {_ASKED}")
             self._only("--to without --own", ("neighbours", "out"))
             return self._send()
-        cast = Cast(self.own, _systems(self.neighbours), self.target)
+        cast = Roles(self.own, _systems(self.neighbours), self.target)
         with self._paced() as pacing:
             return replay_log(self.log, cast, self.like, self.out, self.as_json, pacing)
 

@@ -16,7 +16,7 @@ from mavlink_bridge.wire.header import header
 from outrider.errors import InputError
 from outrider.resources import find
 from outrider.scenarios.scenario import Origin, RecordedTarget, Ring, Scenario
-from outrider.shadow.roles import Survey
+from outrider.shadow.roles import OwnRecords
 from outrider.simulation.preparation import Prepared
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
@@ -26,7 +26,7 @@ _ROOM = 20.0
 _LONGEST_S = 3600.0
 
 
-def prepared(log: Path, seen: Survey, target: int, like: str) -> Prepared:
+def prepared(log: Path, seen: OwnRecords, target: int, like: str) -> Prepared:
     """Return a flight of one vehicle around the recorded ``target``.
 
     It has the companion's settings of the scenario ``like`` and lasts from the first record of the log to the

@@ -15,7 +15,7 @@ from outrider.report.charts import charts, histogram
 from outrider.report.distances import encounters
 from outrider.report.events import Event, events
 from outrider.report.headline import Headline, headline
-from outrider.report.loss import Ledger, Losses
+from outrider.report.loss import LossComparison, Losses
 from outrider.report.page import MARK, page
 from outrider.report.reading import Watch, read
 from outrider.report.replay import document
@@ -27,7 +27,7 @@ from outrider.runs import whole_file
 NAME = "report.html"
 
 
-class Made(NamedTuple):
+class ReportPage(NamedTuple):
     """Report page, and the data on it."""
 
     text: str
@@ -59,9 +59,9 @@ def report(directory: Path, out: Path | None = None, as_json: bool = False) -> i
     return 0
 
 
-def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
+def make(directory: Path, watch: Watch = lambda _what, _share: None) -> ReportPage:
     """Return the page of a run without writing it. Raises InputError if the directory holds no run."""
-    counting, ahead = Ledger(), dict[int, float]()
+    counting, ahead = LossComparison(), dict[int, float]()
 
     def sift(log: Log, motions: Motions | None) -> Log:
         if motions is not None:
@@ -76,7 +76,7 @@ def make(directory: Path, watch: Watch = lambda _what, _share: None) -> Made:
     replay = None if motions is None else _replay(run, motions, lost, ahead, happened)
     said = headline(run, lost.share)
     text = page(_title(run), said, _parts(run, said, happened, lost), replay)
-    return Made(text, run, tuple(happened), lost)
+    return ReportPage(text, run, tuple(happened), lost)
 
 
 def _d_min(run: Run) -> float:
@@ -132,7 +132,7 @@ def write(path: Path, text: str) -> None:
     whole_file.write(path, text)
 
 
-def _document(path: Path, made: Made) -> dict[str, object]:
+def _document(path: Path, made: ReportPage) -> dict[str, object]:
     share = made.losses.share
     return {
         "report": str(path),

@@ -16,7 +16,7 @@ _PIECE = 50
 """A STATUSTEXT of this length continues in the next one."""
 
 
-class Saying(NamedTuple):
+class LogEvent(NamedTuple):
     """Event at ``time`` µs on the clock of the log.
 
     ``kind`` is armed, mode, text or refused; ``bad`` marks an event that needs attention.
@@ -28,13 +28,13 @@ class Saying(NamedTuple):
     bad: bool = False
 
 
-def sayings(log: Log) -> Iterator[Saying]:
+def sayings(log: Log) -> Iterator[LogEvent]:
     """Yield the events in the order of the log.
 
     The first heartbeat gives the initial state. A long STATUSTEXT that arrives in pieces is joined.
     """
     before: Heartbeat | None = None
-    text: Saying | None = None
+    text: LogEvent | None = None
     for time, said in log.utterances:
         if isinstance(said, StatusText):
             if text is not None and text.time == time:
@@ -52,7 +52,7 @@ def sayings(log: Log) -> Iterator[Saying]:
             text = None
         if isinstance(said, CommandAck):
             if said.result not in (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS):
-                yield Saying(time, "refused", f"{command(said.command)}: {_result(said.result)}", bad=True)
+                yield LogEvent(time, "refused", f"{command(said.command)}: {_result(said.result)}", bad=True)
         elif isinstance(said, Heartbeat):
             yield from _changes(time, before, said)
             before = said
@@ -71,19 +71,19 @@ def _result(number: int) -> str:
     return str(entry.name).removeprefix("MAV_RESULT_").lower() if entry is not None else f"result {number}"
 
 
-def _text(time: int, said: StatusText) -> Saying:
+def _text(time: int, said: StatusText) -> LogEvent:
     severity = min(said.severity, len(_SEVERITIES) - 1)
-    return Saying(
+    return LogEvent(
         time, "text", f"{_SEVERITIES[severity]}: {said.text}", bad=severity < mavlink.MAV_SEVERITY_WARNING
     )
 
 
-def _changes(time: int, before: Heartbeat | None, now: Heartbeat) -> Iterator[Saying]:
+def _changes(time: int, before: Heartbeat | None, now: Heartbeat) -> Iterator[LogEvent]:
     state = "armed" if is_armed(now) else "disarmed"
     if before is None:
-        yield Saying(time, "mode", f"{mode_of(now)}, {state}")
+        yield LogEvent(time, "mode", f"{mode_of(now)}, {state}")
         return
     if is_armed(before) != is_armed(now):
-        yield Saying(time, "armed", state)
+        yield LogEvent(time, "armed", state)
     if before.custom_mode != now.custom_mode:
-        yield Saying(time, "mode", f"{mode_of(before)} → {mode_of(now)}")
+        yield LogEvent(time, "mode", f"{mode_of(before)} → {mode_of(now)}")

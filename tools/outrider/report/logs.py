@@ -13,7 +13,7 @@ from mavlink_bridge.frames import ned_to_enu
 from mavlink_bridge.messages import CommandAck, Heartbeat, LocalPosition, Message, StatusText
 from mavlink_bridge.tlog.log import Record, TlogReport, read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.report.run import Log, Sender, Stream, Times, Utterance
+from outrider.report.run import EventMessage, Log, Sender, Stream, Times
 from outrider.runs import names
 
 SWARM = names.LINK_NUMBERS["swarm"]
@@ -81,7 +81,7 @@ class _Pass:
         self._codec = Codec(lambda identifier, system, _component: identifier in _DECODED and system == owner)
         self._moments = array("q")
         self._speeds = array("d")
-        self._utterances: list[Utterance] = []
+        self._utterances: list[EventMessage] = []
 
     def see(self, record: Record) -> None:
         """Process the next record."""
@@ -98,9 +98,9 @@ class _Pass:
                 self._received.setdefault(sender, _Growing()).add(time, sequence, record.frame)
             return
         for message in self._codec.feed(record.frame):
-            self._hear(time, message)
+            self._receive(time, message)
 
-    def _hear(self, time: int, message: Message) -> None:
+    def _receive(self, time: int, message: Message) -> None:
         """Store a message of the own vehicle outside the swarm link.
 
         The companion's answers to the operator have another component id than the autopilot; they are stored
@@ -112,9 +112,9 @@ class _Pass:
                 self._speeds.extend(message.velocity_ned)
         elif isinstance(message, Heartbeat):
             if message.source.component == mavlink.MAV_COMP_ID_AUTOPILOT1:
-                self._utterances.append(Utterance(time, message))
+                self._utterances.append(EventMessage(time, message))
         elif isinstance(message, CommandAck | StatusText):
-            self._utterances.append(Utterance(time, message))
+            self._utterances.append(EventMessage(time, message))
 
     def log(self, report: TlogReport) -> Log:
         """Return the log, with the reader's report on the file."""

@@ -24,7 +24,7 @@ _PAUSE = 2.0
 """Time (s) in which no sender sends 128 messages; after more, whole cycles of numbers may be missing."""
 
 
-class Way(NamedTuple):
+class LossRate(NamedTuple):
     """Loss from one sender to one receiver (system ids): of ``sent`` messages ``lost`` did not arrive.
 
     ``exact`` is true if the sender's own log was used, and false if its sequence numbers were. The other
@@ -54,7 +54,7 @@ class Losses(NamedTuple):
     over all exact pairs; NaN in seconds without a sent message.
     """
 
-    ways: tuple[Way, ...]
+    ways: tuple[LossRate, ...]
     since: int
     by_second: Array
 
@@ -65,7 +65,7 @@ class Losses(NamedTuple):
         return sum(way.lost for way in self.ways) / sent if sent else None
 
 
-class Ledger:
+class LossComparison:
     """Comparison of each sender's log with every receiver's log, as soon as both are available.
 
     The messages received from a sender are kept until then, or to the end for a sender without a log: in less
@@ -73,15 +73,15 @@ class Ledger:
     """
 
     def __init__(self) -> None:
-        self._logs: dict[int, _Party] = {}
+        self._logs: dict[int, _SenderLog] = {}
         self._waiting: dict[int, dict[int, list[Stream]]] = {}
-        self._ways: list[Way] = []
+        self._ways: list[LossRate] = []
         self._seconds = _Seconds()
 
     def take(self, log: Log, ahead: float | None = None) -> None:
         """Add the log of another owner; ``ahead`` is its clock's offset (s, ``clocks.offset``), if known."""
         ahead = 0.0 if ahead is None else ahead
-        new = _Party(log._replace(received={}), ahead, log.begin - 1e6 * min(0.0, ahead))
+        new = _SenderLog(log._replace(received={}), ahead, log.begin - 1e6 * min(0.0, ahead))
         waiting: dict[int, list[Stream]] = {}
         for sender, stream in log.received.items():
             waiting.setdefault(sender.system, []).append(stream)
@@ -99,17 +99,17 @@ class Ledger:
         self._ways.sort(key=lambda way: (way.sender, way.receiver))
         return Losses(tuple(self._ways), *self._seconds.shares())
 
-    def _compare(self, sender: _Party, receiver: _Party, streams: list[Stream]) -> None:
+    def _compare(self, sender: _SenderLog, receiver: _SenderLog, streams: list[Stream]) -> None:
         way, when, lost = _exact(sender.log, receiver.log, streams, receiver.goal)
         self._seconds.add(when * 1e-6 + sender.ahead, lost)
         self._keep(way)
 
-    def _keep(self, way: Way) -> None:
+    def _keep(self, way: LossRate) -> None:
         if way.sent:
             self._ways.append(way)
 
 
-class _Party(NamedTuple):
+class _SenderLog(NamedTuple):
     """``log`` without received messages, the offset ``ahead`` of its clock (s), and its goal event (µs)."""
 
     log: Log
@@ -146,7 +146,7 @@ class _Seconds:
 
 def _exact(
     sender: Log, receiver: Log, streams: list[Stream], goal: float
-) -> tuple[Way, Array, NDArray[np.bool_]]:
+) -> tuple[LossRate, Array, NDArray[np.bool_]]:
     """Compare both logs; ``goal`` is µs on the receiver's clock.
 
     The second and the third value are the times (n,) of sending, µs since the start of the sender's log, and
@@ -169,12 +169,12 @@ def _exact(
     came = np.array([received.get(kind, 0) for kind in kinds.tolist()], dtype=np.int64)
     lost = int(np.maximum(times_sent - came, 0).sum())
     silence, usual = _silences(stream.time[first], there[counted], goal)
-    found = Way(sender.owner, receiver.owner, int(counted.sum()), lost, True, silence, usual)
+    found = LossRate(sender.owner, receiver.owner, int(counted.sum()), lost, True, silence, usual)
     since = (ours.time - sender.begin)[counted].astype(np.float64)
     return found, since, ~arrived[counted]
 
 
-def _by_numbers(system: int, receiver: int, streams: list[Stream], goal: float) -> Way:
+def _by_numbers(system: int, receiver: int, streams: list[Stream], goal: float) -> LossRate:
     """Return the loss by the gaps in the sequence numbers of each component of ``system``."""
     sent = lost = 0
     for stream in streams:
@@ -184,7 +184,7 @@ def _by_numbers(system: int, receiver: int, streams: list[Stream], goal: float) 
             sent, lost = sent + span, lost + span - len(places)
     times = _joined(streams).time
     silence, usual = _silences(times, times, goal)
-    return Way(system, receiver, sent, lost, False, silence, usual)
+    return LossRate(system, receiver, sent, lost, False, silence, usual)
 
 
 def unwrapped(stream: Stream) -> Times:

@@ -82,7 +82,7 @@ class Stream(NamedTuple):
     mark: Times
 
 
-class Utterance(NamedTuple):
+class EventMessage(NamedTuple):
     """Message that may become an event, at ``time`` µs on the clock of the log."""
 
     time: int
@@ -104,7 +104,7 @@ class Log(NamedTuple):
     received: dict[Sender, Stream]
     moments: Times
     speeds: Array
-    utterances: tuple[Utterance, ...]
+    utterances: tuple[EventMessage, ...]
     report: TlogReport
 
 

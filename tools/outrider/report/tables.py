@@ -8,7 +8,7 @@ from html import escape
 from outrider.report.events import Event
 from outrider.report.glossary import HIDDEN, TERMS, Term
 from outrider.report.headline import Fact
-from outrider.report.loss import Losses, Way
+from outrider.report.loss import Losses, LossRate
 from outrider.report.run import Gap
 
 MOST_EVENTS = 2000
@@ -83,7 +83,7 @@ def loss_tables(losses: Losses) -> str:
     return f"<div class=matrices>{shares}{silences}</div>{note}"
 
 
-def _matrix(ways: Mapping[tuple[int, int], Way], title: str, cell: Callable[[Way], str]) -> str:
+def _matrix(ways: Mapping[tuple[int, int], LossRate], title: str, cell: Callable[[LossRate], str]) -> str:
     senders = sorted({sender for sender, _ in ways})
     receivers = sorted({receiver for _, receiver in ways})
     head = "".join(f"<th scope=col>{receiver}</th>" for receiver in receivers)
@@ -101,13 +101,13 @@ def _matrix(ways: Mapping[tuple[int, int], Way], title: str, cell: Callable[[Way
     )
 
 
-def _share_cell(way: Way) -> str:
+def _share_cell(way: LossRate) -> str:
     about = "" if way.exact else "≈"
     sent = f"{way.sender} to {way.receiver}: {about}{way.lost} of {way.sent} messages did not arrive"
     return _cell(f"{about}{100.0 * way.share:.1f}", _level(way.share, _LEVELS), sent)
 
 
-def _silence_cell(way: Way) -> str:
+def _silence_cell(way: LossRate) -> str:
     if way.silence is None:
         return _cell("–", 0, f"{way.sender} to {way.receiver}: nothing was heard")
     usual = "" if way.usual is None else f"; 95 % of the messages came within {way.usual:.2f} s of the last"

@@ -10,16 +10,16 @@ from outrider.scenarios.faults import ClockFault, FaultPart
 from outrider.scenarios.links import PartitionPart
 
 
-class _What(NamedTuple):
+class _Cause(NamedTuple):
     kind: str
     systems: tuple[int, ...]
 
 
-class _Spell(NamedTuple):
+class _Period(NamedTuple):
     """Period in which ``what`` happens, from ``begin`` until before ``end`` (s); ``name`` as in the file."""
 
     name: str
-    what: _What
+    what: _Cause
     begin: float
     end: float
 
@@ -33,14 +33,14 @@ def overlaps(faults: Sequence[FaultPart], partitions: Sequence[PartitionPart]) -
     """
     spells = []
     for index, fault in enumerate(faults):
-        name, what = f"faults[{index}]", _What(fault.kind, (fault.vehicle,))
+        name, what = f"faults[{index}]", _Cause(fault.kind, (fault.vehicle,))
         if isinstance(fault, ClockFault):
-            spells.append(_Spell(name, what, 0.0, float("inf")))
+            spells.append(_Period(name, what, 0.0, float("inf")))
         elif (lasts := getattr(fault, "for_s", None)) is not None:
-            spells.append(_Spell(name, what, fault.at_s, fault.at_s + lasts))
+            spells.append(_Period(name, what, fault.at_s, fault.at_s + lasts))
     for index, cut in enumerate(partitions):
-        what = _What("partition", tuple(sorted(set(cut.members))))
-        spells.append(_Spell(f"partitions[{index}]", what, cut.at_s, cut.at_s + cut.for_s))
+        what = _Cause("partition", tuple(sorted(set(cut.members))))
+        spells.append(_Period(f"partitions[{index}]", what, cut.at_s, cut.at_s + cut.for_s))
     for one, other in combinations(spells, 2):
         if one.what == other.what and max(one.begin, other.begin) < min(one.end, other.end):
             systems = ", ".join(map(str, one.what.systems))

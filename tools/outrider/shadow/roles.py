@@ -40,7 +40,7 @@ class Part(Enum):
 
 
 @dataclass(frozen=True)
-class Cast:
+class Roles:
     """System ids of the roles; ``neighbours`` None: all others that report their position."""
 
     own: int
@@ -62,7 +62,7 @@ class Cast:
         return Part.NOTHING
 
 
-class Survey(NamedTuple):
+class OwnRecords(NamedTuple):
     """Result of a first pass over the own vehicle's records.
 
     ``place``: its first position (°, °, m above mean sea level); ``above_home``: the height of that above its
@@ -93,7 +93,7 @@ class Survey(NamedTuple):
         return FleetFrame(latitude, longitude, altitude - self.above_home)
 
 
-def survey(records: Iterable[Record], own: int, name: str) -> Survey:
+def survey(records: Iterable[Record], own: int, name: str) -> OwnRecords:
     """Examine all ``records`` of the log ``name``.
 
     Raises InputError if the vehicle ``own`` is not in it or does not report its position.
@@ -144,7 +144,7 @@ def survey(records: Iterable[Record], own: int, name: str) -> Survey:
         )
     if origin is None and pair is not None:
         origin = _origin(*pair)
-    return Survey(
+    return OwnRecords(
         (place.latitude, place.longitude, place.altitude),
         place.relative_altitude,
         origin,
@@ -175,7 +175,7 @@ def _origin(place: GlobalPosition, local: LocalPosition) -> tuple[float, float, 
     return here.to_geodetic((-east, -north, down))
 
 
-def check(log: Path, cast: Cast, seen: Survey) -> None:
+def check(log: Path, cast: Roles, seen: OwnRecords) -> None:
     """Raise InputError for a selected system that is the own vehicle or never reports its position."""
     asked = {"--target": () if cast.target is None else (cast.target,), "--neighbours": cast.neighbours or ()}
     allowed = ", ".join(map(str, sorted(seen.placed - {cast.own}))) or "nobody"

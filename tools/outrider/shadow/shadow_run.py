@@ -27,7 +27,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import header
 from outrider.logs.timeline import IDLE, on_one_line
 from outrider.scenarios.part import TARGET_SYSTEM
-from outrider.shadow.roles import Cast, Part, Survey
+from outrider.shadow.roles import OwnRecords, Part, Roles
 from outrider.simulation.beacon import Beacon
 from outrider.simulation.paths import Motion
 from outrider.supervision.supervised_node import SupervisedNode
@@ -60,8 +60,8 @@ class ShadowRun:
 
 def shadow_flight(
     config: CompanionConfig,
-    cast: Cast,
-    seen: Survey,
+    cast: Roles,
+    seen: OwnRecords,
     records: Iterable[Record],
     on_step: Callable[[int, int], None] = lambda _now, _records: None,
     fleet: FleetFrame | None = None,
@@ -83,7 +83,7 @@ def shadow_flight(
     companion = ShadowCompanion(config, cast.own, target, fleet, lambda: 0)
     standing = None if cast.target is not None else Beacon(system, "target", _RATE_HZ, fleet)
     here = fleet.to_enu(*seen.place) * (1.0, 1.0, 0.0)
-    found, reader, stand_in = ShadowRun(), Codec(), _StandIn(cast.own, seen, fleet)
+    found, reader, stand_in = ShadowRun(), Codec(), _Substitute(cast.own, seen, fleet)
     wall = SimulatedClock(seen.begin)
     followed = FollowedClock(wall, seen.begin) if follow else None
     supervised = SupervisedNode(companion, wall, followed, None)
@@ -128,7 +128,9 @@ def steps(records: Iterable[Record]) -> Iterator[tuple[int, list[Record]]]:
         yield now, batch
 
 
-def _given(part: Part, record: Record, reader: Codec, found: ShadowRun, stand_in: _StandIn) -> list[Datagram]:
+def _given(
+    part: Part, record: Record, reader: Codec, found: ShadowRun, stand_in: _Substitute
+) -> list[Datagram]:
     """Return the datagrams that the companion receives for a record.
 
     Set-points from other senders and the vehicle's positions are collected in ``found``.
@@ -152,13 +154,13 @@ def _given(part: Part, record: Record, reader: Codec, found: ShadowRun, stand_in
     return given
 
 
-class _StandIn:
+class _Substitute:
     """Substitute for messages of the own autopilot that the log lacks.
 
     It adds the origin, once, and local positions, derived from the global ones.
     """
 
-    def __init__(self, own: int, seen: Survey, fleet: FleetFrame) -> None:
+    def __init__(self, own: int, seen: OwnRecords, fleet: FleetFrame) -> None:
         self.own = Source(own, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._local = None if seen.local else fleet
         self._codec = Codec()

@@ -45,7 +45,7 @@ class Stage(Enum):
     DONE = "done"
 
 
-class Sight(NamedTuple):
+class Observation(NamedTuple):
     """Observed state at ``now`` (µs).
 
     True positions and velocities (K, 3), the target's position or None, ENU; ``ready``: whether all
@@ -121,7 +121,7 @@ class Conductor:
         """Distance (m) from its place within which a vehicle has arrived."""
         return max(NEAR, _SIGMAS * PROFILES[self._scenario.sensors].deviation)
 
-    def see(self, sight: Sight) -> bool:
+    def see(self, sight: Observation) -> bool:
         """Advance to the next stage if it is time; return True when the flight is over."""
         if self.stage is Stage.PREPARE:
             self._prepare(sight)
@@ -144,7 +144,7 @@ class Conductor:
                 self.clock_end = now
             self._land(now)
 
-    def errors(self, sight: Sight) -> Array:
+    def errors(self, sight: Observation) -> Array:
         """Return the distance (vehicles,) in m of each vehicle with the task from its place.
 
         The place is its goal, or its surface around the target. The distances are NaN without a target.
@@ -156,7 +156,7 @@ class Conductor:
             return np.full(len(positions), np.nan)
         return standoff(self._scenario, positions, sight.target)
 
-    def _prepare(self, sight: Sight) -> None:
+    def _prepare(self, sight: Observation) -> None:
         now, still = sight.now, _RESTLESS[self._scenario.sensors]
         if self._scenario.weather.w20 > 0.0:
             still = _TOSSED
@@ -177,7 +177,7 @@ class Conductor:
             for system, goal in zip(self._scenario.systems, self._starts.goals, strict=False):
                 self._operator.goal(system, goal)
 
-    def _count(self, sight: Sight) -> None:
+    def _count(self, sight: Observation) -> None:
         now = sight.now
         since = now - (self.clock_start or 0)
         while self._intruders and self._intruders[0].after <= since:

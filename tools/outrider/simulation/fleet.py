@@ -28,7 +28,7 @@ from outrider.scenarios.streams import Stream, stream
 from outrider.simulation.bystander import Bystander
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.operator import Operator
-from outrider.simulation.targets import Recorded, Standing, Target, Walking
+from outrider.simulation.targets import Recorded, StandingTarget, Target, Walking
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
 from sitl.vehicle.config import VehicleConfig
@@ -91,7 +91,7 @@ class Fleet:
         """Return the target's node."""
         config = self.scenario.target
         if isinstance(config, FixedTarget):
-            return Standing(config, self.frame)
+            return StandingTarget(config, self.frame)
         if isinstance(config, PathTarget):
             return Walking(config, self.frame)
         return Recorded(config, self._logs / config.log, self.frame)

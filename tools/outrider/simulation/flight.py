@@ -25,7 +25,7 @@ from outrider.runs.recorder import Recorder
 from outrider.scenarios.faults import Vanish
 from outrider.scenarios.links import PartitionPart
 from outrider.scenarios.scenario import Scenario
-from outrider.simulation.conductor import Conductor, Sight, Stage
+from outrider.simulation.conductor import Conductor, Observation, Stage
 from outrider.simulation.disturbances import Event, events, strike_autopilot, strike_computer
 from outrider.simulation.fleet import Fleet
 from outrider.simulation.truth_observer import TruthObserver
@@ -156,7 +156,7 @@ class Flight:
         for autopilot in self.autopilots:
             autopilot.begin(now)
 
-    def _sight(self, now: int) -> Sight:
+    def _sight(self, now: int) -> Observation:
         positions, velocities, target = self.truth.latest()
         waiting = [
             f"{c.name} waits for {c.pilot.waiting_for}" + (f" ({c.pilot.said})" if c.pilot.said else "")
@@ -166,7 +166,7 @@ class Flight:
         armed = any(
             a.armed for s, a in zip(self.systems, self.autopilots, strict=True) if s not in self._vanished
         )
-        return Sight(now, positions, velocities, target, not waiting, tuple(waiting), armed)
+        return Observation(now, positions, velocities, target, not waiting, tuple(waiting), armed)
 
     def _strike(self, event: Event, computers: _Computers) -> None:
         strike_computer(event, computers)

@@ -63,7 +63,7 @@ class Target(Placed, Protocol):
         ...
 
 
-class Standing:
+class StandingTarget:
     """Target at one place; it jumps to others at the goal event and later, if configured."""
 
     name = "target"

@@ -56,7 +56,7 @@ class Screen:
     ) -> None:
         self._asked, self._places, self._board = asked, places, board
         self._console = console
-        self._chronicle = EventFeed(asked, board)
+        self._event_feed = EventFeed(asked, board)
         self._events: deque[str] = deque(maxlen=_EVENTS)
         self._counts: deque[tuple[float, list[tuple[int, int]]]] = deque(maxlen=_WINDOW)
         self._paces: deque[list[Pace]] = deque(maxlen=_LATELY)
@@ -66,7 +66,7 @@ class Screen:
 
     def look(self) -> None:
         """Draw the current state, at most twice a second."""
-        self._events.extend(self._chronicle.look())
+        self._events.extend(self._event_feed.look())
         now = time.monotonic()
         if now - self._drawn >= _REFRESH:
             self._drawn = now

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from companion.dry_run import DryRun
-from companion.flight.hold_on_exit import LastWord
+from companion.flight.hold_on_exit import HoldOnExit
 from companion.node import Companion
 from companion.telemetry.status_text import Severity
 from companion.values.phase import STEERED, Phase
@@ -50,7 +50,7 @@ class SupervisedNode:
         duplicates: DuplicateIds | None = None,
     ) -> None:
         self.companion = companion
-        self.last: LastWord | None = None
+        self.last: HoldOnExit | None = None
         self._wall, self._followed, self._signing = wall, followed, signing
         self._duplicates = None if isinstance(companion, DryRun) else duplicates
         self._gate = TakeoffInhibit(companion.system, signing)
@@ -79,7 +79,9 @@ class SupervisedNode:
         if self.last is None:
             pilot = self.companion.pilot
             ours = pilot.phase in OURS and not isinstance(self.companion, DryRun)
-            self.last = LastWord(self.companion.system, pilot.vehicle.heartbeat, self._signing, steered=ours)
+            self.last = HoldOnExit(
+                self.companion.system, pilot.vehicle.heartbeat, self._signing, steered=ours
+            )
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Step the companion, or the hold on exit after ``give_up``."""

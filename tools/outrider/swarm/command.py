@@ -23,7 +23,7 @@ from outrider.simulation.flight import Flight, Progress
 from outrider.simulation.preparation import Prepared
 
 if TYPE_CHECKING:
-    from outrider.swarm.show import Show
+    from outrider.swarm.show import FlightView
 
 __all__ = [
     "LOCK_STEP",
@@ -52,7 +52,7 @@ def fly(
     directory: Path,
     progress: Progress,
     pace: Pace = LOCK_STEP,
-    show: Show | None = None,
+    show: FlightView | None = None,
 ) -> dict[str, Value]:
     """Fly the scenario, and return the summary.
 
@@ -81,7 +81,7 @@ def fly(
 
 
 def _flown(
-    prepared: Prepared, seed: int, progress: Progress, directory: Path, show: Show | None
+    prepared: Prepared, seed: int, progress: Progress, directory: Path, show: FlightView | None
 ) -> tuple[Outcome, Cost]:
     wall, cpu = time.perf_counter(), time.process_time()
     flight = Flight(
@@ -97,7 +97,7 @@ def _flown(
 
 
 def _flown_in_real_time(
-    prepared: Prepared, seed: int, progress: Progress, directory: Path, pace: Pace, show: Show | None
+    prepared: Prepared, seed: int, progress: Progress, directory: Path, pace: Pace, show: FlightView | None
 ) -> tuple[Outcome, Cost]:
     from outrider.realtime.flight import RealTimeFlight
 

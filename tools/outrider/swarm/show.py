@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _CHANGES: frozenset[Lever] = frozenset({"methods", "loss", "target"})
 
 
-class Show:
+class FlightView:
     """View of one flight by ``viewer``.
 
     ``watched``: whether a user is at a terminal; then a lock-step flight runs in real time from the
@@ -61,11 +61,11 @@ class Show:
 
 
 @contextmanager
-def showing() -> Iterator[Show]:
+def showing() -> Iterator[FlightView]:
     """Open a view on this machine, and close it afterwards; raise InputError if that is impossible."""
     viewer = ViewerClient()
     try:
         sys.stderr.write(f"{viewer.url} shows the flight\n")
-        yield Show(viewer, sys.stderr.isatty() and sys.stdin.isatty())
+        yield FlightView(viewer, sys.stderr.isatty() and sys.stdin.isatty())
     finally:
         viewer.close()

@@ -104,7 +104,7 @@ class Cluster:
             for site in self._sites.values():
                 while backlog and site.free:
                     self._begin(site, backlog.take())
-            self._hear(backlog, ended)
+            self._receive(backlog, ended)
             tick()
 
     def _look(self, backlog: Backlog, ended: Ended) -> None:
@@ -163,7 +163,7 @@ class Cluster:
         self._flights[future.key] = _Flight(task, site, future, time.monotonic())
         future.add_done_callback(self._answers.put)
 
-    def _hear(self, backlog: Backlog, ended: Ended) -> None:
+    def _receive(self, backlog: Backlog, ended: Ended) -> None:
         """Process the answers that have arrived; wait for a while if there are none."""
         wait = _TICK_S
         with suppress(Empty):

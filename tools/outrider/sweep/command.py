@@ -23,7 +23,7 @@ from outrider.sweep.flying import RUN
 from outrider.sweep.grid import Sweep
 from outrider.sweep.journal import Journal, opened
 from outrider.sweep.pool import Pool
-from outrider.sweep.progress import Watch, duration, watching
+from outrider.sweep.progress import ResultCounter, duration, watching
 from outrider.sweep.report import CellReport, cell_report, document, exit_status
 from outrider.sweep.runs import Run, run_of
 from outrider.sweep.table import show
@@ -127,7 +127,7 @@ def _again(
     return shlex.join(words)
 
 
-def _name_losses(watch: Watch, labels: dict[str, str]) -> None:
+def _name_losses(watch: ResultCounter, labels: dict[str, str]) -> None:
     for entry in watch.lost:
         sys.stderr.write(f"lost: {labels[entry.key]}, seed {entry.seed}: {entry.what}\n")
 
@@ -135,7 +135,7 @@ def _name_losses(watch: Watch, labels: dict[str, str]) -> None:
 class _Effort:
     """Effort of this attempt; it is not part of the result."""
 
-    def __init__(self, flown: Sequence[Task], watch: Watch, wall_s: float) -> None:
+    def __init__(self, flown: Sequence[Task], watch: ResultCounter, wall_s: float) -> None:
         self.flown, self.lost, self.wall_s = len(flown), watch.lost, wall_s
 
     def document(self, labels: dict[str, str]) -> dict[str, Any]:

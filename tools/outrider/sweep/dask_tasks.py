@@ -25,7 +25,7 @@ ME = uuid4().hex
 """Identity of this worker process; it changes with a restart, even at the same address."""
 
 
-class Crew:
+class WorkerProcesses:
     """Processes of a Dask worker, by sweep."""
 
     def __init__(self) -> None:
@@ -84,7 +84,7 @@ class Crew:
         self._all.get(sweep, set()).discard(process)
 
 
-CREW = Crew()
+CREW = WorkerProcesses()
 
 
 def introduce() -> dict[str, Any]:
@@ -113,7 +113,7 @@ def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> di
             process.receive()
         if process.ready and not process.dead:
             break
-        what = process.cannot or process.bury(wall_limit_s)
+        what = process.cannot or process.terminate(wall_limit_s)
         process.end()
         CREW.forget(sweep, process)
     else:
@@ -125,7 +125,7 @@ def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> di
     while (entry := process.take_entry()) is None:
         if process.dead or process.overdue(wall_limit_s):
             CREW.forget(sweep, process)
-            return {"entry": process.lost(task, process.bury(wall_limit_s))._asdict()}
+            return {"entry": process.lost(task, process.terminate(wall_limit_s))._asdict()}
         if output.poll(1e3 * min(_TICK_S, wall_limit_s)):
             process.receive()
     process.task = None

@@ -24,7 +24,7 @@ _LEAST_RADIUS = 4.0
 """Least radius (m) of the circle around an escorted target; the radius grows with the number of vehicles."""
 
 
-class Dials(NamedTuple):
+class SceneParameters(NamedTuple):
     """Parameters of a scene at its difficulty, for a number of vehicles.
 
     They are the half width of the square in which the vehicles start (m), the speed (m/s), numbers of
@@ -45,7 +45,7 @@ def vehicles(scene: Scene, seed: int) -> int:
     return int(stream(seed, Stream.SCENE_FLEET).integers(scene.vehicles[0], scene.vehicles[1] + 1))
 
 
-def dials(scene: Scene, count: int, seed: int) -> Dials:
+def dials(scene: Scene, count: int, seed: int) -> SceneParameters:
     """Return every parameter at the scene's difficulty, for ``count`` vehicles.
 
     Obstacles that the scene gives by a total number are drawn by the seed.
@@ -65,7 +65,7 @@ def dials(scene: Scene, count: int, seed: int) -> Dials:
 
     density = at(scene.density.easy, scene.density.hard)
     jumps = scene.jumps
-    return Dials(
+    return SceneParameters(
         half=math.sqrt(100.0 * count / density) / 2.0,
         speed=round(at(scene.speed.easy, scene.speed.hard), 3),
         spheres=many(scene.spheres),

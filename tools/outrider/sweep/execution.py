@@ -8,7 +8,7 @@ from typing import Protocol
 
 from outrider.sweep.cells import Cell
 from outrider.sweep.journal import Header, Journal
-from outrider.sweep.progress import Watch
+from outrider.sweep.progress import ResultCounter
 from outrider.sweep.sources import versions
 from outrider.sweep.tasks import AbandonedError, Ended, Entry, Task
 
@@ -27,7 +27,7 @@ class Workers(Protocol):
         """
 
 
-def work(journal: Journal, waiting: Sequence[Task], watch: Watch, workers: Workers) -> str | None:
+def work(journal: Journal, waiting: Sequence[Task], watch: ResultCounter, workers: Workers) -> str | None:
     """Run the waiting tasks; return None, or the reason if it stopped before the end.
 
     It stops early if the user pressed Ctrl-C or no workers are left.

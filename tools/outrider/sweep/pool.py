@@ -31,7 +31,7 @@ class Pool:
         self._run, self._jobs, self._limit = run, jobs, wall_limit_s
         self._selector = selectors.DefaultSelector()
         self._workers: list[Process] = []
-        self._stillborn = 0
+        self._failed_starts = 0
 
     def __enter__(self) -> Pool:
         return self
@@ -58,9 +58,9 @@ class Pool:
             for _ in range(min(self._jobs - alive, len(backlog) + busy - alive)):
                 self._start()
             for key, _ in self._selector.select(self._next_limit()):
-                self._hear(key.data)
+                self._receive(key.data)
             for worker in list(self._workers):
-                entry = worker.take_entry() or self._buried(worker)
+                entry = worker.take_entry() or self._removed(worker)
                 if entry is not None:
                     task, worker.task = worker.task, None
                     if entry.status == "lost" and task is not None:
@@ -80,22 +80,22 @@ class Pool:
         ends = [w.since + self._limit - now for w in self._workers if w.task is not None]
         return max(0.0, min([_TICK_S, *ends]))
 
-    def _hear(self, worker: Process) -> None:
+    def _receive(self, worker: Process) -> None:
         worker.receive()
         if worker.cannot is not None:
             raise OutriderError(f"no worker can start: {worker.cannot}")
         if worker.ready:
-            self._stillborn = 0
+            self._failed_starts = 0
 
-    def _buried(self, worker: Process) -> Entry | None:
+    def _removed(self, worker: Process) -> Entry | None:
         """Remove the worker if it is dead or too slow, and return the entry of its run, if it had one."""
         if not worker.dead and not worker.overdue(self._limit):
             return None
         self._selector.unregister(worker.output)
         self._workers.remove(worker)
-        what = worker.bury(self._limit)
+        what = worker.terminate(self._limit)
         if not worker.ready:
-            self._stillborn += 1
-            if self._stillborn >= MOST_STARTS:
-                raise OutriderError(f"no worker can start: {self._stillborn} in a row ended; {what}")
+            self._failed_starts += 1
+            if self._failed_starts >= MOST_STARTS:
+                raise OutriderError(f"no worker can start: {self._failed_starts} in a row ended; {what}")
         return None if worker.task is None else worker.lost(worker.task, what)

@@ -91,7 +91,7 @@ class Process:
         """Return whether the run has taken longer than ``limit_s`` (s)."""
         return self.task is not None and time.monotonic() - self.since >= limit_s
 
-    def bury(self, limit_s: float) -> str:
+    def terminate(self, limit_s: float) -> str:
         """End the process and return why: it is dead, or slower than ``limit_s``."""
         dead, status = self.dead, self.end()
         return f"its worker {death(status)}" if dead else f"took longer than {limit_s:g} s of wall time"

@@ -14,7 +14,7 @@ from outrider.sweep.tasks import Entry
 from outrider.terminal.progress_lines import ProgressLines
 
 
-class Watch:
+class ResultCounter:
     """Counter and display of the runs' results. ``lost`` holds every loss of this attempt, retried or not."""
 
     def __init__(self, total: int, finished: int, bar: Progress | None) -> None:
@@ -59,11 +59,11 @@ class Watch:
 
 
 @contextmanager
-def watching(total: int, finished: int) -> Iterator[Watch]:
+def watching(total: int, finished: int) -> Iterator[ResultCounter]:
     """Provide a `Watch` over ``total`` runs, ``finished`` of which have ended already."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield Watch(total, finished, None)
+        yield ResultCounter(total, finished, None)
         return
     columns = (
         BarColumn(),
@@ -71,7 +71,7 @@ def watching(total: int, finished: int) -> Iterator[Watch]:
         TextColumn("{task.fields[words]}"),
     )
     with Progress(*columns, console=console, transient=True) as bar:
-        yield Watch(total, finished, bar)
+        yield ResultCounter(total, finished, bar)
 
 
 def duration(seconds: float) -> str:

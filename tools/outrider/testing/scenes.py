@@ -13,7 +13,7 @@ from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import InputError
 from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
-from outrider.shadow.roles import Cast, check, survey
+from outrider.shadow.roles import Roles, check, survey
 from outrider.shadow.shadow_run import shadow_flight
 from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
@@ -46,7 +46,7 @@ def replayed(
 ) -> Replayed:
     """Run a companion over ``log`` and return what it would have sent."""
     config = changed(like, {"companion": changes}).companion
-    cast = Cast(own, None if neighbours is None else frozenset(neighbours), target)
+    cast = Roles(own, None if neighbours is None else frozenset(neighbours), target)
     try:
         seen = survey(read_tlog(log), own, str(log))
     except LogError as error:

@@ -102,7 +102,7 @@ class Listener:
         for link, datagrams, codec in self._links:
             for data in link.receive():
                 for message in codec.feed(data, whole=datagrams):
-                    self._hear(wall, message)
+                    self._receive(wall, message)
         systems = tuple(sorted(system for system in self._received if system != self._target))
         if not systems or wall < self._next:
             return ()
@@ -120,7 +120,7 @@ class Listener:
     def command(self, commands: ViewCommands, sought: float | None) -> None:
         """Ignore view commands, because nothing is sent."""
 
-    def _hear(self, wall: float, message: Message) -> None:
+    def _receive(self, wall: float, message: Message) -> None:
         system, component = message.source
         if isinstance(message, GlobalPosition):
             self._place(wall, system, component, message)

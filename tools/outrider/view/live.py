@@ -34,7 +34,7 @@ class Landed(NamedTuple):
     directory: str
 
 
-class Live:
+class LiveSource:
     """``Source`` at one end of ``line``; after the flight it plays the run that the flight left."""
 
     def __init__(self, line: DatagramChannel, load: Callable[[Path], Player]) -> None:

@@ -10,7 +10,7 @@ import socket
 import sys
 
 from outrider.scene.datagram_channel import DatagramChannel
-from outrider.view.live import Live, Ready
+from outrider.view.live import LiveSource, Ready
 
 _GENTLE = 10
 """Nice value: flying processes have priority."""
@@ -35,7 +35,7 @@ def main(descriptor: int, host: str, port: int) -> None:
         line.send(pickle.dumps(Ready(error=f"{type(error).__name__}: {error}")))
         return
     line.send(pickle.dumps(Ready(page_server.url)))
-    page_server.run(Live(line, load), lambda: os.getppid() != parent)
+    page_server.run(LiveSource(line, load), lambda: os.getppid() != parent)
     # Threads of the server may still be sending to browsers: do not wait for them.
     os._exit(0)
 

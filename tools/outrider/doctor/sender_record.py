@@ -69,7 +69,7 @@ _CLOCKED = (Attitude, AttitudeQuaternion, GlobalPosition, LocalPosition, Positio
 """Messages whose time stamp is of the autopilot's one clock; RAW_IMU's, for example, is of a sensor's."""
 
 
-class Speaker:
+class SenderRecord:
     """Record of all that ``source`` has sent. Repeated frames are counted in ``repeated`` only.
 
     ``origins``: the different GPS_GLOBAL_ORIGINs in their order. ``pair``: the last global and local position

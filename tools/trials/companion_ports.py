@@ -1,4 +1,4 @@
-"""Hub that connects the companions: it forwards each message to all others, unless the link is cut."""
+"""Ports of the companions: each message is forwarded to all others, unless the link is cut."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _LONGEST: Final = 65536
 _BUFFER: Final = 1 << 20
 
 
-class Hub:
+class CompanionPorts:
     """UDP port for each of ``systems``; the last sender at a port is that vehicle's companion."""
 
     def __init__(self, systems: Sequence[int]) -> None:

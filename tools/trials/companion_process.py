@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO, Any
 
 
-class Wingman:
+class CompanionProcess:
     """Companion process of vehicle ``system``, with its files below ``directory``.
 
     ``events`` are those that ``look`` has read.

@@ -18,7 +18,7 @@ _LONGEST: Final = 65536
 _BUFFER: Final = 1 << 20
 
 
-class Ear(Protocol):
+class Receiver(Protocol):
     """Receiver for some vehicles, which can also send to them."""
 
     def receive(self) -> list[bytes]:
@@ -34,7 +34,7 @@ class Ear(Protocol):
         ...
 
 
-class LinkEar:
+class LinkReceiver:
     """Receiver at the endpoint of one vehicle."""
 
     def __init__(self, endpoint: str) -> None:
@@ -53,7 +53,7 @@ class LinkEar:
         self._link.close()
 
 
-class PortEar:
+class PortReceiver:
     """UDP port to which several vehicles send as to a ground station.
 
     Each vehicle is sent only messages addressed to it, because a PX4 forwards to its companion what it
@@ -110,21 +110,23 @@ class PortEar:
         self._port.close()
 
 
-def open_ears(told: dict[int, str]) -> dict[int, Ear]:
+def open_receivers(told: dict[int, str]) -> dict[int, Receiver]:
     """Open a receiver for each vehicle by its endpoint; vehicles with the same endpoint share one.
 
     Raises InputError if one cannot be opened; then none stays open.
     """
-    ears: dict[str, Ear] = {}
+    receivers: dict[str, Receiver] = {}
     try:
         for text in told.values():
-            if text not in ears:
+            if text not in receivers:
                 endpoint = parse_endpoint(text)
                 # With a peer the port is one vehicle's.
                 shared = isinstance(endpoint, UdpIn) and endpoint.peer is None
-                ears[text] = PortEar(endpoint) if shared and isinstance(endpoint, UdpIn) else LinkEar(text)
+                receivers[text] = (
+                    PortReceiver(endpoint) if shared and isinstance(endpoint, UdpIn) else LinkReceiver(text)
+                )
     except (InputError, LinkError) as error:
-        for ear in ears.values():
-            ear.close()
+        for receiver in receivers.values():
+            receiver.close()
         raise error if isinstance(error, InputError) else InputError(f"--autopilots: {error}") from None
-    return {system: ears[text] for system, text in told.items()}
+    return {system: receivers[text] for system, text in told.items()}
