@@ -6,7 +6,7 @@ import numpy as np
 
 from companion.config import CompanionConfig
 from companion.estimation.time_sync import RoundTrips
-from companion.flight.health_monitor import Change, HealthMonitor, Reaction, Situation
+from companion.flight.health_monitor import Change, HealthInputs, HealthMonitor, Reaction
 from companion.flight.state_machine import Pilot
 from companion.planning.avoidance import Avoidance
 from companion.telemetry.status_text import Severity, StatusReporter
@@ -91,10 +91,10 @@ class HealthChecks:
         self._reactions.follow(self._pilot)
         self._report_limits()
 
-    def _situation(self, now: int, view: View) -> Situation:
+    def _situation(self, now: int, view: View) -> HealthInputs:
         world, pilot, avoidance = self._world, self._pilot, self._avoidance
         world.neighbours.listen(now, view.own)
-        return Situation(
+        return HealthInputs(
             now,
             view,
             pilot.phase,

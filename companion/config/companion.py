@@ -13,7 +13,7 @@ from pydantic import ConfigDict, Field, model_validator
 from companion.config.certified import CertifiedConfig
 from companion.config.estimation import TrackConfig
 from companion.config.flight import GroundMessagesConfig, GuardConfig, RatesConfig, TrackingConfig
-from companion.config.formation import FormationConfig, Nearest
+from companion.config.formation import FormationConfig, Nearest, Spread
 from companion.config.obstacles import (
     Moving,
     MovingPost,
@@ -128,6 +128,11 @@ class CompanionConfig(Settings):
     guard: GuardConfig = GuardConfig()
     rates: RatesConfig = RatesConfig()
     ground_messages: GroundMessagesConfig = GroundMessagesConfig()
+
+    @property
+    def shares_surface(self) -> bool:
+        """Whether the vehicles spread on one surface."""
+        return isinstance(self.formation, Spread)
 
     def surface_of(self, system: int) -> Surface:
         """Return the surface of the vehicle with the id ``system``."""

@@ -38,7 +38,7 @@ class Concern(NamedTuple):
     severity: Severity = Severity.WARNING
 
 
-class Situation(NamedTuple):
+class HealthInputs(NamedTuple):
     """Inputs from which concerns are determined.
 
     ``late``: µs from the last step's due time to this step; ``neighbours``: age (µs) by system id;
@@ -99,7 +99,7 @@ class HealthMonitor:
         self._lost: deque[tuple[int, int]] = deque()
         self._target_seen = False
 
-    def look(self, s: Situation) -> list[Change]:
+    def look(self, s: HealthInputs) -> list[Change]:
         """Return the concerns that began or ended since the last call."""
         found = {concern.name: concern for concern in self._judge(s)}
         changes = [Change(concern, True) for name, concern in found.items() if name not in self.concerns]
@@ -118,7 +118,7 @@ class HealthMonitor:
 
     # Each of the following returns a concern, or None.
 
-    def _judge(self, s: Situation) -> list[Concern]:
+    def _judge(self, s: HealthInputs) -> list[Concern]:
         found = [
             self._own(s),
             self._positioning(s),
@@ -138,7 +138,7 @@ class HealthMonitor:
         ]
         return [concern for concern in found if concern is not None]
 
-    def _own(self, s: Situation) -> Concern | None:
+    def _own(self, s: HealthInputs) -> Concern | None:
         guard, age = self._config.guard, s.view.own_age
         if s.phase in _ON_THE_GROUND or age <= guard.own_stale_us:
             return None
@@ -146,13 +146,13 @@ class HealthMonitor:
         text = "Own position is lost: landing" if lost else "Own position is old: braking"
         return Concern(f"own state {lost}", text, Reaction.LAND if lost else Reaction.TELL)
 
-    def _positioning(self, s: Situation) -> Concern | None:
+    def _positioning(self, s: HealthInputs) -> Concern | None:
         trouble = s.vehicle.positioning.trouble
         if not trouble or s.phase in _ON_THE_GROUND:
             return None
         return Concern("positioning", f"{trouble}: dead reckoning", severity=Severity.CRITICAL)
 
-    def _target(self, s: Situation) -> Concern | None:
+    def _target(self, s: HealthInputs) -> Concern | None:
         if s.view.target is not None:
             self._target_seen = True
             return None
@@ -160,7 +160,7 @@ class HealthMonitor:
             return None
         return Concern("target", "Target lost: holding")
 
-    def _solver(self, s: Situation) -> Concern | None:
+    def _solver(self, s: HealthInputs) -> Concern | None:
         guard = self._config.guard
         if s.failing is None or s.now - s.failing <= guard.hold_us or s.phase in _ON_THE_GROUND:
             return None
@@ -168,7 +168,7 @@ class HealthMonitor:
         text = "No plan can be found: landing" if lost else "No plan can be found: braking"
         return Concern(f"solver {lost}", text, Reaction.LAND if lost else Reaction.TELL)
 
-    def _battery(self, s: Situation) -> Concern | None:
+    def _battery(self, s: HealthInputs) -> Concern | None:
         guard = self._config.guard
         left = None if s.vehicle.status is None else s.vehicle.status.battery_remaining
         if left is None or left >= guard.battery_low or s.phase in _ON_THE_GROUND:
@@ -179,7 +179,7 @@ class HealthMonitor:
             )
         return Concern("battery low", f"Battery {100 * left:.0f} %: coming back", Reaction.RETURN)
 
-    def _autopilot(self, s: Situation) -> Concern | None:
+    def _autopilot(self, s: HealthInputs) -> Concern | None:
         beat = s.vehicle.heartbeat
         if beat is None or s.phase in _ON_THE_GROUND:
             return None
@@ -194,7 +194,7 @@ class HealthMonitor:
             return Concern("failsafe", "Autopilot reports a failsafe")
         return None
 
-    def _tracking(self, s: Situation) -> Concern | None:
+    def _tracking(self, s: HealthInputs) -> Concern | None:
         alarm = self._config.tracking.alarm
         if alarm is None or s.phase in _ON_THE_GROUND:
             return None
@@ -204,13 +204,13 @@ class HealthMonitor:
             else None
         )
 
-    def _near(self, s: Situation) -> Concern | None:
+    def _near(self, s: HealthInputs) -> Concern | None:
         near = self._config.guard.near
         if near is None or s.nearest is None or s.phase in _ON_THE_GROUND or s.nearest[1] >= near:
             return None
         return Concern(f"near {s.nearest[0]}", f"Neighbour {s.nearest[0]} is near: slower")
 
-    def _fence(self, s: Situation) -> Concern | None:
+    def _fence(self, s: HealthInputs) -> Concern | None:
         guard, own = self._config.guard, s.view.own
         if own is None or s.phase in _ON_THE_GROUND:
             return None
@@ -222,16 +222,16 @@ class HealthMonitor:
         which = "too far from the origin" if far else "too high"
         return Concern("fence", f"Fence: {which}, coming back", Reaction.RETURN, Severity.CRITICAL)
 
-    def _lateness(self, s: Situation) -> Concern | None:
+    def _lateness(self, s: HealthInputs) -> Concern | None:
         late = self._late.after(s.now, s.late > self._config.guard.late_us)
         return Concern("lateness", "Deadlines are missed") if late else None
 
-    def _clock(self, s: Situation) -> Concern | None:
+    def _clock(self, s: HealthInputs) -> Concern | None:
         jumped = self._clock_set.after(s.now, s.clock_steps != self._clock_steps)
         self._clock_steps = s.clock_steps
         return Concern("clock", "The autopilot's clock has jumped") if jumped else None
 
-    def _slow_clock(self, s: Situation) -> Concern | None:
+    def _slow_clock(self, s: HealthInputs) -> Concern | None:
         """Return a concern if the clock loses time over some seconds; a single loss is only a stall."""
         lost = self._lost
         lost.append((s.now, s.clock_lost))
@@ -242,12 +242,12 @@ class HealthMonitor:
             return None
         return Concern("slow clock", "Autopilot's clock is slow: followed")
 
-    def _late_messages(self, s: Situation) -> Concern | None:
+    def _late_messages(self, s: HealthInputs) -> Concern | None:
         if not s.unanswered or s.phase in _ON_THE_GROUND:
             return None
         return Concern("late messages", "Autopilot is heard late: slow link or clock")
 
-    def _origin(self, s: Situation) -> Concern | None:
+    def _origin(self, s: HealthInputs) -> Concern | None:
         moved = self._origin_moved.after(s.now, s.moves != self._moves)
         self._moves = s.moves
         if not moved or s.phase in _ON_THE_GROUND:
@@ -258,7 +258,7 @@ class HealthMonitor:
             )
         return Concern("origin False", "The autopilot's origin has moved")
 
-    def _others(self, s: Situation) -> list[Concern]:
+    def _others(self, s: HealthInputs) -> list[Concern]:
         limit = self._config.guard.neighbour_lost_us
         lost = sorted(system for system, age in s.neighbours.items() if age > limit)
         return [Concern(f"{_NEIGHBOUR}{system}", f"Neighbour {system} is not heard") for system in lost]

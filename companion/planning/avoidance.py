@@ -34,7 +34,7 @@ class Tally(NamedTuple):
     plan_at: Sequence[int] = ()
 
 
-class Situation(NamedTuple):
+class AvoidanceInputs(NamedTuple):
     """Inputs of one step of avoidance.
 
     ``measured``: the own motion, its velocity clipped to the limits; ``stale``: whether it is too old to plan
@@ -122,7 +122,7 @@ class Avoidance(Protocol):
         """Discard the horizon and the state of tracking while set-points do not control the vehicle."""
         ...
 
-    def fly(self, now: int, situation: Situation) -> Array | None:
+    def fly(self, now: int, situation: AvoidanceInputs) -> Array | None:
         """Update the horizon at ``now`` (µs).
 
         Returns the own positions (N + 1, 3), m, of the next steps if a new yaw plan is due along them,

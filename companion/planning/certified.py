@@ -12,7 +12,7 @@ from companion.flight.guard import Holding
 from companion.flight.lowering import Lowered
 from companion.flight.state_machine import Pilot
 from companion.flight.tracking import Tracking
-from companion.planning.avoidance import Situation, Tally
+from companion.planning.avoidance import AvoidanceInputs, Tally
 from companion.planning.plan_times import PlanTimes
 from companion.values.horizon import Array, Horizon, Motion
 from companion.world import View, World
@@ -85,7 +85,7 @@ class CertifiedAvoidance:
         """Discard what is flown, because set-points do not steer the vehicle."""
         self.horizon = None
 
-    def fly(self, now: int, situation: Situation) -> Array | None:
+    def fly(self, now: int, situation: AvoidanceInputs) -> Array | None:
         """Bring the committed plan up to date.
 
         Returns its positions (N + 1, 3), m, of the next steps when the yaw is due, otherwise None.
@@ -123,7 +123,7 @@ class CertifiedAvoidance:
         """Return None: committed plans have messages of their own."""
         return None
 
-    def _replan(self, now: int, situation: Situation) -> None:
+    def _replan(self, now: int, situation: AvoidanceInputs) -> None:
         """Make the next epoch's plan, or extend the committed plan by one epoch."""
         flight, started = self._flight, self._times.stopwatch()
         aim = None if situation.stale else situation.aim()

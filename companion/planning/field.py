@@ -9,7 +9,6 @@ import numpy as np
 from companion.avoidance.field.plan_log import PlanLog
 from companion.avoidance.field.planner import Aim, Plan, Planner
 from companion.config import CompanionConfig
-from companion.config.formation import Spread
 from companion.config.planning import MethodName
 from companion.errors import CompanionError
 from companion.flight.guard import Guard, Holding
@@ -17,7 +16,7 @@ from companion.flight.lowering import Lowered
 from companion.flight.state_machine import Pilot
 from companion.flight.tracking import Tracking
 from companion.obstacles.neighbours import fading
-from companion.planning.avoidance import Situation, Tally
+from companion.planning.avoidance import AvoidanceInputs, Tally
 from companion.planning.plan_times import PlanTimes
 from companion.values.horizon import Array, Horizon, Motion, roll_out
 from companion.values.phase import Phase
@@ -44,7 +43,6 @@ class FieldAvoidance:
         self.log = PlanLog()
         """Log of all plans since the last ``shed``."""
         self._fading = fading(config)
-        self._shares_surface = isinstance(config.formation, Spread)
         self._plans = self._relaxed = 0
 
     @property
@@ -109,7 +107,7 @@ class FieldAvoidance:
         self.guard.rest()
         self.tracking.reset()
 
-    def fly(self, now: int, situation: Situation) -> Array | None:
+    def fly(self, now: int, situation: AvoidanceInputs) -> Array | None:
         """Make a plan if one is due; return its positions (N + 1, 3), m, from n = 1 on, otherwise None."""
         period = self._config.rates.replan_us
         if now < self.next_due:
@@ -152,7 +150,7 @@ class FieldAvoidance:
         if self.guard.horizon is not None:
             return self.guard.horizon
         rises = self._pilot.phase is Phase.PREPARE and self._pilot.vehicle.armed
-        if not self._shares_surface or not rises or view.own is None:
+        if not self._config.shares_surface or not rises or view.own is None:
             return None
         own, horizon = view.own, self._config.horizon
         velocity = clipped(own.velocity, np.array(self._pilot.planned_limits.v_max))
@@ -166,7 +164,7 @@ class FieldAvoidance:
             sent = horizon.at(now)._replace(acceleration=later)
             self.tracking.observe(now, sent, measured, loop)
 
-    def _replan(self, now: int, situation: Situation, aim: Aim) -> Array | None:
+    def _replan(self, now: int, situation: AvoidanceInputs, aim: Aim) -> Array | None:
         """Make a plan towards ``aim``; without a solution keep the old one."""
         horizon, config = self.guard.horizon, self._config.horizon
         state = self.guard.anchor(now, situation.measured)

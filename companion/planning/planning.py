@@ -8,13 +8,12 @@ import numpy as np
 
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
-from companion.config.formation import Spread
 from companion.errors import SurfaceError
 from companion.flight.lowering import Lowered
 from companion.flight.state_machine import Pilot
 from companion.goals.goals import Goals
 from companion.goals.heading import Heading, Yaw
-from companion.planning.avoidance import Avoidance, Situation
+from companion.planning.avoidance import Avoidance, AvoidanceInputs
 from companion.values.horizon import Array, Motion
 from companion.values.obstacles import Obstacles
 from companion.values.phase import Phase
@@ -43,7 +42,6 @@ class Planning:
         self._avoidance = avoidance
         self._heading = Heading(config.heading, config.horizon)
         self._frame: LocalFrame | None = None
-        self._shares_surface = isinstance(config.formation, Spread)
         self._lowered = pilot.limits.lowered
         self.fastest: Array = np.array(config.limits.v_max)
         """v_max (3,), m/s, as lowered by the autopilot's parameters."""
@@ -80,7 +78,7 @@ class Planning:
             self._goals.begin(measured.position)
             avoidance.begin(now, measured)
         aim = partial(self._aim, now, view, measured, cautious=cautious)
-        places = avoidance.fly(now, Situation(view, measured, stale, aim))
+        places = avoidance.fly(now, AvoidanceInputs(view, measured, stale, aim))
         if places is not None:
             self._face(now, view, places)
 
@@ -109,7 +107,7 @@ class Planning:
             here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
             obstacles = self._world.obstacles(now, view, here)
         try:
-            mates = self._world.neighbours.mates(now) if self._shares_surface else _NOBODY
+            mates = self._world.neighbours.mates(now) if self._config.shares_surface else _NOBODY
             below = self._world.neighbours.below if self._config.guard.return_step else 0
             aim = self._goals.aim(now, view, measured, obstacles, mates, below, cautious=cautious)
         except SurfaceError:

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.config import CompanionConfig
 from companion.estimation.tracks import State
 from companion.flight.guard import Holding
-from companion.flight.health_monitor import HealthMonitor, Reaction, Situation
+from companion.flight.health_monitor import HealthInputs, HealthMonitor, Reaction
 from companion.flight.vehicle import Vehicle
 from companion.values.phase import Phase
 from companion.world import View
@@ -46,7 +46,7 @@ def vehicle(*, battery=None, state=4, now=SECOND):
 
 def situation(**changes):
     view = View(HERE, 0.3, TARGET, LOCAL)
-    good = Situation(SECOND, view, Phase.ESCORT, vehicle(), Holding.FRESH, {12: 0}, None, 0, 0)
+    good = HealthInputs(SECOND, view, Phase.ESCORT, vehicle(), Holding.FRESH, {12: 0}, None, 0, 0)
     return good._replace(**changes)
 
 
