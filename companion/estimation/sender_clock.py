@@ -131,6 +131,7 @@ class SenderClock:
         "_least",
         "_line",
         "_newest",
+        "_outliers",
         "_pieces",
         "_rate",
         "_received",
@@ -138,7 +139,6 @@ class SenderClock:
         "_repeats",
         "_stamp",
         "_suspected",
-        "_suspects",
         "_timed",
         "_tolerance",
         "brief",
@@ -164,7 +164,7 @@ class SenderClock:
         self._begun = self._timed = False
         self._stamp = self._newest = 0
         self._repeats, self._repeated = 0, 0
-        self._suspects: list[_Outlier] = []
+        self._outliers: list[_Outlier] = []
         self._suspected = 0
         self._received = 0
         self._line = 0.0
@@ -184,11 +184,11 @@ class SenderClock:
         if not self._begun:
             return self._begin(_Outlier(received, stamp), received - stamp, 1)
         if self._base is None:
-            return self._suspect(_Outlier(received, stamp))
+            return self._outlier(_Outlier(received, stamp))
         lag = received - stamp
         expected = self._line + self._rate * max(received - self._received, 0)
         if stamp < self._newest - self._tolerance or lag < expected - self._tolerance:
-            return self._suspect(_Outlier(received, stamp))
+            return self._outlier(_Outlier(received, stamp))
         if stamp != self._stamp:
             self._stamp, self._repeats, self._repeated = stamp, 0, received
             if stamp > self._newest:
@@ -198,8 +198,8 @@ class SenderClock:
             if self._repeats >= _REPEATS and received - self._repeated >= _SECOND:
                 self._base = None
                 return self._by_arrival(received)
-        if self._suspects:
-            self._suspects.clear()
+        if self._outliers:
+            self._outliers.clear()
         self.support += 1
         self._lag = lag
         self._lately.append(lag)
@@ -268,7 +268,7 @@ class SenderClock:
         self._base = lag - self._delay - self.skew
         self._stamp = self._newest = stamp
         self._repeats, self._repeated = 0, received
-        self._suspects.clear()
+        self._outliers.clear()
         self._answered, self._lag = None, lag
         self._lately.clear()
         self._lately.append(lag)
@@ -278,13 +278,13 @@ class SenderClock:
         self.support = support
         return TrackTime(stamp + self._base, True)
 
-    def _suspect(self, new: _Outlier) -> TrackTime | None:
+    def _outlier(self, new: _Outlier) -> TrackTime | None:
         """Date a message off the line; return None if it cannot be dated.
 
         Enough such messages that agree define a new line. If they contradict each other for a second there is
         no line, and messages are dated by their arrival.
         """
-        suspects = self._suspects
+        suspects = self._outliers
         if not suspects:
             self._suspected = new.received
         elif new.stamp <= suspects[-1].stamp or abs(new.lag - suspects[-1].lag) > self._tolerance:

@@ -33,6 +33,8 @@ _HEAD_ON = 1.0
 """m; nearer to the path than this, the side is undefined: the vehicle evades to the aircraft's right."""
 _NEAR = 1e-6
 _EAST = np.array([1.0, 0.0])
+_MOVES = 1.0
+"""Least square (m²) of the length of a path that has a direction."""
 
 
 class _Aircraft(NamedTuple):
@@ -42,6 +44,39 @@ class _Aircraft(NamedTuple):
     place: Array
     velocity: Array
     half: float
+
+
+class _Path(NamedTuple):
+    """Path of an aircraft: it begins at ``begin`` (3,), m, and leads along ``way`` (3,), m.
+
+    ``half``: half of the range of heights (m) in which the aircraft may be.
+    """
+
+    begin: Array
+    way: Array
+    half: float
+
+    @property
+    def square(self) -> float:
+        """Square of the length seen from above, m²."""
+        return float(self.way[:2] @ self.way[:2])
+
+    def nearest(self, points: Array) -> Array:
+        """Return the path points (n, 3) that are nearest to ``points`` (n, 3), seen from above."""
+        off, square = points - self.begin, self.square
+        share = (
+            np.zeros(len(off)) if square < _MOVES else np.clip(off[:, :2] @ self.way[:2] / square, 0.0, 1.0)
+        )
+        nearest = self.begin + share[:, None] * self.way
+        nearest[:, 2] = np.clip(points[:, 2], nearest[:, 2] - self.half, nearest[:, 2] + self.half)
+        return np.asarray(nearest)
+
+    def across(self, side: Array) -> Array:
+        """Return a horizontal direction (2,) at a right angle to the path, on the ``side`` (3,), m, of it."""
+        if self.square < _MOVES:
+            return side[:2] if hypot(side[0], side[1]) > _NEAR else _EAST
+        left = np.array([-self.way[1], self.way[0]])
+        return left if left @ side[:2] >= 0.0 else -left
 
 
 class Traffic:
@@ -90,19 +125,20 @@ class Traffic:
         self._forget(now)
         room = self._config.radius + clearance
         for one in self._received.values():
-            there, beside = self._nearest(now, one, np.stack([goal, here]))
+            path = self._path(now, one)
+            there, beside = path.nearest(np.stack([goal, here]))
             off, own = goal - there, here - beside
-            if off @ off < room**2:
-                ways = (own, off) if own @ own < room**2 else (off, own)
-                # Never up or down: there may be ground below.
-                places = [
-                    np.append(there[:2] + way[:2] * (room / hypot(way[0], way[1])), goal[2])
-                    for way in (*ways, _EAST)
-                    if hypot(way[0], way[1]) > _NEAR
-                ]
-                # A way that is not at a right angle to the path may lead nearer to another point of it.
-                away = [hypot(*(place - self._nearest(now, one, place[None])[0])[:2]) for place in places]
-                goal = next((p for p, d in zip(places, away, strict=True) if d >= room - _NEAR), places[0])
+            if off @ off >= room**2:
+                continue
+            # Never up or down: there may be ground below. A direction that is not at a right angle to the
+            # path may lead nearer to another point of it; the last one is at a right angle.
+            for way in (own if own @ own < room**2 else off, path.across(here - there)):
+                size = hypot(way[0], way[1])
+                if size > _NEAR:
+                    place = np.append(there[:2] + way[:2] * (room / size), goal[2])
+                    if hypot(*(place - path.nearest(place[None])[0])[:2]) >= room - _NEAR:
+                        goal = place
+                        break
         return goal
 
     def _take(self, now: int, message: AdsbVehicle, place: Array, here: Array) -> bool:
@@ -141,20 +177,23 @@ class Traffic:
         del self._received[furthest]
         return True
 
-    def _nearest(self, now: int, one: _Aircraft, prediction: Array) -> Array:
-        """Return the path points (n, 3) that are nearest to ``prediction`` (n, 3), seen from above."""
+    def _path(self, now: int, one: _Aircraft) -> _Path:
+        """Return the path of an aircraft from ``now`` on."""
         begin = one.place + 1e-6 * (now - one.when) * one.velocity
-        way = 1e-6 * self._config.ahead_us * one.velocity
-        off = prediction - begin
-        square = float(way[:2] @ way[:2])
-        share = np.zeros(len(off)) if square < 1.0 else np.clip(off[:, :2] @ way[:2] / square, 0.0, 1.0)
-        nearest = begin + share[:, None] * way
-        nearest[:, 2] = np.clip(prediction[:, 2], nearest[:, 2] - one.half, nearest[:, 2] + one.half)
+        return _Path(begin, 1e-6 * self._config.ahead_us * one.velocity, one.half)
+
+    def _nearest(self, now: int, one: _Aircraft, prediction: Array) -> Array:
+        """Return the path points (n, 3) that are nearest to ``prediction`` (n, 3), seen from above.
+
+        A prediction on the path has a point beside it instead, to which the field has a direction.
+        """
+        path = self._path(now, one)
+        nearest = path.nearest(prediction)
         aside = prediction - nearest
         level = np.abs(aside[:, 2]) < _HEAD_ON
         head_on = level & (np.vecdot(aside[:, :2], aside[:, :2]) < _HEAD_ON**2)
-        if square >= 1.0 and head_on.any():
-            left = np.array([-way[1], way[0], 0.0]) / np.sqrt(square)
+        if path.square >= _MOVES and head_on.any():
+            left = np.array([-path.way[1], path.way[0], 0.0]) / np.sqrt(path.square)
             nearest[head_on] = prediction[head_on] + _HEAD_ON * left
         return nearest
 

@@ -99,8 +99,8 @@ def _readable(fileno: int | None) -> bool:
 class DemultiplexedLink:
     """One end of a ``Demultiplexer``: a ``Link``; if it is not read, the oldest data is dropped."""
 
-    def __init__(self, dealer: Demultiplexer, *, first: bool) -> None:
-        self._dealer, self._first = dealer, first
+    def __init__(self, demultiplexer: Demultiplexer, *, first: bool) -> None:
+        self._demultiplexer, self._first = demultiplexer, first
         self._waiting: deque[bytes] = deque()
         self._bytes = 0
         self._received = self._sent = 0
@@ -109,11 +109,11 @@ class DemultiplexedLink:
     @property
     def counters(self) -> LinkCounters:
         """Counts of this end; ``dropped`` is that of the physical link, for all its ends."""
-        return LinkCounters(self._received, self._sent, self._dealer.link.counters.dropped)
+        return LinkCounters(self._received, self._sent, self._demultiplexer.link.counters.dropped)
 
     def fileno(self) -> int | None:
         """Return that of the physical link for the first end, None for the others."""
-        return self._dealer.link.fileno() if self._first else None
+        return self._demultiplexer.link.fileno() if self._first else None
 
     def put(self, data: bytes) -> None:
         """Add some frames for this end."""
@@ -133,7 +133,7 @@ class DemultiplexedLink:
         """Return the frames that were distributed to this end."""
         if not self._open:
             return []
-        self._dealer.read()
+        self._demultiplexer.read()
         found = [self._waiting.popleft() for _ in range(min(len(self._waiting), BURST))]
         self._bytes -= sum(map(len, found))
         self._received += len(found)
@@ -143,11 +143,11 @@ class DemultiplexedLink:
         """Send ``data`` by the physical link."""
         if self._open:
             self._sent += 1
-            self._dealer.send(data)
+            self._demultiplexer.send(data)
 
     def close(self) -> None:
         """Close this end."""
         if self._open:
             self._open = False
             self.clear()
-            self._dealer.leave()
+            self._demultiplexer.leave()

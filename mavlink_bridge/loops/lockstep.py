@@ -43,7 +43,7 @@ class Scheduled(NamedTuple):
 class StepObserver(Protocol):
     """Observer of every step of a node and of every datagram that enters (``in``) or leaves (``out``) it.
 
-    A tap must not change anything.
+    An observer must not change anything.
     """
 
     def begin(self, now: int, node: str, /) -> None:

@@ -164,7 +164,7 @@ class Commander:
         if mode is Mode.MISSION:
             itinerary = self._autonomous_modes.itinerary
             status = status._replace(items=itinerary.total, takes_off=itinerary.takes_off)
-        if refusal := self._flavour.mode_denial(mode, status):
+        if refusal := self._flavour.mode_refusal(mode, status):
             return refusal
         self._switch(mode, now)
         if not self.armed or self._flavour.armable_mode(mode):

@@ -43,7 +43,7 @@ class Failsafes:
         self._battery = battery
         self._estimate = estimate
         self._status_text = status_text
-        self._worry = BatteryCondition(0)
+        self._battery_condition = BatteryCondition(0)
         self._worse_since: int | None = None
         self._breach = Breach.NONE
         self._breached_at = 0
@@ -67,8 +67,8 @@ class Failsafes:
         found = [] if self._commander.ready else ["no position yet"]
         if self._battery is not None and self._battery.charge.remaining <= 0.0:
             found.append("battery empty")
-        elif self._worry.level:
-            found.append(f"battery {self._worry.word}")
+        elif self._battery_condition.level:
+            found.append(f"battery {self._battery_condition.word}")
         if self._commander.ready and self._where() is not Breach.NONE:
             found.append(f"{_WORDS[self._where()]} of the fence")
         return found
@@ -100,15 +100,15 @@ class Failsafes:
         if charge.remaining <= 0.0 and commander.armed:
             commander.cut("Battery empty: motors stopped")
         condition = self._flavour.condition(charge)
-        if not commander.armed and condition.level < self._worry.level:
-            self._worry = condition
-        if condition.level <= self._worry.level:
+        if not commander.armed and condition.level < self._battery_condition.level:
+            self._battery_condition = condition
+        if condition.level <= self._battery_condition.level:
             self._worse_since = None
             return
         if self._worse_since is None:
             self._worse_since = now
         if now - self._worse_since >= self._flavour.battery_patience:
-            self._worry, self._worse_since = condition, None
+            self._battery_condition, self._worse_since = condition, None
             self._status_text.warn(
                 f"Battery {condition.word}: {charge.voltage:.1f} V, {100 * charge.remaining:.0f} %"
             )

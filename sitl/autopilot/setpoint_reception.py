@@ -74,13 +74,13 @@ class SetpointReception:
         """
         reading = self._read(message, here)
         if not isinstance(reading, Setpoint):
-            refusal = self._flavour.steering_denial(status)
+            refusal = self._flavour.steering_refusal(status)
             self._status_text.complain(refusal or reading.reason, now)
             if isinstance(reading, Stop) and refusal is None and self._guidance.activity is Activity.TRACK:
                 self._guidance.hold()
             return False
         self.stream = Stream(reading, now, self.stream.newest)
-        refusal = self._flavour.steering_denial(status)
+        refusal = self._flavour.steering_refusal(status)
         if refusal is None:
             self._follow(reading, here, now)
         elif refusal:

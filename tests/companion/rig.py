@@ -99,7 +99,7 @@ def scene(
     )
 
 
-class LoggedPlan(NamedTuple):
+class MadePlan(NamedTuple):
     """One plan of a flight: who made it, from which state, and what came out."""
 
     time: int
@@ -117,7 +117,7 @@ def fly(
     seconds: float,
     period: int = 100_000,
     still: int = 0,
-) -> Iterator[LoggedPlan]:
+) -> Iterator[MadePlan]:
     """Point masses that fly exactly what they plan and know each other's last horizons, from ``starts`` to
     ``goals`` (K, 3); the last ``still`` of them never move."""
     steps, dt = config.horizon.steps + 1, config.horizon.dt_us
@@ -144,7 +144,7 @@ def fly(
             aim = standing(goals[k], ZERO)
             plan = planners[k].plan(now, motion.position, motion.velocity, predictions[k], aim, seen)
             fresh.append(plan.horizon)
-            yield LoggedPlan(now, k, planners[k], motion.position, motion.velocity, plan)
+            yield MadePlan(now, k, planners[k], motion.position, motion.velocity, plan)
         horizons[: len(fresh)] = fresh
 
 

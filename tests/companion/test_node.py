@@ -168,13 +168,13 @@ def test_an_escort_takes_its_place_on_the_circle_and_faces_the_target():
 # Who may command
 
 
-class NonCooperativeVehicle:
+class OtherLinks:
     """Ways of not being entitled."""
 
     links = tuple(link for link in LINKS if link != "ground")
 
 
-@pytest.mark.parametrize("link", NonCooperativeVehicle.links)
+@pytest.mark.parametrize("link", OtherLinks.links)
 @pytest.mark.parametrize("command", [mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND])
 def test_a_command_by_another_link_is_not_obeyed(flying, link, command):
     sent = flying.fly(
@@ -203,7 +203,7 @@ def test_other_components_of_the_vehicle_have_no_say(flying, component):
 
 
 def test_no_go_by_another_link_starts_anything():
-    for link in NonCooperativeVehicle.links:
+    for link in OtherLinks.links:
         bench = Bench()
         order = CommandLong(GROUND, SYSTEM, 195, mavlink.MAV_CMD_NAV_TAKEOFF, 0, (0, 0, 0, 0, 0, 0, 5.0))
         assert commands(bench.fly(3.0, bench.datagram(link, order))) == []

@@ -1,4 +1,4 @@
-"""The nodes of an airfield. A ``NodeEnvironment`` is where a companion runs, and may be started anew; a
+"""The nodes of an airfield. A ``RestartableCompanion`` is where a companion runs, and may be started anew; a
 ``Radio`` is what its autopilot says and hears by, and may change both; the ``Wanderer`` is the target, the
 ``Tower`` the operator."""
 
@@ -87,7 +87,7 @@ class Radio:
         return b"".join(one if isinstance(one, bytes) else codec.encode(one) for one in passing)
 
 
-class NodeEnvironment:
+class RestartableCompanion:
     """A companion, a ``Node``; ``sent`` is told every set-point with its time."""
 
     def __init__(self, make: Callable[[], Companion], sent: Callable[[int, SetpointLocal], None]) -> None:

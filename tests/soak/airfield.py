@@ -35,8 +35,8 @@ from tests.soak.air_nodes import (
     SENSORS,
     TARGET,
     TICK,
-    NodeEnvironment,
     Radio,
+    RestartableCompanion,
     Tower,
     Wanderer,
 )
@@ -60,7 +60,7 @@ class Craft:
     system: int
     flavour: str
     radio: Radio
-    slot: NodeEnvironment
+    slot: RestartableCompanion
     pad: np.ndarray
     marks: dict[str, Any] = field(default_factory=dict)
 
@@ -135,7 +135,7 @@ class Airfield:
             ),
             self._signing,
         )
-        slot = NodeEnvironment(
+        slot = RestartableCompanion(
             lambda: Companion(self.config, system, TARGET, FLEET, lambda: 0, self._signing()),
             lambda now, message: sent(system, now, message),
         )

@@ -67,7 +67,7 @@ def recorded() -> tuple[bytes, ...]:
     return tuple(found)
 
 
-class NonCooperativeVehicle:
+class Attacker:
     """A ``Node`` on the swarm link and on every autopilot's. It hears, remembers and says. ``quiet``: only
     hears."""
 
@@ -180,7 +180,7 @@ class Siege:
         self.seconds, self._progress = seconds, progress
         self.signed, self._besieged = signed, besieged
         systems = range(FIRST, FIRST + count)
-        self.stranger = NonCooperativeVehicle(seed, systems)
+        self.stranger = Attacker(seed, systems)
         # An autopilot without a key obeys whoever speaks to it: that is not the companion's to prevent.
         self.field = Airfield(
             count,

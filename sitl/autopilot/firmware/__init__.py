@@ -172,7 +172,7 @@ class Firmware(Protocol):
         """Return the reason against arming now, or None."""
         ...
 
-    def mode_denial(self, mode: Mode, status: Status) -> CommandRefusal | None:
+    def mode_refusal(self, mode: Mode, status: Status) -> CommandRefusal | None:
         """Return the reason against entering ``mode`` now, or None."""
         ...
 
@@ -198,7 +198,7 @@ class Firmware(Protocol):
         """Interpret an attitude and a thrust."""
         ...
 
-    def steering_denial(self, status: Status) -> str | None:
+    def steering_refusal(self, status: Status) -> str | None:
         """Return the reason against following a good set-point now, or None.
 
         An empty text means that it is ignored without a complaint.

@@ -152,7 +152,7 @@ class ArduPilot:
         name = _NAMES.get(status.mode, status.mode.name)
         return None if self.armable_mode(status.mode) else f"{name} mode is not armable"
 
-    def mode_denial(self, mode: Mode, status: Status) -> CommandRefusal | None:
+    def mode_refusal(self, mode: Mode, status: Status) -> CommandRefusal | None:
         """Return the reason against entering ``mode`` now, or None."""
         if mode is Mode.STANDBY and status.armed and not status.landed:
             return CommandRefusal(mavlink.MAV_RESULT_FAILED, "STABILIZE in flight needs a pilot")
@@ -222,7 +222,7 @@ class ArduPilot:
         """Interpret an attitude, with its thrust as a climb rate."""
         return climbing(message, self._climb, self._sink)
 
-    def steering_denial(self, status: Status) -> str | None:
+    def steering_refusal(self, status: Status) -> str | None:
         """Return the reason against following a good set-point now, or None."""
         if status.mode is not Mode.GUIDED:
             return "Set-point ignored: not in GUIDED"

@@ -133,7 +133,7 @@ class Px4:
             return "no offboard signal"
         return None if self.armable_mode(status.mode) else f"{status.mode.name} mode is not armable"
 
-    def mode_denial(self, mode: Mode, status: Status) -> CommandRefusal | None:
+    def mode_refusal(self, mode: Mode, status: Status) -> CommandRefusal | None:
         """Return the reason against entering ``mode`` now, or None."""
         # Any mode can be chosen while disarmed; the stream is then checked at arming.
         if mode is Mode.GUIDED and status.armed and not _streaming(status):
@@ -208,7 +208,7 @@ class Px4:
         """Interpret an attitude and a thrust."""
         return thrusting(message)
 
-    def steering_denial(self, status: Status) -> str | None:
+    def steering_refusal(self, status: Status) -> str | None:
         """Return None to follow set-points now, or an empty text to ignore them without complaint."""
         return None if status.mode is Mode.GUIDED and status.armed else ""
 

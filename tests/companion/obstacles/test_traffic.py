@@ -200,27 +200,54 @@ def test_without_a_receiver_it_stays():
     assert flown("field", told=False)[0] < 4.5
 
 
+def off_path(point, place, course):
+    """The horizontal distance (m) of ``point`` from the path, and on which side of it the point is."""
+    way = 60.0 * 1e-6 * CONFIG.ahead_us * np.array([math.sin(course), math.cos(course)])
+    off = (point - place)[:2]
+    share = min(max(off @ way / (way @ way), 0.0), 1.0)
+    return np.linalg.norm(off - share * way), np.sign(way[0] * off[1] - way[1] * off[0])
+
+
+ON_THE_PATH = [
+    example(goal=np.array([0.0, 50.0, 0.0]), own=np.array([x, 50.0, 0.0]), place=ZERO, course=0.0, clear=1.0)
+    for x in (-20.0, 20.0)
+] + [
+    example(
+        goal=np.array([0.0, -50.0, 0.0]), own=np.array([x, -50.0, 0.0]), place=ZERO, course=math.pi, clear=1.5
+    )
+    for x in (-30.0, 30.0)
+]
+
+
 @LAWS
 @example(goal=np.zeros(3), own=np.array([1.0, 0, 0]), place=np.array([1.0, 0, 51]), course=0.0, clear=1.0)
 @example(goal=np.array([0, -25.0, 0]), own=np.zeros(3), place=np.array([1.0, 0, 0]), course=2.0, clear=1.0)
+@ON_THE_PATH[0]
+@ON_THE_PATH[1]
+@ON_THE_PATH[2]
+@ON_THE_PATH[3]
 @given(
     goal=vectors(60.0),
     own=vectors(60.0),
     place=vectors(200.0),
-    course=numbers(-3.0, 3.0),
+    course=numbers(-math.pi, math.pi),
     clear=numbers(0.5, 5),
 )
 def test_a_goal_is_moved_just_off_its_way_or_not_at_all(goal, own, place, course, clear):
+    """And not to the other side of it, if the vehicle is beside it."""
     traffic = received(place, course=course)
     moved, room = traffic.outside(START, goal, own, clear), CONFIG.radius + clear
-
-    def off(point):
-        return np.linalg.norm((point - around(traffic, point[None]).positions[0, 0])[:2])
-
-    assert off(moved) >= min(room, off(goal)) - 1e-6
+    before, _ = off_path(goal, place, course)
+    distance, side = off_path(moved, place, course)
     assert moved[2] == goal[2]
-    if np.linalg.norm(goal - around(traffic, goal[None]).positions[0, 0]) >= room:
+    if before >= room:
         np.testing.assert_array_equal(moved, goal)
+    if not np.array_equal(moved, goal):
+        assert distance == pytest.approx(room, abs=1e-4)
+        inside, own_side = off_path(own, place, course)
+        level = np.linalg.norm(own - around(traffic, own[None]).positions[0, 0]) < room - 1.0
+        if inside < room - 1e-3 and level and (own - place)[:2] @ [math.sin(course), math.cos(course)] > 0.0:
+            assert side == own_side or inside < 1e-3
 
 
 @LAWS

@@ -16,7 +16,7 @@ from tests.mavlink_bridge.link_pairs import HOST, frame, frames, gather
 
 
 class Listening:
-    """An ear that counts."""
+    """An observer that counts."""
 
     heard_frames = 0
 
@@ -32,16 +32,16 @@ def test_all_that_waits_is_forgotten(read: bool) -> None:
     """More than one read brings."""
     own, far = memory_pair()
     ear = Listening()
-    dealer = Demultiplexer(own, {"one": lambda _header: True, "other": lambda _header: True}, ear)
+    demultiplexer = Demultiplexer(own, {"one": lambda _header: True, "other": lambda _header: True}, ear)
     for k in range(3 * BURST):
         far.send(frame(k))
     if read:
-        dealer.ends["one"].receive()
+        demultiplexer.ends["one"].receive()
     received = ear.heard_frames
-    dealer.forget()
+    demultiplexer.forget()
     assert ear.heard_frames == received
     far.send(frame(7))
-    assert {name: end.receive() for name, end in dealer.ends.items()} == {
+    assert {name: end.receive() for name, end in demultiplexer.ends.items()} == {
         "one": [frame(7)],
         "other": [frame(7)],
     }
@@ -50,14 +50,14 @@ def test_all_that_waits_is_forgotten(read: bool) -> None:
 def test_who_has_called_and_spoken_before_anybody_read_is_forgotten_too() -> None:
     """Calls are answered one at a time, and long ago said is said long ago by whomever."""
     listener = TcpListener(TcpIn(HOST, 0), SimulatedClock())
-    dealer = Demultiplexer(listener, {"only": lambda _header: True})
+    demultiplexer = Demultiplexer(listener, {"only": lambda _header: True})
     callers = [socket.create_connection(listener.address[:2]) for _ in range(3)]
     for caller in callers:
         caller.sendall(b"".join(frame(k) for k in range(600)))
-    dealer.forget()
+    demultiplexer.forget()
     for number, caller in enumerate(callers):
         caller.sendall(frame(1000 + number))
-    end = dealer.ends["only"]
+    end = demultiplexer.ends["only"]
     found = gather(end, lambda found: len(frames(found)) >= len(callers))
     assert sorted(frames(found)) == [frame(1000 + k) for k in range(len(callers))]
     for caller in callers:

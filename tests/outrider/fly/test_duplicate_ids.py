@@ -46,8 +46,8 @@ class Air:
         self.clock = SimulatedClock(SECOND)
         self.duplicates = DuplicateIds(1, self.clock)
         own, self.far = memory_pair()
-        dealer = Demultiplexer(own, {"swarm": lambda _header: True}, self.duplicates)
-        self.end = dealer.ends["swarm"]
+        demultiplexer = Demultiplexer(own, {"swarm": lambda _header: True}, self.duplicates)
+        self.end = demultiplexer.ends["swarm"]
         self._codec, self._other = Codec(), Codec()
 
     def pass_by(self, seconds: float, source: Source | None = None) -> None:

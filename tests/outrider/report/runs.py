@@ -38,7 +38,7 @@ Lost = Callable[[int, int, int], bool]
 """Of the nth message from one system to another: whether it is lost."""
 
 
-class ReportPage(NamedTuple):
+class WrittenRun(NamedTuple):
     """Where the run lies; its times (T,) and positions (T, K, 3)."""
 
     directory: Path
@@ -56,7 +56,7 @@ def leave(
     text: str = "Armed",
     late: dict[int, int] | None = None,
     **summary: object,
-) -> ReportPage:
+) -> WrittenRun:
     """Vehicles on a circle, each at its own speed, for ``seconds`` after the goal event. ``late``: by how
     many µs a companion's clock is ahead; ``summary``: keys beside the usual ones."""
     directory.mkdir(parents=True, exist_ok=True)
@@ -91,7 +91,7 @@ def leave(
     np.savez_compressed(directory / "plan_times.npz", system=system, time_s=due, plan_ms=spent)
     if logs:
         _write_logs(directory, vehicles, seconds, lost, text, late or {})
-    return ReportPage(directory, time, position)
+    return WrittenRun(directory, time, position)
 
 
 def circle(time: np.ndarray, vehicles: int) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from outrider.report.command import report
-from tests.outrider.report.runs import ReportPage, leave
+from tests.outrider.report.runs import WrittenRun, leave
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None
@@ -38,7 +38,7 @@ Browse = Callable[..., str]
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> ReportPage:
+def made(tmp_path_factory: pytest.TempPathFactory) -> WrittenRun:
     """A run with its page; somebody tried to slip a program into its log."""
     made = leave(tmp_path_factory.mktemp("run"), text="<script>document.title='mine'</script>")
     report(made.directory)
@@ -84,14 +84,14 @@ def within(page: str, identifier: str) -> str:
     return unescape(found[1])
 
 
-def nearest(made: ReportPage, time: float) -> float:
+def nearest(made: WrittenRun, time: float) -> float:
     index = int(np.argmin(np.abs(made.time - time)))
     place = made.position[index]
     return min(float(np.linalg.norm(place[j] - place[k])) for j in range(len(place)) for k in range(j))
 
 
 @pytest.mark.parametrize("time", [0.0, 3.2, 9.96])
-def test_the_page_shows_the_flight_at_a_time(time: float, made: ReportPage, browse: Browse) -> None:
+def test_the_page_shows_the_flight_at_a_time(time: float, made: WrittenRun, browse: Browse) -> None:
     page = browse(made.directory / "report.html", f"#{time}")
     shown = within(page, "now")
     assert shown.startswith(f"{time:.2f} s · nearest {nearest(made, time):.2f} m, ")
@@ -101,7 +101,7 @@ def test_the_page_shows_the_flight_at_a_time(time: float, made: ReportPage, brow
     assert re.search(r"<title>[^<]* · outrider</title>", page)
 
 
-def test_the_canvas_is_painted(made: ReportPage, browse: Browse) -> None:
+def test_the_canvas_is_painted(made: WrittenRun, browse: Browse) -> None:
     also = """
       const canvas = document.getElementById("view");
       const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
@@ -118,7 +118,7 @@ def test_the_canvas_is_painted(made: ReportPage, browse: Browse) -> None:
     assert {"3f90da", "ffa90e", "bd1f01"} <= set(found[1].split())
 
 
-def test_clicks_and_keys(made: ReportPage, browse: Browse) -> None:
+def test_clicks_and_keys(made: WrittenRun, browse: Browse) -> None:
     also = """
       const told = [];
       const now = () => document.getElementById("clock").textContent;
@@ -153,7 +153,7 @@ def test_clicks_and_keys(made: ReportPage, browse: Browse) -> None:
     assert found[1] == "7.50 s | 2.00 s | 2.04 s | 12 | 10.00 s | -3"
 
 
-def test_it_plays(made: ReportPage, browse: Browse) -> None:
+def test_it_plays(made: WrittenRun, browse: Browse) -> None:
     # A browser without a screen shows as few pictures as it likes.
     also = """
       window.requestAnimationFrame = (show) => setTimeout(() => show(performance.now()), 20);
@@ -165,7 +165,7 @@ def test_it_plays(made: ReportPage, browse: Browse) -> None:
     assert float(within(page, "clock").removesuffix(" s")) > 7.0
 
 
-def test_the_policy_stops_what_would_get_in(made: ReportPage, browse: Browse, tmp_path: Path) -> None:
+def test_the_policy_stops_what_would_get_in(made: WrittenRun, browse: Browse, tmp_path: Path) -> None:
     """As if a text had not been escaped."""
     text = (made.directory / "report.html").read_text()
     page = tmp_path / "open.html"

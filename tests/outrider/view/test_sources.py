@@ -30,14 +30,14 @@ from outrider.swarm import command as swarm
 from outrider.view.listener import Listener
 from outrider.view.player import Player, load
 from outrider.view.recorded import Record
-from tests.outrider.report.runs import ReportPage, leave
+from tests.outrider.report.runs import WrittenRun, leave
 from tests.outrider.said import Run
 from tests.outrider.shipped import FIREFLY, LOGS
 from tests.outrider.view.flights import small
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> ReportPage:
+def made(tmp_path_factory: pytest.TempPathFactory) -> WrittenRun:
     return leave(tmp_path_factory.mktemp("view") / "run")
 
 
@@ -45,7 +45,7 @@ def seen(player: Player, wall: float) -> list[Snapshot]:
     return [one for one in player.poll(wall) if isinstance(one, Snapshot)]
 
 
-def test_a_run_is_played_as_it_was(made: ReportPage) -> None:
+def test_a_run_is_played_as_it_was(made: WrittenRun) -> None:
     player = load(made.directory)
     first, *_ = player.poll(0.0)
     assert isinstance(first, Scene)
@@ -59,7 +59,7 @@ def test_a_run_is_played_as_it_was(made: ReportPage) -> None:
         np.testing.assert_allclose(np.linalg.norm(moment.attitude, axis=1), 1.0, atol=1e-6)
 
 
-def test_pause_step_speed_and_a_time_that_is_chosen(made: ReportPage) -> None:
+def test_pause_step_speed_and_a_time_that_is_chosen(made: WrittenRun) -> None:
     player = load(made.directory)
     player.poll(0.0)
     player.command(ViewCommands(paused=True), None)
@@ -129,7 +129,7 @@ def test_what_is_no_run_is_said_in_one_line(tmp_path: Path, run: Run) -> None:
 
 
 def test_without_the_extra_it_says_what_to_install(
-    run: Run, monkeypatch: pytest.MonkeyPatch, made: ReportPage
+    run: Run, monkeypatch: pytest.MonkeyPatch, made: WrittenRun
 ) -> None:
     import sys
 
@@ -144,7 +144,7 @@ def test_without_the_extra_it_says_what_to_install(
     assert not Path("runs").exists()
 
 
-def test_a_run_becomes_one_file(run: Run, made: ReportPage, tmp_path: Path) -> None:
+def test_a_run_becomes_one_file(run: Run, made: WrittenRun, tmp_path: Path) -> None:
     page = tmp_path / "out.html"
     ended = run("view", str(made.directory), "--html", str(page))
     assert (ended.status, ended.out) == (0, f"{page}\n")

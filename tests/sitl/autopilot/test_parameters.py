@@ -83,7 +83,7 @@ def test_tables_are_sound(flavour):
     assert len({p.name for p in table}) == len(table)
     for p in table:
         assert len(p.name) <= 16
-        assert p.denial(p.fitted(p.default)) is None
+        assert p.refusal(p.fitted(p.default)) is None
         assert p.kind in ((Kind.INT32, Kind.REAL32) if flavour == "px4" else tuple(Kind))
         if p.bound:
             attrgetter(p.bound.setting)(Rig(flavour).config)
@@ -111,7 +111,7 @@ def some_value(p: Parameter) -> st.SearchStrategy[float]:
     bits = {Kind.INT8: 8, Kind.INT16: 16, Kind.INT32: 31}.get(p.kind)
     if bits is None:
         floats = st.floats(max(p.low, -1e30), min(p.high, 1e30))
-        return floats.map(p.fitted).filter(lambda value: p.denial(value) is None)
+        return floats.map(p.fitted).filter(lambda value: p.refusal(value) is None)
     low, high = max(p.low, -(1 << bits - 1)), min(p.high, (1 << bits - 1) - 1)
     # Beyond 24 bits ArduPilot's floats lose the last ones, as they do on the real one.
     return st.integers(int(max(low, -(1 << 24))), int(min(high, 1 << 24))).map(float)

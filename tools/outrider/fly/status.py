@@ -17,7 +17,7 @@ from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.wire.signing import Signing
 from outrider.fly.transmit_statistics import TransmitStatistics
-from outrider.logs.flight_modes import mode_name
+from outrider.logs.flight_modes import mode_of
 from outrider.supervision.supervised_node import OURS, TWIN, SupervisedNode
 
 SHOWN = 200_000
@@ -133,7 +133,7 @@ class StatusReports:
             round((now - (self._began or now)) * 1e-6, 2),
             pilot.phase.value,
             self._waiting(),
-            mode_of(vehicle),
+            _mode(vehicle),
             vehicle.armed,
             vehicle.guided,
             None if beat is None else _numbers(vehicle),
@@ -166,7 +166,7 @@ class StatusReports:
         sentences = {
             "phase": pilot.phase.value,
             "waiting": self._waiting(),
-            "mode": mode_of(vehicle),
+            "mode": _mode(vehicle),
             "armed": ("armed" if vehicle.armed else "disarmed") if vehicle.heartbeat is not None else "",
         }
         if sentences != self._sentences:
@@ -249,11 +249,9 @@ def _words(message: SetpointLocal) -> str:
     return f"east, north, up {where} m of the vehicle's origin, {how} m/s, mask 0x{message.type_mask:03X}"
 
 
-def mode_of(vehicle: Vehicle) -> str:
+def _mode(vehicle: Vehicle) -> str:
     """Return the name of the autopilot's mode, empty before the first heartbeat."""
-    if vehicle.heartbeat is None or vehicle.profile is None:
-        return ""
-    return mode_name(vehicle.profile.name.lower(), vehicle.heartbeat.custom_mode)
+    return "" if vehicle.heartbeat is None or vehicle.profile is None else mode_of(vehicle.heartbeat)
 
 
 def _numbers(vehicle: Vehicle) -> tuple[int, int, int, int, int]:

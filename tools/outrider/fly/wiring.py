@@ -37,28 +37,28 @@ _SWARMS = frozenset(
 class Wiring(NamedTuple):
     """Open links of a companion.
 
-    ``ends`` maps the companion's names of links to links. ``dealers`` are the physical links; ``duplicates``
-    observes all of them.
+    ``ends`` maps the companion's names of links to links. ``demultiplexers`` are the physical links;
+    ``duplicates`` observes all of them.
     """
 
     ends: dict[str, DemultiplexedLink]
-    dealers: list[Demultiplexer]
+    demultiplexers: list[Demultiplexer]
     duplicates: DuplicateIds
 
     def physical(self, name: str) -> Link:
         """Return the physical link below the end of that ``name``."""
-        return next(dealer.link for dealer in self.dealers if name in dealer.ends)
+        return next(demultiplexer.link for demultiplexer in self.demultiplexers if name in demultiplexer.ends)
 
     def drain(self) -> None:
         """Discard what has arrived: messages from before the start do not count."""
-        for dealer in self.dealers:
-            dealer.forget()
+        for demultiplexer in self.demultiplexers:
+            demultiplexer.forget()
 
     def lend(self) -> None:
         """Release serial ports in this process: a forked process uses the links now."""
-        for dealer in self.dealers:
-            if isinstance(dealer.link, SerialPort):
-                dealer.link.let_go()
+        for demultiplexer in self.demultiplexers:
+            if isinstance(demultiplexer.link, SerialPort):
+                demultiplexer.link.let_go()
 
     def close(self) -> None:
         """Close all links."""
@@ -113,7 +113,7 @@ def wire(
 ) -> Wiring:
     """Open the links. Raises InputError if one cannot be opened; then none stays open."""
     with ExitStack() as opened:
-        dealers = []
+        demultiplexers = []
         duplicates = DuplicateIds(system, clock)
         ends: dict[str, DemultiplexedLink] = {}
         for endpoint in dict.fromkeys(endpoints.values()):
@@ -124,7 +124,7 @@ def wire(
                 raise InputError(f"--{names[0]}: {error}") from None
             opened.callback(link.close)
             deal = {name: wants(name, system, target, config) for name in names}
-            dealers.append(Demultiplexer(link, deal, duplicates))
-            ends |= dealers[-1].ends
+            demultiplexers.append(Demultiplexer(link, deal, duplicates))
+            ends |= demultiplexers[-1].ends
         opened.pop_all()
-    return Wiring(ends, dealers, duplicates)
+    return Wiring(ends, demultiplexers, duplicates)

@@ -14,7 +14,7 @@ from outrider.runs.steps_file import StepsFile
 
 
 class Recorder:
-    """Tap that writes one tlog in ``directory`` for each vehicle of ``systems``.
+    """Observer that writes one tlog in ``directory`` for each vehicle of ``systems``.
 
     The tlog holds all that the vehicle's companion received and sent, at the times at which it handled it. A
     second file holds the times of its steps. ``files`` closes the files.

@@ -31,17 +31,17 @@ def overlaps(faults: Sequence[FaultPart], partitions: Sequence[PartitionPart]) -
     clock's fault lasts the whole flight. Faults without an end are not checked, because another cannot end
     them.
     """
-    spells = []
+    periods = []
     for index, fault in enumerate(faults):
         name, what = f"faults[{index}]", _Cause(fault.kind, (fault.vehicle,))
         if isinstance(fault, ClockFault):
-            spells.append(_Period(name, what, 0.0, float("inf")))
+            periods.append(_Period(name, what, 0.0, float("inf")))
         elif (lasts := getattr(fault, "for_s", None)) is not None:
-            spells.append(_Period(name, what, fault.at_s, fault.at_s + lasts))
+            periods.append(_Period(name, what, fault.at_s, fault.at_s + lasts))
     for index, cut in enumerate(partitions):
         what = _Cause("partition", tuple(sorted(set(cut.members))))
-        spells.append(_Period(f"partitions[{index}]", what, cut.at_s, cut.at_s + cut.for_s))
-    for one, other in combinations(spells, 2):
+        periods.append(_Period(f"partitions[{index}]", what, cut.at_s, cut.at_s + cut.for_s))
+    for one, other in combinations(periods, 2):
         if one.what == other.what and max(one.begin, other.begin) < min(one.end, other.end):
             systems = ", ".join(map(str, one.what.systems))
             allowed = "one for each vehicle" if one.what.kind == "clock" else "one after the other"
