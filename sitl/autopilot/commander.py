@@ -29,7 +29,7 @@ _GRAVITY: Final = {Mode.HOLD: 1, Mode.RETURN: 2, Mode.LAND: 3}
 class Commander:
     """Armed state and flight mode of one vehicle.
 
-    A command method returns None if its request is executed or already fulfilled, or else the denial.
+    A command method returns None if its request is executed or already fulfilled, or else the refusal.
     ``doubts`` returns the objections to arming that do not depend on the mode.
     """
 

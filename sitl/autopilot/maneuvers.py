@@ -167,7 +167,7 @@ class Maneuvers:
         return None
 
     def _target(self, order: Order) -> tuple[float, float, float] | CommandRefusal:
-        """Return the target (m, local NED) or the denial. PX4 takes a NaN coordinate as "unchanged"."""
+        """Return the target (m, local NED) or the refusal. PX4 takes a NaN coordinate as "unchanged"."""
         latitude, longitude, altitude = order.place
         here = self._estimate().position
         if order.relative is None and self._flavour.stops:

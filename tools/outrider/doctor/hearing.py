@@ -25,8 +25,8 @@ class Hearing:
     """Record of a link, fed with frames.
 
     ``begin`` and ``end`` span all that was received or waited for (µs). ``octets``: bytes of frames. ``bad``,
-    ``skipped_bytes``: frames with a wrong checksum, and bytes that belong to no frame. ``unheard``: frames of
-    senders beyond the recorded number. ``refused``: frames that failed the signature check; ``refusal``: why
+    ``skipped_bytes``: frames with a wrong checksum, and bytes that belong to no frame. ``unreceived``: frames
+    of senders beyond the recorded number. ``refused``: frames that failed the signature check; ``refusal``: why
     the last one did.
     """
 
