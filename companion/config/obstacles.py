@@ -25,7 +25,7 @@ class Sphere(Settings):
 
 
 class Post(Settings):
-    """Vertical cylinder from below up to ``height``."""
+    """Vertical cylinder without a lower end; its top is at ``height``."""
 
     kind: Literal["post"]
     at: tuple[_Coordinate, _Coordinate] = Field(description="axis, m east and north of the fleet origin")
@@ -37,7 +37,7 @@ Obstacle = Annotated[Sphere | Post, Field(discriminator="kind")]
 
 
 class _Moving(Settings):
-    system: int = Field(ge=1, le=254, description="system id that it speaks with")
+    system: int = Field(ge=1, le=254, description="system id of its messages")
 
 
 class MovingSphere(_Moving):
@@ -48,7 +48,7 @@ class MovingSphere(_Moving):
 
 
 class MovingPost(_Moving):
-    """Moving vertical cylinder from below up to ``height``; its reported position is on its axis."""
+    """Moving vertical cylinder without a lower end; its top is at ``height``, its position on its axis."""
 
     kind: Literal["post"]
     radius: Size = Field(description="m")
@@ -61,16 +61,19 @@ Moving = Annotated[MovingSphere | MovingPost, Field(discriminator="kind")]
 class ProximityConfig(Settings):
     """Processing of OBSTACLE_DISTANCE."""
 
-    age_us: _Age = Field(1_000_000, description="a return is forgotten after so long")
+    age_us: _Age = Field(1_000_000, description="µs: a return is removed this long after it was measured")
     delay_us: int = Field(
-        50_000, ge=0, le=1_000_000, description="age at arrival, where the autopilot's stamp does not say"
+        50_000,
+        ge=0,
+        le=1_000_000,
+        description="µs: assumed age of a return whose message has no usable time stamp",
     )
-    reach: Positive = Field(15.0, description="m: what is further off does not count")
+    reach: Positive = Field(15.0, description="m: returns further away are ignored")
     spacing: Positive = Field(0.3, description="m: returns nearer to each other than this are one")
     known: float = Field(
-        1.0, ge=0.0, le=10.0, description="m: a return so near to a neighbour is that neighbour"
+        1.0, ge=0.0, le=10.0, description="m: a return nearer than this to a neighbour is ignored"
     )
-    most: int = Field(48, ge=1, le=300, description="the nearest so many count")
+    most: int = Field(48, ge=1, le=300, description="only the nearest this many returns are used")
 
 
 _ADDRESSES = 1 << 24
@@ -82,12 +85,20 @@ _Address = Annotated[int, Field(ge=0, lt=_ADDRESSES)]
 class TrafficConfig(Settings):
     """Processing of ADSB_VEHICLE."""
 
-    radius: Positive = Field(30.0, description="m of room about it, in which no vehicle is to be")
-    height_error: float = Field(50.0, ge=0.0, le=1000.0, description="m, how wrong its height may be")
-    ahead_us: _Duration = Field(10_000_000, description="so far ahead its way is kept clear")
-    age_us: _Duration = Field(10_000_000, description="it is forgotten after so long without a message")
-    reach: Positive = Field(3000.0, description="m horizontally: what is further off does not count")
-    most: int = Field(32, ge=1, le=200, description="the nearest so many count")
+    radius: Positive = Field(
+        30.0, description="m: horizontal distance that vehicles keep from an aircraft's path"
+    )
+    height_error: float = Field(
+        50.0, ge=0.0, le=1000.0, description="m: largest error of an aircraft's reported height"
+    )
+    ahead_us: _Duration = Field(
+        10_000_000, description="µs: length of the extrapolated path that is kept clear"
+    )
+    age_us: _Duration = Field(
+        10_000_000, description="µs: an aircraft is removed this long after its last message"
+    )
+    reach: Positive = Field(3000.0, description="m, horizontally: aircraft further away are ignored")
+    most: int = Field(32, ge=1, le=200, description="only the nearest this many aircraft are used")
     ignore: tuple[_Address, ...] = Field(
         (), max_length=255, description="ICAO addresses of the fleet's own transponders"
     )

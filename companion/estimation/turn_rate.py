@@ -47,7 +47,8 @@ class TurnFilter:
     def after(self, turn: Turn, dt: float, before: tuple[float, float], now: tuple[float, float]) -> Turn:
         """Return the estimate ``dt`` seconds later.
 
-        ``before`` and ``now``: the horizontal velocity (m/s) before and after.
+        ``before`` and ``now``: the horizontal velocity (m/s) before and after. ``turn`` is returned unchanged
+        if ``sigma`` is 0 or ``dt`` is not positive; below 1 mm of displacement it is only predicted.
         """
         if self._variance == 0.0 or dt <= 0.0:
             return turn
@@ -62,7 +63,7 @@ class TurnFilter:
 
 
 def carried(position: Array, velocity: Array, rate: float, seconds: Array) -> Path:
-    """Return the motion (3,), (3,) extrapolated to each of ``seconds`` (n,) later.
+    """Return the path from ``position`` (3,), m, at ``velocity`` (3,), m/s, after each of ``seconds`` (n,).
 
     The course turns at ``rate`` (rad/s); speed and vertical speed stay constant.
     """

@@ -2,8 +2,8 @@
 
 Without GPS an estimator dead-reckons on its accelerometers and reports its estimated position as before; it
 reports the loss of position after 5 s (PX4) or 7 s (ArduPilot), and then its failsafe acts. GPS_RAW_INT (24)
-shows the loss at once. So do the flags of EKF_STATUS_REPORT (193) and ESTIMATOR_STATUS (230), and a ratio of
-innovation to gate of 1 or more: then GPS is refused, and the estimator dead-reckons as well.
+shows the loss at once. The flags of EKF_STATUS_REPORT (193) and ESTIMATOR_STATUS (230) show it too. A ratio
+of innovation to gate of 1 or more means that the estimator rejects GPS and dead-reckons.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from mavlink_bridge.messages import EkfStatus, EstimatorStatus, GpsRaw, Message
 
 _REFUSES = 1.0
+"""Ratio of innovation to gate from which the estimator rejects GPS."""
 _COASTING = 0.1
 """m/s²: two standard deviations of the acceleration error of dead reckoning."""
 _FURTHEST = 10.0
@@ -22,9 +23,9 @@ _FADES = 2_000_000
 
 
 class Positioning:
-    """Position quality of one autopilot; messages are dated by ``tick``.
+    """Position quality of one autopilot. A message counts as received at the time of the last ``tick``.
 
-    For a vehicle that never had GPS, such as one with cameras, a missing GPS is no trouble.
+    The loss of a fix is reported only after a first fix: a vehicle with cameras may have no GPS at all.
     """
 
     def __init__(self) -> None:
@@ -77,7 +78,10 @@ class Positioning:
 
     @property
     def radius(self) -> float:
-        """How far (m) the vehicle may be from its reported position, beyond the usual error."""
+        """Additional uncertainty (m) of the reported position.
+
+        It is 0 with good positioning, grows during ``trouble`` to 10 m at most, and is 0 again 2 s after it.
+        """
         return min(self._worst, _FURTHEST)
 
     def _estimated(self) -> float:

@@ -1,8 +1,8 @@
 """Set-points: consistent position, velocity, acceleration and yaw at a bounded look-ahead of the horizon.
 
-The paper sends x(N + 1), 1.6 s ahead; a position-first controller that follows a point 8 m ahead overshoots
-its limits. A look-ahead equal to the link's delay makes the set-point correct when it arrives; 1 600 000 µs
-is the paper's choice.
+The paper sends the last state, 1.6 s ahead: 8 m at 5 m/s. A cascaded position controller that follows such a
+point exceeds its speed limit. A look-ahead equal to the link's delay makes the set-point correct when it
+arrives; 1 600 000 µs is the paper's choice.
 """
 
 from __future__ import annotations
@@ -39,9 +39,11 @@ def setpoint(
 ) -> SetpointLocal:
     """Return SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame.
 
-    It contains the ``horizon`` and ``yaw`` at ``time`` (µs). ``compensation`` (3,), m/s², is added to the
-    acceleration and ``bias`` (3,), m/s, to the velocity (``tracking``), which ``v_max`` (3,) bounds. The
-    acceleration is that of ``lead`` µs later.
+    It contains the ``horizon`` and ``yaw`` at ``time`` (µs). ``since_boot`` (µs): time_boot_ms; ``own``
+    is the sender, and its system id the target's; ``mask`` is POSITION_TARGET_TYPEMASK. ``compensation``
+    (3,), m/s², fleet-local ENU, is added to the acceleration. ``bias`` (3,), m/s, is added to the velocity
+    (``tracking``); the sum is then clipped on each axis to the larger of ``v_max`` (3,) and the planned
+    speed. The acceleration is taken ``lead`` µs later.
     """
     motion = horizon.at(time)
     acceleration = horizon.at(time + lead).acceleration if lead else motion.acceleration

@@ -60,7 +60,7 @@ class Guidance:
         self.timed_out = False
 
     def configure(self, config: AutopilotConfig) -> None:
-        """Use new settings from now on."""
+        """Use new settings from now on, except for the yaw limits, which stay those of the constructor."""
         limits = config.max_speed, config.max_acceleration, config.max_jerk
         gentle = config.gentle_acceleration, config.max_jerk
         self._config = config
@@ -109,7 +109,11 @@ class Guidance:
         return abs(gap) < _REACHED[0] and math.hypot(*self._shaper.velocity) < _REACHED[1]
 
     def wanted(self, now: int) -> Setpoint:
-        """Return the followed set-point, extrapolated to ``now`` (µs) and within the limits."""
+        """Return the set-point to follow at ``now`` (µs).
+
+        That of GO is returned unchanged. With a model of a firmware's response it is extrapolated for
+        ArduPilot only, and not limited. Otherwise it is extrapolated and within the limits.
+        """
         config = self._config
         age = (now - self._received) * 1e-6
         if self.activity is Activity.GO:
@@ -125,7 +129,10 @@ class Guidance:
         self._interrupted = None
 
     def takeoff(self, height: float, here: Pose) -> None:
-        """Climb vertically to ``height`` (m above the origin)."""
+        """Climb vertically to ``height`` (m above the origin).
+
+        ``here`` is the pose at which the reference begins if there is none, here and in the methods below.
+        """
         self._leave_ground(here)
         x, y, _ = self._shaper.position
         self._begin(Activity.TAKEOFF, Setpoint((POSITION, POSITION, POSITION), (x, y, -height)))
@@ -148,11 +155,11 @@ class Guidance:
         self._begin(Activity.TRACK, setpoint)
         if self._chased:
             return
-        # A trajectory that the shaper passes through takes effect at once, not at the end of the next step.
+        # With a step of zero length, a set-point that the shaper passes through takes effect without delay.
         self._shaper.advance(self.wanted(now), self._limits[Activity.TRACK], 0.0)
 
     def hasten(self, speed: float) -> None:
-        """Limit the speed of the current flight to a destination to ``speed`` (m/s) from now on."""
+        """Set the speed of the current flight to a destination to ``speed`` (m/s) from now on."""
         if self.activity is Activity.GO or (self._interrupted and self._interrupted[0] is Activity.GO):
             self._limits[Activity.GO] = self._limits[Activity.GO]._replace(speed=speed)
 
@@ -184,7 +191,7 @@ class Guidance:
             self._begin(activity, setpoint)
 
     def hover(self, here: Pose) -> None:
-        """Hold ``here``, at rest in the air."""
+        """Brake and hold; without a reference, begin one at rest ``here``."""
         self._leave_ground(here)
         self.hold()
 
@@ -201,9 +208,10 @@ class Guidance:
         self._begin(Activity.LAND, _STAY._replace(velocity=(0.0, 0.0, speed)))
 
     def relocate(self, position: Vector, velocity: Vector) -> None:
-        """Move the tracked reference to ``position`` (m) and ``velocity`` (m/s) after the frame has slipped.
+        """Move the tracked reference to ``position`` (m) and ``velocity`` (m/s).
 
-        A takeoff still leads straight up. A set-point keeps its value, and is approached within the limits.
+        Call it after the position estimate has jumped. A takeoff continues vertically above the new position;
+        other set-points keep their values, and are approached within the limits.
         """
         if self.activity is Activity.IDLE:
             return

@@ -78,8 +78,9 @@ class CertifiedFlight:
     def stand(self, now: int, position: Array) -> None:
         """While not in control, hold ``position`` (3,), m, unannounced until the vehicle steers.
 
-        But a plan in whose tube the vehicle still is continues, and so does one that was announced for this
-        epoch: others rely on it. Leaving a plan that was announced earlier counts as planning anew.
+        The committed plan continues if the vehicle is within ``certified.tube`` (m) of it, or if it is
+        announced for this epoch or a later one, because others rely on it. Otherwise a plan at rest at
+        ``position`` begins; ``anchored_anew`` counts this if a plan had been announced.
         """
         self._asked = now
         commitment, horizon = self.commitment, self.commitment.horizon()
@@ -94,9 +95,10 @@ class CertifiedFlight:
         self._steers = self._announced = False
 
     def due(self, now: int) -> bool:
-        """Return whether the next epoch's plan is to be made now, by ``plan`` or otherwise.
+        """Begin the next epoch if it is time; return True if ``plan`` is to be called for it now.
 
-        When waiting for plans must end, this carries the committed plan on and returns False.
+        That is when the clocks agree and the plans of all peers have arrived. At the latest possible time
+        without them, the committed plan is continued for an epoch, and the result is False.
         """
         self._asked, self._steers = now, True
         if not self.commitment.turn(now):
@@ -125,13 +127,13 @@ class CertifiedFlight:
 
     @property
     def lost(self) -> bool:
-        """Whether the vehicle is so far from its plan that planning must start anew at the vehicle."""
+        """Whether the vehicle is further than ``guard.tube`` (m) from its plan, which then begins anew."""
         return self.off > self._config.guard.tube
 
     def plan(self, now: int, aim: Aim, world: World, view: View) -> bool:
-        """Make the next epoch's plan towards ``aim``; return False if the old one is carried on.
+        """Make the next epoch's plan towards ``aim``; return False if the committed plan continues.
 
-        The end of ``aim`` is the end of that plan.
+        ``aim.destination`` is where the plan should end.
         """
         commitment = self.commitment
         start = commitment.start()
@@ -155,10 +157,10 @@ class CertifiedFlight:
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
         """Return the messages for the swarm link now.
 
-        They are the newest plan, at once and then repeated at intervals, and its roster: the coordination set
-        that it was made with. ``farewell``: the vehicle makes no further plan; that is announced once it
-        flies the last one. Without ``farewell``, a plan that is not flown is not announced: control lapses
-        unless ``due`` or ``stand`` is called at ``now``.
+        They are TIMESYNC messages, and the newest plan with its roster (the coordination set that it was made
+        with), at once and then every ``repeat_us``. ``farewell``: the vehicle makes no further plan; that is
+        announced once it flies the last one. Without ``farewell``, call ``due`` or ``stand`` at ``now``
+        first: otherwise the vehicle counts as not in control, and no plan is announced.
         """
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()

@@ -1,14 +1,14 @@
 """QP of the certified mode: three axes together, because planes couple them; PIQP, with the rows that matter.
 
-Variables are the accelerations a_n (n = 0…N) of each axis in turn. The cost is the paper's on every step
-instead of the last alone, without the field in the input: a plan that ends at rest cannot follow a lasting
-push with its accelerations. For the field, −2 Ω_f f·x is added on every step, as if f were the slope of a
-potential there: it moves the plan as far as nothing is in the way. The plan ends at rest.
+Variables are the accelerations of each axis in turn, n for each. The paper's cost weights the last step alone
+and adds the field to the acceleration. Here every step is weighted, and the field f enters as the linear term
+−2 Ω_f f·x of every step: it moves the positions within the constraints. A plan that ends at rest could not
+follow a lasting push with its accelerations. The plan ends at rest.
 
 Bounds of acceleration are bounds on variables. Limits of speed and position and the planes are rows Ga ≥ low.
-Only those rows take part that the committed plan is near to, that the best plan without any rows would break,
-or that a solution has broken. A limit that the committed plan itself breaks is widened to it, so that this
-plan is feasible in every problem.
+A row is in the QP if the committed plan is within ``_NEAR`` of it, or if the best plan without rows or an
+earlier solution violates it. A limit that the committed plan violates is relaxed until the plan satisfies it,
+so that this plan is feasible in every problem.
 """
 
 from __future__ import annotations
@@ -30,9 +30,12 @@ _ROUNDS = 8
 _NEAR = 0.1
 """Distance (m/s, m) of the committed plan within which a row takes part from the first solution on."""
 _TOLERANCE = 1e-5
-"""Error (m, m/s) that PIQP leaves; far below what is wanted beyond the least distance."""
+"""Largest violation of a row (m, m/s) that is accepted; much smaller than the planes' margin."""
 _ROUNDED = 0.01
-"""Tightening of the bounds (m/s²), so that rounding, and coming to rest exactly, keep them."""
+"""Tightening of the acceleration bounds (m/s²).
+
+Rounding, and the correction to an exact stop, do not violate them then.
+"""
 
 
 class State(NamedTuple):
@@ -71,7 +74,10 @@ class Answer(NamedTuple):
 
 
 class SeparationQp:
-    """Matrices for one horizon of ``steps`` inputs; ``solve`` for each plan. ``planar``: at one height."""
+    """Matrices of the QP for ``steps`` accelerations; call ``solve`` for each plan.
+
+    ``planar``: the vertical acceleration is bounded to ±0.01 m/s², so that the height stays.
+    """
 
     def __init__(
         self, steps: int, limits: LimitsConfig, config: CertifiedConfig, *, planar: bool = False
@@ -117,7 +123,7 @@ class SeparationQp:
     def solve(self, state: State, wish: Objective, planes: Planes) -> Answer:
         """Return the best plan from ``state`` that keeps all rows.
 
-        Raises SolverError if PIQP finds none, or if rows are still broken after some rounds.
+        Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs.
         """
         free = self._free(state.position, state.velocity)
         c = self._cost(free[:, 2], state.velocity, state.before, wish)
@@ -181,7 +187,7 @@ class _Rows:
         self._low[: self._split] -= np.maximum(-self.values(state.committed)[: self._split], 0.0)
 
     def values(self, a: Array) -> Array:
-        """Return by how much each row holds with accelerations ``a`` (n, 3), m/s²."""
+        """Return the slack G a − low of each row, negative if violated; ``a`` (n, 3), m/s²."""
         moved = np.einsum("bij,jk->ibk", self._program._maps, a)
         planes = np.einsum("mnk,nik->mni", self._normals, moved)
         limits = self._program._limits_G @ a.T.ravel()

@@ -71,7 +71,7 @@ def test_a_disk_that_stands_still_is_not_waited_for(tmp_path: Path, patience: No
         recorded(log, 100)
         assert said == []
         recorded(log, BATCH * MOST)
-        assert said == ["no log from here on: the disk stands still"]
+        assert said == ["no log from here on: the disk does not respond"]
         # Nothing more is kept for it.
         assert log._waiting.qsize() <= MOST + 1
     assert len(said) == 1
@@ -99,7 +99,7 @@ def test_what_the_end_does_not_wait_for_is_said(tmp_path: Path, patience: None) 
     said: list[str] = []
     with Log(tmp_path, 1, said.append, patience=0.0) as log:
         recorded(log, 100)
-    assert said == ["no log from here on: the disk stands still"]
+    assert said == ["no log from here on: the disk does not respond"]
     assert read_late(tmp_path / "vehicle-1.tlog")
 
 

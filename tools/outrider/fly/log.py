@@ -21,17 +21,20 @@ from outrider.runs.recorder import Recorder
 BATCH: Final = 16
 """Number of entries handed to the thread together: some hundredths of a second.
 
-The thread writes them within a fraction of a millisecond, during which no other thread runs.
+The thread writes them within a fraction of a millisecond; it holds the interpreter lock (GIL) meanwhile.
 """
 MOST: Final = 4096
 """Maximum number of waiting batches: a minute or two of a flight, about 20 MB."""
 PATIENCE: Final = 5.0
-"""Time for which the end waits until all is written (s); less than the process has to write its files."""
-_STILL: Final = "the disk stands still"
+"""Longest time (s) for which the end waits until all is written.
+
+It is shorter than the time that the process has for its end.
+"""
+_STILL: Final = "the disk does not respond"
 
 
 class _Entry(NamedTuple):
-    """Arguments of a tap call; without ``datagram``: the beginning of a step."""
+    """Arguments of one call of the observer; without ``datagram``: the beginning of a step."""
 
     now: int
     node: str
@@ -40,9 +43,9 @@ class _Entry(NamedTuple):
 
 
 class Log:
-    """Log of vehicle ``system`` in ``directory``: a tap that never blocks, and a context manager.
+    """Log of vehicle ``system`` in ``directory``: an observer of the loop, and a context manager.
 
-    ``tell`` receives once the reason, if logging has to stop.
+    No call blocks. ``tell`` is called once, with the reason, if logging has to stop.
     """
 
     def __init__(

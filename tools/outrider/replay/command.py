@@ -12,7 +12,7 @@ from rich.text import Text
 
 from mavlink_bridge.messages import Message
 from mavlink_bridge.wire.codec import Codec
-from outrider.replay.companion_replay import Difference, Replayed, Sent
+from outrider.replay.companion_replay import Difference, LinkFrame, Replayed
 from outrider.replay.run_replay import again
 from outrider.terminal.share_progress import share_progress
 
@@ -66,7 +66,7 @@ def _show(name: str, found: tuple[Replayed, ...]) -> None:
 
 def words(difference: Difference) -> str:
     """Return time, message and fields in which two flights first differ, as text."""
-    before, after = _read(difference.logged), _read(difference.again)
+    before, after = _read(difference.logged), _read(difference.replayed)
     where = f"at {difference.time} µs"
     if before is None or after is None or type(before) is not type(after):
         return f"{where}: the log has {_kind(before)}, now it is {_kind(after)}"
@@ -82,6 +82,6 @@ def _kind(message: Message | None) -> str:
     return "nothing" if message is None else type(message).__name__
 
 
-def _read(sent: Sent | None) -> Message | None:
+def _read(sent: LinkFrame | None) -> Message | None:
     found = [] if sent is None else Codec().feed(sent.frame)
     return found[0] if found else None

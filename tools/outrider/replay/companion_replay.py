@@ -21,8 +21,8 @@ from outrider.runs import names
 _LINKS = {number: link for link, number in names.LINK_NUMBERS.items()}
 
 
-class Sent(NamedTuple):
-    """Frame, and the link it was sent on."""
+class LinkFrame(NamedTuple):
+    """Frame, and its link."""
 
     link: str
     frame: bytes
@@ -32,15 +32,16 @@ class Difference(NamedTuple):
     """First frame that differs, at ``time`` (µs); None where one side has no more frames at that time."""
 
     time: int
-    logged: Sent | None
-    again: Sent | None
+    logged: LinkFrame | None
+    replayed: LinkFrame | None
 
 
 class Replayed(NamedTuple):
     """Result for one vehicle.
 
-    ``frames`` counts sent frames that are the same, ``setpoints`` the set-points among them, ``different``
-    those that differ. ``stray``: records at times at which the companion was not stepped.
+    ``frames`` counts equal frames, ``setpoints`` the set-points among them, ``different`` the pairs (the k-th
+    logged and the k-th replayed frame of a step) that differ, or of which one is missing. ``stray``: records
+    at times at which the companion was not stepped.
     """
 
     system: int
@@ -64,9 +65,11 @@ def reenact(
     records: Iterable[Record],
     watch: Callable[[int], None] = lambda _time: None,
 ) -> Replayed:
-    """Step ``companion`` at ``steps`` (µs) with what ``records`` contain at these times, and compare.
+    """Step ``companion`` at the times ``steps`` (µs) and compare its output with the log.
 
-    ``own`` is its system and component id; ``watch`` receives the time of each step.
+    ``steps`` and ``records`` are in the order of time. Records of other senders are the input of the step at
+    their time; those of the companion are compared with its output, frame by frame. ``own`` is its system
+    and component id; ``watch`` receives the time of each step.
     """
     together = _Together(records)
     count = frames = setpoints = different = 0
@@ -77,12 +80,12 @@ def reenact(
         at_once = together.at(now)
         inbox = [Datagram(sent.link, sent.frame) for sent in at_once if header(sent.frame)[:2] != own]
         logged = [sent for sent in at_once if header(sent.frame)[:2] == own]
-        again = [
-            Sent(link, frame.data)
+        replayed = [
+            LinkFrame(link, frame.data)
             for link, data in companion.step(now, inbox)
             for frame in leading_frames(data)[0]
         ]
-        for before, after in zip_longest(logged, again):
+        for before, after in zip_longest(logged, replayed):
             if before == after:
                 frames += 1
                 setpoints += (
@@ -102,12 +105,12 @@ class _Together:
         self._next = next(self._records, None)
         self._stray = 0
 
-    def at(self, now: int) -> list[Sent]:
+    def at(self, now: int) -> list[LinkFrame]:
         """Return all records at ``now`` (µs); earlier ones that were not requested count as stray."""
         found = []
         while self._next is not None and self._next.time <= now:
             if self._next.time == now:
-                found.append(Sent(_LINKS[self._next.link], self._next.frame))
+                found.append(LinkFrame(_LINKS[self._next.link], self._next.frame))
             else:
                 self._stray += 1
             self._next = next(self._records, None)

@@ -23,7 +23,7 @@ from distributed import Future, KilledWorker
 from distributed.client import FutureCancelledError
 
 from outrider.errors import InputError
-from outrider.sweep import dask_tasks as crew
+from outrider.sweep import dask_tasks
 from outrider.sweep.backlog import Backlog
 from outrider.sweep.scheduler import connected
 from outrider.sweep.sources import differences
@@ -31,7 +31,7 @@ from outrider.sweep.tasks import AbandonedError, Ended, Entry, Task
 
 PATIENCE_S = 300.0
 """Time (s) that a sweep waits for a worker."""
-_INTRODUCTION = "__import__('outrider.sweep.dask_tasks', fromlist=['crew']).introduce()"
+_IDENTIFY = "__import__('outrider.sweep.dask_tasks', fromlist=['identify']).identify()"
 """Given as text: a Dask worker that cannot find a function ends, and outrider may not be installed there."""
 _TICK_S, _LOOK_S, _FETCH_S, _GOODBYE_S, _REPLY_S = 0.5, 1.0, 2.0, 3.0, 20.0
 
@@ -73,7 +73,7 @@ class Cluster:
     def __init__(self, address: str, run: str, wall_limit_s: float, patience_s: float = PATIENCE_S) -> None:
         self._address, self._run, self._limit, self._patience = address, run, wall_limit_s, patience_s
         self._sweep = uuid4().hex
-        self._versions = crew.equipment()
+        self._versions = dask_tasks.equipment()
         self._sites: dict[str, _Site] = {}
         self._flights: dict[Key, _Flight] = {}
         self._answers: SimpleQueue[Future[Any]] = SimpleQueue()
@@ -122,7 +122,7 @@ class Cluster:
         for address, threads in there.items():
             if address not in self._sites:
                 self._sites[address] = site = _Site(address, threads)
-                self._submit(site, None, eval, _INTRODUCTION)
+                self._submit(site, None, eval, _IDENTIFY)
         self._wait(now)
 
     def _there(self) -> dict[str, int]:
@@ -153,10 +153,10 @@ class Cluster:
     def _begin(self, site: _Site, task: Task) -> None:
         site.busy += 1
         values = (site.me, self._sweep, self._run, self._limit, json.dumps(task._asdict()))
-        self._submit(site, task, crew.fly, *values)
+        self._submit(site, task, dask_tasks.fly, *values)
 
     def _submit(self, site: _Site, task: Task | None, function: Callable[..., Any], *values: Any) -> None:
-        name = "introduce" if task is None else f"fly-{task.key}-{task.seed}"
+        name = "identify" if task is None else f"fly-{task.key}-{task.seed}"
         future = self._client.submit(
             function, *values, key=f"{name}-{uuid4().hex}", workers=[site.address], pure=False
         )
@@ -246,7 +246,7 @@ class Cluster:
         """End the processes that still fly for this sweep."""
         addresses = [site.address for site in self._sites.values() if site.me is not None]
         if addresses:
-            self._client.run(crew.dismiss, self._sweep, workers=addresses, on_error="ignore")
+            self._client.run(dask_tasks.dismiss, self._sweep, workers=addresses, on_error="ignore")
 
 
 def _quietly(action: Callable[[], object]) -> None:

@@ -19,7 +19,7 @@ from outrider.sweep.sources import version_of, versions
 from outrider.sweep.tasks import Task
 
 IDLE_S = 60.0
-"""Time (s) after which an idle process ends, because its sweep was killed."""
+"""Time (s) after which an idle process ends: its sweep may have been killed."""
 _TICK_S = 0.5
 ME = uuid4().hex
 """Identity of this worker process; it changes with a restart, even at the same address."""
@@ -64,9 +64,9 @@ class WorkerProcesses:
             self._all.get(sweep, set()).discard(process)
 
     def dismiss(self, sweep: str, only: Process | None = None) -> None:
-        """End the processes of a sweep, or only one of them if it is idle.
+        """End all processes of a sweep and start no more; or, with ``only``, that process if it is idle.
 
-        A caller that waits for one of the processes sees it die.
+        A ``fly`` that waits for one of the processes returns the entry of a lost run.
         """
         with self._lock:
             idle = self._idle.get(sweep, {})
@@ -84,29 +84,31 @@ class WorkerProcesses:
         self._all.get(sweep, set()).discard(process)
 
 
-CREW = WorkerProcesses()
+PROCESSES = WorkerProcesses()
 
 
-def introduce() -> dict[str, Any]:
+def identify() -> dict[str, Any]:
     """Return the identity of this worker, and the versions that results depend on."""
     return {"me": ME, "versions": equipment()}
 
 
 def equipment() -> dict[str, str]:
-    """Return the versions that must be the same here and where the sweep was started."""
+    """Return the versions that must be the same on this worker and on the client."""
     return {**versions(), "distributed": version_of("distributed")}
 
 
 def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> dict[str, Any]:
-    """Fly a task, given in JSON, for a ``sweep`` by ``run``, a ``module:function``.
+    """Fly one run in a process of this worker.
 
-    The result has one key: ``entry``; or ``restarted`` if this is not the worker ``me`` that was meant; or
-    ``unable``, the reason why no process can be started here.
+    ``document``: the ``Task`` as JSON; ``run``: the ``module:function`` that flies it; ``sweep``: id of the
+    sweep; ``me``: the expected ``ME``; ``wall_limit_s``: longest wall time of the run (s). The result has one
+    key: ``entry``, the ``Entry`` as a dict; or ``restarted`` if this is another worker; or ``unable``, the
+    reason why no process can be started here.
     """
     if me != ME:
         return {"restarted": True}
     for _ in range(MOST_STARTS):
-        process = CREW.take(sweep, run)
+        process = PROCESSES.take(sweep, run)
         if process is None:
             return {"unable": "its sweep is over"}
         while not process.ready and not process.dead and process.cannot is None:
@@ -115,7 +117,7 @@ def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> di
             break
         what = process.cannot or process.terminate(wall_limit_s)
         process.end()
-        CREW.forget(sweep, process)
+        PROCESSES.forget(sweep, process)
     else:
         return {"unable": what}
     task = Task(**json.loads(document))
@@ -124,15 +126,15 @@ def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> di
     output.register(process.output, select.POLLIN)
     while (entry := process.take_entry()) is None:
         if process.dead or process.overdue(wall_limit_s):
-            CREW.forget(sweep, process)
+            PROCESSES.forget(sweep, process)
             return {"entry": process.lost(task, process.terminate(wall_limit_s))._asdict()}
         if output.poll(1e3 * min(_TICK_S, wall_limit_s)):
             process.receive()
     process.task = None
-    CREW.give_back(sweep, process)
+    PROCESSES.give_back(sweep, process)
     return {"entry": entry._asdict()}
 
 
 def dismiss(sweep: str) -> None:
     """End the processes of a sweep that is over."""
-    CREW.dismiss(sweep)
+    PROCESSES.dismiss(sweep)

@@ -22,9 +22,9 @@ from outrider.yaml_files.yaml_file import load as load_yaml
 from sitl.vehicle.config import VehicleConfig
 
 PAST, PAST_EVERY = 20.0, 0.2
-"""Time (s) before a chosen time for which the trails are drawn again, and its step."""
+"""Length (s) of the trails that are drawn again after a jump, and the interval (s) of their samples."""
 FAST = 16.0
-"""Speed, in multiples of real time, if the user chose the fastest."""
+"""Multiple of real time that is used if the chosen speed is None."""
 _STEP = 0.1
 """Duration of a single step (s)."""
 
@@ -32,7 +32,7 @@ Watch = Callable[[str, float], None]
 
 
 class Player:
-    """``Source`` that plays a run; it starts by itself.
+    """``Source`` of snapshots of a run; it starts unpaused.
 
     ``span`` is the time of the first and of the last sample (s after the goal event).
     """
@@ -53,7 +53,11 @@ class Player:
         self._sought = True
 
     def poll(self, wall: float) -> Sequence[Scene | Snapshot]:
-        """Return the scene at first, then a snapshot whenever time has advanced."""
+        """Return what is to be shown from wall time ``wall`` (s) on.
+
+        That is the scene in the first call; the snapshots of the trails after a jump; the present snapshot if
+        its time has changed.
+        """
         found: list[Scene | Snapshot] = []
         if self._wall is None:
             found.append(self.scene)

@@ -1,7 +1,7 @@
-"""Meaning of a plain YAML scalar by the core schema of YAML 1.2.
+"""Meaning of a plain YAML scalar by the core schema of YAML 1.2, except that leading zeros make text.
 
-Text that YAML 1.1 reads differently (``on``, ``010``, ``1:30``, ``1_000``) stays text, so that it never
-becomes a number unnoticed.
+So text that YAML 1.1 reads differently (``on``, ``010``, ``1:30``, ``1_000``) stays text, and never becomes a
+number unnoticed.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def _integer(text: str, base: int) -> int:
 
 
 def number_hint(text: str) -> str:
-    """Return a suggestion for a text that stands in place of a number, or an empty string."""
+    """Return the end of an error message, beginning with "; ", for text in place of a number; or nothing."""
     if _SEXAGESIMAL.fullmatch(text):
         return "; base 60 is not read, write one number"
     cleaned = text.strip().replace("_", "").replace(",", ".")
@@ -68,6 +68,6 @@ def number_hint(text: str) -> str:
 
 
 def boolean_hint(text: str) -> str:
-    """Return a suggestion for a text that stands in place of true or false, or an empty string."""
+    """Return the end of an error message, beginning with "; ", for text in place of a boolean; or nothing."""
     meant = _YAML_1_1_BOOLEANS.get(text.casefold())
     return "" if meant is None else f"; did you mean {meant}?"
