@@ -30,6 +30,7 @@ from companion.flight.autopilots.known import profile_of
 from companion.flight.setpoint import setpoint
 from companion.flight.vehicle import HEARTBEAT_LOST
 from companion.goals.heading import Yaw
+from companion.telemetry.sharing import onboard_heartbeat
 from companion.values.components import COMPONENT
 from companion.values.horizon import Horizon
 from mavlink_bridge.errors import PlanWireError
@@ -148,8 +149,7 @@ class BackupNode:
         if now < self._next_beat:
             return []
         self._next_beat = now + _SECOND
-        kind, autopilot = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
-        beat = Heartbeat(self._own, kind, autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE)
+        beat = onboard_heartbeat(self._own)
         return [Datagram("autopilot", self._codecs["autopilot"].encode(beat))]
 
     def _receive(self, now: int, message: Message) -> None:

@@ -25,6 +25,12 @@ _TAKES_BACK = 3_000_000
 """µs after the last position uncertainty during which an uncertainty of 0 is sent."""
 
 
+def onboard_heartbeat(own: Source) -> Heartbeat:
+    """Return HEARTBEAT (0) of an active onboard computer, which is no autopilot."""
+    kind, autopilot = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
+    return Heartbeat(own, kind, autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE)
+
+
 class Shared(NamedTuple):
     """Messages by link."""
 
@@ -60,8 +66,7 @@ class Sharing:
         rates = self._config.rates
         shared = Shared([], [])
         if self._passes(0, now, _SECOND):
-            kind, autopilot = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
-            beat = Heartbeat(self._own, kind, autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE)
+            beat = onboard_heartbeat(self._own)
             shared.autopilot.append(beat)
             shared.swarm.append(beat)
         fresh = view.own is not None and view.own.age <= self._config.guard.own_stale_us

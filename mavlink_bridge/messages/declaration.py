@@ -22,6 +22,9 @@ from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.messages.fields import Fields
 from mavlink_bridge.messages.source import Source
 
+_CODE = re.compile(r"\d*[a-zA-Z]")
+"""One code of a struct's layout, with its count."""
+
 
 class Message(Protocol):
     """Any declared message: a frozen tuple of its source and its values."""
@@ -82,7 +85,7 @@ class Converter(NamedTuple):
                 for number in value if isinstance(value, Iterable) else (value,):
                     if isinstance(number, Real) and not isfinite(number):
                         return EncodeError(f"{self.name}: {name} = {number} is not finite")
-        codes = re.findall(r"\d*[a-zA-Z]", self.struct.format)
+        codes = _CODE.findall(self.struct.format)
         for name, code, value in zip(self.field_names, codes, self.encode(message), strict=True):
             try:
                 Struct("<" + code).pack(value)
@@ -129,7 +132,7 @@ def message(
             bytes((generated.crc_extra,)),
             struct,
             struct.size if size_v1 is None else size_v1,
-            tuple(field for field, code in names for _ in re.findall(r"\d*[a-zA-Z]", code)),
+            tuple(field for field, code in names for _ in _CODE.findall(code)),
             getattr(kind, "decode", partial(_as_sent, kind)),
             getattr(kind, "encode", _as_they_are),
             finite,
@@ -153,5 +156,5 @@ def _codes(layout: str) -> list[str]:
 
     ``4f`` becomes four values; ``16s`` is one, and so are the 16 bytes of ``16B``.
     """
-    fields = re.findall(r"\d*[a-zA-Z]", re.sub(r"(\d+)B", r"\1s", layout))
+    fields = _CODE.findall(re.sub(r"(\d+)B", r"\1s", layout))
     return [field if field.endswith("s") else field[-1] * int(field[:-1] or 1) for field in fields]

@@ -76,25 +76,11 @@ class HomePosition(NamedTuple):
 
     @staticmethod
     def decode(source: Source, fields: Fields) -> HomePosition | None:
-        if not on_globe(fields[0], fields[1]):
-            return None
-        return HomePosition(
-            source,
-            fields[0] / 1e7,
-            fields[1] / 1e7,
-            fields[2] / 1e3,
-            fields[3:6],
-            fields[6:10],
-            fields[10:13],
-            fields[13],
-        )
+        place = _home(fields)
+        return None if place is None else HomePosition(source, *place, fields[13])
 
     def encode(self) -> Fields:
-        place = (
-            *degrees_e7(self.latitude, self.longitude),
-            round(self.altitude * 1e3),
-        )
-        return (*place, *self.position_ned, *self.attitude, *self.approach, self.time)
+        return *_home_fields(self), self.time
 
 
 @message("SET_HOME_POSITION", size_v1=53)
@@ -113,23 +99,23 @@ class SetHomePosition(NamedTuple):
 
     @staticmethod
     def decode(source: Source, fields: Fields) -> SetHomePosition | None:
-        if not on_globe(fields[0], fields[1]):
-            return None
-        return SetHomePosition(
-            source,
-            fields[0] / 1e7,
-            fields[1] / 1e7,
-            fields[2] / 1e3,
-            fields[3:6],
-            fields[6:10],
-            fields[10:13],
-            fields[13],
-            fields[14],
-        )
+        place = _home(fields)
+        return None if place is None else SetHomePosition(source, *place, fields[13], fields[14])
 
     def encode(self) -> Fields:
-        place = (
-            *degrees_e7(self.latitude, self.longitude),
-            round(self.altitude * 1e3),
-        )
-        return (*place, *self.position_ned, *self.attitude, *self.approach, self.target_system, self.time)
+        return *_home_fields(self), self.target_system, self.time
+
+
+def _home(
+    fields: Fields,
+) -> tuple[float, float, float, Vector, tuple[float, float, float, float], Vector] | None:
+    """Return what both messages of home have in common, from latitude to approach; None beyond the globe."""
+    if not on_globe(fields[0], fields[1]):
+        return None
+    return fields[0] / 1e7, fields[1] / 1e7, fields[2] / 1e3, fields[3:6], fields[6:10], fields[10:13]
+
+
+def _home_fields(home: HomePosition | SetHomePosition) -> Fields:
+    """Return the fields that both messages of home have in common: the first thirteen."""
+    place = *degrees_e7(home.latitude, home.longitude), round(home.altitude * 1e3)
+    return *place, *home.position_ned, *home.attitude, *home.approach

@@ -11,11 +11,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from mavlink_bridge.messages import CommandInt, CommandLong
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.firmware import CommandRefusal, Firmware, Mode
-from sitl.values.home import ABOVE_HOME, ABOVE_SEA
+from sitl.values.home import ABOVE_HOME, ABOVE_SEA, NOWHERE
 
 _FORCED: Final = 21196.0
-# INT32_MAX in a field of COMMAND_INT
-NOWHERE: Final = 0x7FFFFFFF
 
 
 class Order(NamedTuple):

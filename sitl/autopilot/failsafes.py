@@ -99,7 +99,7 @@ class Failsafes:
         commander = self._commander
         if charge.remaining <= 0.0 and commander.armed:
             commander.cut("Battery empty: motors stopped")
-        condition = self._flavour.condition(charge)
+        condition = self._flavour.battery_condition(charge)
         if not commander.armed and condition.level < self._battery_condition.level:
             self._battery_condition = condition
         if condition.level <= self._battery_condition.level:

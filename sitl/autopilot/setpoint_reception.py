@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import SetpointAttitude, SetpointGlobal, SetpointLocal, Vector
+from mavlink_bridge.messages.fields import on_globe
 from sitl.autopilot.firmware import Firmware, Status
 from sitl.autopilot.guidance import Activity, Guidance
 from sitl.telemetry.status_text import StatusReporter
@@ -25,8 +26,6 @@ _SECOND: Final = 1_000_000
 _RISING: Final = (0.2, 0.1, 0.1)
 # Pause (µs) after which a set-point begins a new stream.
 _PAUSE: Final = 2 * _SECOND
-# Greatest latitude and longitude (degE7).
-_POLE, _DATE_LINE = 900_000_000, 1_800_000_000
 
 
 class Stream(NamedTuple):
@@ -131,7 +130,7 @@ def _localised(
         if message.frame not in ABOVE_SEA | ABOVE_HOME:
             reason = f"frame {message.frame}"
             return Stop(f"Set-point stops: {reason}") if stops else Refusal(f"Set-point refused: {reason}")
-        if abs(message.x) > _POLE or abs(message.y) > _DATE_LINE:
+        if not on_globe(message.x, message.y):
             return Refusal("Set-point refused: no such place on the globe")
         position = _position(message, origin, home)
     return SetpointLocal(

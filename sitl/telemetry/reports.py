@@ -65,7 +65,7 @@ _EKF_READY: Final[int] = (
     | mavlink.EKF_PRED_POS_HORIZ_REL
     | mavlink.EKF_PRED_POS_HORIZ_ABS
 )
-_EKF_WAITING: Final[int] = mavlink.EKF_ATTITUDE | mavlink.EKF_CONST_POS_MODE | mavlink.EKF_UNINITIALIZED
+_EKF_WAITING: Final[int] = mavlink.EKF_ATTITUDE | mavlink.EKF_CONST_POS_MODE
 # The flags that a third, and two thirds, of the start-up add.
 _EKF_VERTICAL: Final[int] = mavlink.EKF_VELOCITY_VERT | mavlink.EKF_POS_VERT_ABS
 _EKF_HORIZONTAL: Final[int] = mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_POS_HORIZ_REL
@@ -196,11 +196,13 @@ def position_target(s: Snapshot) -> Message | None:
 def ekf_status(s: Snapshot) -> Message:
     """Return EKF_STATUS_REPORT (193)."""
     good = _TESTED if s.located else 0.0
-    return EkfStatus(s.source, estimator_flags(s), good, max(good, s.strain), _TESTED, _TESTED)
+    # The same bit means a GPS glitch in ESTIMATOR_STATUS.
+    waits = 0 if s.ready or not s.located else mavlink.EKF_UNINITIALIZED
+    return EkfStatus(s.source, estimator_flags(s) | waits, good, max(good, s.strain), _TESTED, _TESTED)
 
 
 def estimator_flags(s: Snapshot) -> int:
-    """Return EKF_STATUS_FLAGS; ESTIMATOR_STATUS_FLAGS have the same values (except EKF_UNINITIALIZED).
+    """Return the flags that EKF_STATUS_FLAGS and ESTIMATOR_STATUS_FLAGS have in common.
 
     While ``waking``: attitude at once, vertical velocity and height from a third, horizontal velocity and
     relative position from two thirds.

@@ -147,9 +147,7 @@ def estimator_status(s: Snapshot) -> Message:
     good = 0.05 if s.located else _NAN
     # The ratios of this message are squares.
     ratios = good, max(good, s.strain**2), 0.05, 0.05, _NAN, _NAN
-    # The bit that means "not initialised" in EKF_STATUS_REPORT means a GPS glitch here.
-    flags = estimator_flags(s) & ~mavlink.EKF_UNINITIALIZED
-    return EstimatorStatus(s.source, s.time, *ratios, 0.3 + s.spread, 0.3, flags)
+    return EstimatorStatus(s.source, s.time, *ratios, 0.3 + s.spread, 0.3, estimator_flags(s))
 
 
 def home(s: Snapshot) -> Message | None:

@@ -15,6 +15,8 @@ ABOVE_HOME: Final = frozenset(
     (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 )
 """Frames whose altitude counts from home."""
+NOWHERE: Final = 0x7FFFFFFF
+"""INT32_MAX as latitude or longitude: the vehicle's position, or "unchanged"."""
 _NAN = float("nan")
 
 

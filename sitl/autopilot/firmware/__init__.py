@@ -176,7 +176,7 @@ class Firmware(Protocol):
         """Return the reason against entering ``mode`` now, or None."""
         ...
 
-    def condition(self, charge: Charge, /) -> BatteryCondition:
+    def battery_condition(self, charge: Charge, /) -> BatteryCondition:
         """Return the severity of the battery's state."""
         ...
 

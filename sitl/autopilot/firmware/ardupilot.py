@@ -166,7 +166,7 @@ class ArduPilot:
             return CommandRefusal(mavlink.MAV_RESULT_FAILED, "Auto: Missing Takeoff Cmd")
         return None
 
-    def condition(self, charge: Charge, /) -> BatteryCondition:
+    def battery_condition(self, charge: Charge, /) -> BatteryCondition:
         """Return the severity of the battery's state, by voltage."""
         battery = self._battery
         if charge.voltage < battery.critical_voltage:

@@ -150,7 +150,7 @@ class Px4:
             )
         return None
 
-    def condition(self, charge: Charge, /) -> BatteryCondition:
+    def battery_condition(self, charge: Charge, /) -> BatteryCondition:
         """Return the severity of the battery's state, by its remaining charge."""
         battery = self._battery
         if charge.remaining < battery.emergency:

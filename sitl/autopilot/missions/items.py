@@ -8,7 +8,8 @@ from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from sitl.values.home import ABOVE_HOME, ABOVE_SEA
+from mavlink_bridge.messages.fields import on_globe
+from sitl.values.home import ABOVE_HOME, ABOVE_SEA, NOWHERE
 
 
 class Type(IntEnum):
@@ -67,9 +68,6 @@ _KNOWN: Final = {
     Type.RALLY: (mavlink.MAV_CMD_NAV_RALLY_POINT,),
 }
 
-# INT32_MAX as a coordinate: the vehicle's position.
-NOWHERE: Final = 0x7FFFFFFF
-_LAST: Final = 900_000_000, 1_800_000_000
 _HIGHEST: Final = 10_000.0
 _LONGEST: Final = 86_400.0
 _FEWEST: Final = 3
@@ -154,9 +152,9 @@ def _place_fault(item: Item) -> int:
     result: int = mavlink.MAV_MISSION_ACCEPTED
     if item.frame not in ABOVE_SEA | ABOVE_HOME:
         result = mavlink.MAV_MISSION_UNSUPPORTED_FRAME
-    elif placed and abs(item.x) > _LAST[0]:
+    elif placed and not on_globe(item.x, 0):
         result = mavlink.MAV_MISSION_INVALID_PARAM5_X
-    elif placed and abs(item.y) > _LAST[1]:
+    elif placed and not on_globe(0, item.y):
         result = mavlink.MAV_MISSION_INVALID_PARAM6_Y
     # The height may be NaN only for a landing, which does not use it.
     elif not abs(item.z) <= _HIGHEST and not (lands and math.isnan(item.z)):

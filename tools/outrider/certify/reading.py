@@ -124,10 +124,8 @@ class _Tally:
 
 def _read(owner: int, path: Path, at: Callable[[int], None]) -> Log:
     """Read one log; ``at`` receives the number of bytes read. Raises LogError."""
-    tally, codec = (
-        _Tally(owner),
-        Codec(lambda identifier, _system, _component: identifier == mavlink.MAVLINK_MSG_ID_TUNNEL),
-    )
+    tally = _Tally(owner)
+    codec = Codec(lambda identifier, _system, _component: identifier == mavlink.MAVLINK_MSG_ID_TUNNEL)
     reader, size = read_tlog(path), 0
     for number, record in enumerate(reader):
         size += 8 + len(record.frame)

@@ -11,7 +11,8 @@ from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from mavlink_bridge.messages import CommandLong, Heartbeat, Message, ParamRequestRead, Source
+from companion.telemetry.sharing import onboard_heartbeat
+from mavlink_bridge.messages import CommandLong, Message, ParamRequestRead, Source
 from outrider.doctor.examination import Examination
 from outrider.doctor.objections import Objections
 from outrider.doctor.sender_record import SenderRecord
@@ -89,8 +90,7 @@ class Questions:
         said: list[Message] = []
         if self._beat is None or now - self._beat >= _HEARTBEAT_EVERY:
             self._beat = now
-            kind, autopilot = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
-            said.append(Heartbeat(self.me, kind, autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE))
+            said.append(onboard_heartbeat(self.me))
         if vehicle is not None:
             open_ones = [key for key in self._wanted(vehicle, now) if self._is_open(key, vehicle, now)]
             said += [self._ask(key, vehicle, now) for key in open_ones[:_AT_ONCE]]

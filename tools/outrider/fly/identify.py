@@ -6,6 +6,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.flight.autopilots import Profile
 from companion.flight.autopilots.known import KNOWN, profile_of
+from companion.telemetry.sharing import onboard_heartbeat
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.wire.codec import Codec
@@ -49,15 +50,7 @@ class Identification:
             # Routers and autopilots that wait for a first message learn the return address from this
             # heartbeat.
             self._next = now + _BEAT
-            beat = Heartbeat(
-                self._own,
-                mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-                mavlink.MAV_AUTOPILOT_INVALID,
-                0,
-                0,
-                mavlink.MAV_STATE_ACTIVE,
-            )
-            self._link.send(self._codec.encode(beat))
+            self._link.send(self._codec.encode(onboard_heartbeat(self._own)))
         for data in self._link.receive():
             for message in self._codec.feed(data, whole=True):
                 if isinstance(message, Heartbeat) and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID:

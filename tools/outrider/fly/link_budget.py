@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.flight.readiness import HEALTH, STREAMS
+from companion.telemetry.sharing import onboard_heartbeat
 from mavlink_bridge.links.endpoints import BAUD_RATES, Endpoint, Serial
 from mavlink_bridge.messages import (
     Attitude,
@@ -15,7 +16,6 @@ from mavlink_bridge.messages import (
     ExtendedSysState,
     GlobalPosition,
     GpsRaw,
-    Heartbeat,
     LocalPosition,
     Message,
     SetpointLocal,
@@ -42,9 +42,7 @@ _SECOND: Final = 1e6
 _ONE: Final = Source(1, 1)
 _STATE: Final = GlobalPosition(_ONE, 1, 1.0, 1.0, 1.0, 1.0, (1.0, 1.0, 1.0), 1.0)
 _PLAN: Final = Tunnel(_ONE, 0, 0, PAYLOAD_TYPE, b"\xff" * 128)
-_BEAT: Final = Heartbeat(
-    _ONE, mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE
-)
+_BEAT: Final = onboard_heartbeat(_ONE)
 _ANY: Final[Vector] = (1.0, 1.0, 1.0)
 _SETPOINT: Final = SetpointLocal(_ONE, 1, 1, 1, 1, 1, _ANY, _ANY, _ANY, 1.0, 1.0)
 _TOLD: Final[dict[int, Message]] = {
