@@ -76,7 +76,7 @@ class Companion:
             if config.avoidance == "certified"
             else FieldAvoidance(config, world, pilot, times)
         )
-        self._goals = Goals(config, system, pilot, self.avoidance.seconds)
+        self._goals = Goals(config, system, pilot, self.avoidance.lookahead_s)
         self._orders = Orders(config, own, fleet, pilot, self._goals)
         self._planning = Planning(config, world, pilot, self._goals, self.avoidance)
         self._setpoints = Setpoints(config, own, pilot, self.avoidance, self._planning)

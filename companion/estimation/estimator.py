@@ -93,7 +93,7 @@ class Estimator:
         if len(z) == 3:
             return self._after_place(belief, time, z)
         if belief is None:
-            return Belief(time, z, self._first, self._turning.unknown, (), 0)
+            return Belief(time, z, self._first, self._turning.prior, (), 0)
         elapsed = time - belief.time
         (s, t, u), (j, k, m, n), P = gain(self._noise, belief.P, elapsed)
         # x = F x and y = z − x, then x + K y: per axis the position, then the velocity.
@@ -113,7 +113,7 @@ class Estimator:
             e + m * yb + n * ye,
             f + m * yc + n * yf,
         )
-        turn = self._turning.after(belief.turn, dt, (d, e), (x[3], x[4]))
+        turn = self._turning.updated(belief.turn, dt, (d, e), (x[3], x[4]))
         return Belief(time, x, P, turn, (), belief.refused)
 
     def _after_place(self, belief: Belief | None, time: int, z: Three) -> Belief:
@@ -122,7 +122,7 @@ class Estimator:
         The innovation of the velocity is 0 and its measurement noise is very large.
         """
         if belief is None:
-            return Belief(time, (*z, 0.0, 0.0, 0.0), self._first_blind, self._turning.unknown, (), 0)
+            return Belief(time, (*z, 0.0, 0.0, 0.0), self._first_blind, self._turning.prior, (), 0)
         elapsed = time - belief.time
         (s, t, u), (j, _, m, _), P = gain(self._blind, belief.P, elapsed)
         dt = 1e-6 * elapsed
@@ -133,7 +133,7 @@ class Estimator:
         if far > self._most(elapsed) ** 2 or u * far > self._gate * (s * u - t * t):
             return self._doubt(belief, time, (*z, d, e, f), self._first_blind)
         x = (a + j * ya, b + j * yb, c + j * yc, d + m * ya, e + m * yb, f + m * yc)
-        return Belief(time, x, P, self._turning.unknown, (), belief.refused)
+        return Belief(time, x, P, self._turning.prior, (), belief.refused)
 
     def _doubt(self, belief: Belief, time: int, z: Six, first: Square) -> Belief:
         doubts = list(belief.doubts)
@@ -146,7 +146,7 @@ class Estimator:
                 del doubts[index]
                 break
         if witnesses >= self._witnesses:
-            return Belief(time, z, first, self._turning.unknown, (), belief.refused)
+            return Belief(time, z, first, self._turning.prior, (), belief.refused)
         doubts.append(RefusedMeasurement(time, z, witnesses))
         return belief._replace(doubts=tuple(doubts[-_DOUBTS:]), refused=belief.refused + 1)
 

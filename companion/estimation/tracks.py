@@ -16,7 +16,7 @@ from companion.estimation.estimator import Belief, Measured, Six, estimator
 from companion.estimation.kalman_gains import model
 from companion.estimation.out_of_sequence import OutOfSequenceBuffer
 from companion.estimation.sender_clock import SenderClock
-from companion.estimation.turn_rate import Path, carried
+from companion.estimation.turn_rate import Path, turning_path
 from companion.values.horizon import Array
 
 _FAR, _FAST = 1e5, 100.0
@@ -39,7 +39,7 @@ class State(NamedTuple):
 
     def ahead(self, seconds: Array) -> Path:
         """Return position and velocity ``seconds`` (n,) later, at constant speed and turn rate."""
-        return carried(self.position, self.velocity, self.turn_rate, seconds)
+        return turning_path(self.position, self.velocity, self.turn_rate, seconds)
 
 
 class Track:
@@ -163,7 +163,7 @@ class Track:
         if rate == 0.0:
             position, velocity = np.array((a + dt * d, b + dt * e, c + dt * f)), np.array((d, e, f))
         else:
-            path = carried(np.array((a, b, c)), np.array((d, e, f)), rate, np.array((dt,)))
+            path = turning_path(np.array((a, b, c)), np.array((d, e, f)), rate, np.array((dt,)))
             position, velocity = path.positions[0], path.velocities[0]
         if age > most:
             return State(position, np.zeros(3), age, sigma)

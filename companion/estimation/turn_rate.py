@@ -42,9 +42,9 @@ class TurnFilter:
 
     def __init__(self, sigma: float, memory: float, sigma_velocity: float) -> None:
         self._variance, self._memory, self._noise = sigma**2, memory, sigma_velocity**2
-        self.unknown = Turn(0.0, self._variance)
+        self.prior = Turn(0.0, self._variance)
 
-    def after(self, turn: Turn, dt: float, before: tuple[float, float], now: tuple[float, float]) -> Turn:
+    def updated(self, turn: Turn, dt: float, before: tuple[float, float], now: tuple[float, float]) -> Turn:
         """Return the estimate ``dt`` seconds later.
 
         ``before`` and ``now``: the horizontal velocity (m/s) before and after. ``turn`` is returned unchanged
@@ -52,17 +52,17 @@ class TurnFilter:
         """
         if self._variance == 0.0 or dt <= 0.0:
             return turn
-        kept = exp(-dt / self._memory)
-        rate, variance = kept * turn.rate, kept**2 * turn.variance + (1.0 - kept**2) * self._variance
+        decay = exp(-dt / self._memory)
+        rate, variance = decay * turn.rate, decay**2 * turn.variance + (1.0 - decay**2) * self._variance
         speed = min(hypot(*before), hypot(*now))
         if speed * dt < _NEAR:
             return Turn(rate, variance)
-        seen = remainder(atan2(now[1], now[0]) - atan2(before[1], before[0]), tau) / dt
-        share = variance / (variance + 2.0 * self._noise / (speed * dt) ** 2)
-        return Turn(rate + share * (seen - rate), (1.0 - share) * variance)
+        measured = remainder(atan2(now[1], now[0]) - atan2(before[1], before[0]), tau) / dt
+        gain = variance / (variance + 2.0 * self._noise / (speed * dt) ** 2)
+        return Turn(rate + gain * (measured - rate), (1.0 - gain) * variance)
 
 
-def carried(position: Array, velocity: Array, rate: float, seconds: Array) -> Path:
+def turning_path(position: Array, velocity: Array, rate: float, seconds: Array) -> Path:
     """Return the path from ``position`` (3,), m, at ``velocity`` (3,), m/s, after each of ``seconds`` (n,).
 
     The course turns at ``rate`` (rad/s); speed and vertical speed stay constant.

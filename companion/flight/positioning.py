@@ -12,13 +12,13 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import EkfStatus, EstimatorStatus, GpsRaw, Message
 
-_REFUSES = 1.0
+_REJECTS = 1.0
 """Ratio of innovation to gate from which the estimator rejects GPS."""
-_COASTING = 0.1
+_DEAD_RECKONING_ERROR = 0.1
 """m/s²: two standard deviations of the acceleration error of dead reckoning."""
-_FURTHEST = 10.0
+_LARGEST_RADIUS = 10.0
 """m; upper bound of the radius: distances are not widened further."""
-_FADES = 2_000_000
+_CONVERGENCE_US = 2_000_000
 """µs from the return of GPS until the estimate has converged to it."""
 
 
@@ -33,10 +33,10 @@ class Positioning:
         self._absolute: bool | None = None
         self._refused = False
         self._accuracy: float | None = None
-        self._good: float | None = None
-        self._since: int | None = None
-        self._until: int | None = None
-        self._worst = 0.0
+        self._accuracy_before: float | None = None
+        self._lost_at: int | None = None
+        self._recovered_at: int | None = None
+        self._largest_error = 0.0
         self._now = 0
 
     def receive(self, message: Message) -> None:
@@ -49,7 +49,7 @@ class Positioning:
             absolute = bool(message.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS)
             self._absolute = absolute if absolute or self._absolute is not None else None
             # NaN means not tested.
-            self._refused = absolute and message.horizontal >= _REFUSES
+            self._refused = absolute and message.horizontal >= _REJECTS
             if isinstance(message, EstimatorStatus):
                 self._accuracy = message.horizontal_accuracy
 
@@ -57,15 +57,15 @@ class Positioning:
         """Set the time to ``now`` (µs) and update the radius."""
         self._now = now
         if self.trouble:
-            self._since = now if self._since is None else self._since
-            self._until = None
-            self._worst = max(self._worst, self._estimated())
+            self._lost_at = now if self._lost_at is None else self._lost_at
+            self._recovered_at = None
+            self._largest_error = max(self._largest_error, self._estimated())
             return
-        self._good = self._accuracy
-        if self._since is not None:
-            self._until = now + _FADES if self._until is None else self._until
-            if now >= self._until:
-                self._since, self._until, self._worst = None, None, 0.0
+        self._accuracy_before = self._accuracy
+        if self._lost_at is not None:
+            self._recovered_at = now + _CONVERGENCE_US if self._recovered_at is None else self._recovered_at
+            if now >= self._recovered_at:
+                self._lost_at, self._recovered_at, self._largest_error = None, None, 0.0
 
     @property
     def trouble(self) -> str:
@@ -82,12 +82,16 @@ class Positioning:
 
         It is 0 with good positioning, grows during ``trouble`` to 10 m at most, and is 0 again 2 s after it.
         """
-        return min(self._worst, _FURTHEST)
+        return min(self._largest_error, _LARGEST_RADIUS)
 
     def _estimated(self) -> float:
         """Return the error (m) by elapsed time, or by the estimator's own report if that is larger."""
-        since = self._now if self._since is None else self._since
-        coasted = 0.5 * _COASTING * (1e-6 * (self._now - since)) ** 2
-        if self._accuracy is None or self._good is None or not self._accuracy >= self._good:
-            return coasted
-        return max(coasted, 2.0 * (self._accuracy - self._good))
+        lost_at = self._now if self._lost_at is None else self._lost_at
+        dead_reckoned = 0.5 * _DEAD_RECKONING_ERROR * (1e-6 * (self._now - lost_at)) ** 2
+        if (
+            self._accuracy is None
+            or self._accuracy_before is None
+            or not self._accuracy >= self._accuracy_before
+        ):
+            return dead_reckoned
+        return max(dead_reckoned, 2.0 * (self._accuracy - self._accuracy_before))

@@ -17,9 +17,9 @@ from companion.values.horizon import Array, Horizon
 from mavlink_bridge.frames import LocalFrame
 from mavlink_bridge.messages import SetpointLocal, Source, Vector
 
-NONE: Array = np.zeros(3)
+NO_ACCELERATION: Array = np.zeros(3)
 """No compensation."""
-NONE.flags.writeable = False
+NO_ACCELERATION.flags.writeable = False
 UNBOUNDED: Array = np.full(3, np.inf)
 UNBOUNDED.flags.writeable = False
 
@@ -32,8 +32,8 @@ def setpoint(
     local: LocalFrame,
     own: Source,
     mask: int,
-    compensation: Array = NONE,
-    bias: Array = NONE,
+    compensation: Array = NO_ACCELERATION,
+    bias: Array = NO_ACCELERATION,
     v_max: Array = UNBOUNDED,
     lead: int = 0,
 ) -> SetpointLocal:
@@ -48,7 +48,7 @@ def setpoint(
     motion = horizon.at(time)
     acceleration = horizon.at(time + lead).acceleration if lead else motion.acceleration
     velocity = motion.velocity
-    if bias is not NONE:
+    if bias is not NO_ACCELERATION:
         most = np.maximum(np.abs(velocity), v_max)
         velocity = np.minimum(np.maximum(velocity + bias, -most), most)
     return SetpointLocal(

@@ -63,13 +63,13 @@ class Goals:
     """Destinations of the vehicle of ``system``.
 
     ``pilot`` gives the phase, and receives a report when the vehicle is back and when it has settled.
-    ``seconds``: how far ahead a plan ends, s.
+    ``lookahead_s``: how far ahead a plan ends, s.
     """
 
-    def __init__(self, config: CompanionConfig, system: int, pilot: Flight, seconds: float) -> None:
+    def __init__(self, config: CompanionConfig, system: int, pilot: Flight, lookahead_s: float) -> None:
         self._config = config
         self._pilot = pilot
-        self._seconds = seconds
+        self._lookahead_s = lookahead_s
         self._surface = config.surface_of(system)
         self._settling = Settling(config)
         self._phase: Phase | None = None
@@ -151,7 +151,7 @@ class Goals:
 
     def _around(self, target: State, measured: Motion, mates: Array) -> Aim:
         """Return the aim on the surface around the target's position at the end of the horizon."""
-        ahead, rate, surface = self._seconds, self._config.turn_rate, self._surface
+        ahead, rate, surface = self._lookahead_s, self._config.turn_rate, self._surface
         (end,), (velocity,) = target.ahead(np.array([ahead]))
         here = measured.position - target.position
         turn, apart = self._turn(here, mates - target.position)

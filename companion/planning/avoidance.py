@@ -55,7 +55,7 @@ class Avoidance(Protocol):
     """Time (µs) at which the next plan is due; with committed plans, the next yaw."""
 
     @property
-    def seconds(self) -> float:
+    def lookahead_s(self) -> float:
         """Upper bound (s) of the time from now to the end of the next plan."""
         ...
 

@@ -41,7 +41,7 @@ class CertifiedAvoidance:
     ) -> None:
         self._config, self._world, self._pilot, self._times = config, world, pilot, times
         self._flight = CertifiedFlight(config, own, fleet)
-        self.seconds = self._flight.seconds
+        self.lookahead_s = self._flight.lookahead_s
         self.tracking = Tracking(TrackingConfig(compensate=False, usual=None, alarm=None))
         self.horizon: Horizon | None = None
         self.log = PlanLog()

@@ -36,7 +36,7 @@ class FieldAvoidance:
         self.planner = Planner(config)
         self.guard = Guard(config)
         self.tracking = Tracking(config.tracking)
-        self.seconds = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
+        self.lookahead_s = (config.horizon.steps + 1) * config.horizon.dt_us * 1e-6
         self.next_due = 0
         self.plan: Plan | None = None
         """Last plan of the ``planner``; None before the first."""

@@ -214,7 +214,7 @@ class Commander:
             self._autonomous_step(now)
         elif guidance.activity is Activity.TAKEOFF and guidance.reached:
             self.mode = self._chosen = self._flavour.after_takeoff
-            guidance.settle()
+            guidance.end_takeoff()
         if not self.landed:
             self._postpone(now)
         elif now >= self._disarm_at:

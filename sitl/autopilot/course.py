@@ -57,7 +57,7 @@ class Course:
         guidance = self._guidance
         if guidance.activity is Activity.IDLE:
             return None
-        motion = self._origin.motion_to_site(guidance.asked)
+        motion = self._origin.motion_to_site(guidance.commanded)
         yaw = guidance.yaw + self._origin.turn
         return Reference(motion[0], motion[1], motion[2], yaw=yaw, yaw_rate=guidance.yaw_rate)
 

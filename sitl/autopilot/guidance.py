@@ -55,7 +55,7 @@ class Guidance:
         self._received = 0
         self._deadline = _FOR_EVER
         self._interrupted: tuple[Activity, Setpoint] | None = None
-        self._asked: Motion | None = None
+        self._commanded: Motion | None = None
         self.activity = Activity.IDLE
         self.timed_out = False
 
@@ -85,9 +85,9 @@ class Guidance:
         return shaper.position, shaper.velocity, shaper.acceleration
 
     @property
-    def asked(self) -> Motion:
+    def commanded(self) -> Motion:
         """Motion requested by set-points now, or the motion itself if there are none."""
-        return self._asked if self._asked is not None and self._chased else self.motion
+        return self._commanded if self._commanded is not None and self._unshaped else self.motion
 
     @property
     def yaw(self) -> float:
@@ -118,7 +118,7 @@ class Guidance:
         age = (now - self._received) * 1e-6
         if self.activity is Activity.GO:
             return self._setpoint
-        if self._chased:
+        if self._unshaped:
             # ArduPilot extrapolates a set-point until its time-out; PX4 keeps it unchanged.
             return self._setpoint.after(age if config.flavour == "ardupilot" else 0.0, math.inf)
         return self._setpoint.after(age, config.thrusting).limited(config.max_speed, config.max_acceleration)
@@ -153,17 +153,17 @@ class Guidance:
             self._interrupted = Activity.TRACK, setpoint
             return
         self._begin(Activity.TRACK, setpoint)
-        if self._chased:
+        if self._unshaped:
             return
         # With a step of zero length, a set-point that the shaper passes through takes effect without delay.
         self._shaper.advance(self.wanted(now), self._limits[Activity.TRACK], 0.0)
 
-    def hasten(self, speed: float) -> None:
+    def set_speed(self, speed: float) -> None:
         """Set the speed of the current flight to a destination to ``speed`` (m/s) from now on."""
         if self.activity is Activity.GO or (self._interrupted and self._interrupted[0] is Activity.GO):
             self._limits[Activity.GO] = self._limits[Activity.GO]._replace(speed=speed)
 
-    def look(self, yaw: float) -> None:
+    def turn_to(self, yaw: float) -> None:
         """Turn to ``yaw`` (rad), until something else sets the yaw."""
         self._setpoint = self._setpoint._replace(yaw=yaw, yaw_rate=None)
 
@@ -199,7 +199,7 @@ class Guidance:
         """Brake, and hold at the stopping point."""
         self._begin(Activity.HOLD, _STAY)
 
-    def settle(self) -> None:
+    def end_takeoff(self) -> None:
         """Hold at the end of the takeoff."""
         self.activity = Activity.HOLD
 
@@ -244,9 +244,9 @@ class Guidance:
                 return
         self._heading.advance(wanted.yaw, wanted.yaw_rate, dt)
         shaper, response = self._shaper, self._response
-        if response is not None and self._chased:
-            self._asked = wanted.position, wanted.velocity, wanted.acceleration
-            response.advance(self._asked, dt, wind, drift)
+        if response is not None and self._unshaped:
+            self._commanded = wanted.position, wanted.velocity, wanted.acceleration
+            response.advance(self._commanded, dt, wind, drift)
             # The activity after the stream begins where the firmware's response is now.
             shaper.position, shaper.velocity, shaper.acceleration = response.desired
             return
@@ -267,7 +267,7 @@ class Guidance:
         self.timed_out = True
 
     @property
-    def _chased(self) -> bool:
+    def _unshaped(self) -> bool:
         """Whether the firmware's own position controller receives the set-points unshaped."""
         return (
             self._response is not None

@@ -106,8 +106,8 @@ class Maneuvers:
         wanted = None if speed == _USUAL else speed
         self._speed = None if wanted is None else (self._commander.mode, wanted)
         if self._commander.mode is Mode.MISSION:
-            self._itinerary.hasten(wanted)
-        self._guidance.hasten(self._commander.level_speed if wanted is None else wanted)
+            self._itinerary.set_speed(wanted)
+        self._guidance.set_speed(self._commander.level_speed if wanted is None else wanted)
         return None
 
     def _pause(self, order: Order) -> CommandRefusal | None:
@@ -137,7 +137,7 @@ class Maneuvers:
         turn = math.radians(angle)
         if relative == 1.0:
             turn = self._guidance.yaw + (-turn if direction < 0.0 else turn)
-        self._guidance.look(turn)
+        self._guidance.turn_to(turn)
         return None
 
     def _reposition(self, order: Order) -> CommandRefusal | None:

@@ -124,7 +124,7 @@ class Commitment:
             # The rounded plan is checked: it is the one that the others will hold.
             kept = np.einsum("mnk,nik->mni", corridor.normals, points) - corridor.least
             if kept.min(initial=np.inf) >= 0.0:
-                push = np.einsum("mni,mnk->k", answer.pressure, corridor.normals)
+                push = np.einsum("mni,mnk->k", answer.plane_multipliers, corridor.normals)
                 self._stall.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
                 self.following = plan
                 return True

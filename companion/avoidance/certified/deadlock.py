@@ -6,8 +6,10 @@ back by its planes while its rest point makes no progress turns its goal aside a
 one side, and back again when the push is gone. Only the cost changes, and only by the vehicle's own
 solutions: nothing that certifies changes.
 
-F = Σ λ c over the planes' rows is the push; b = clip(−F·d / (pull · L), 0, 1) · clip(1 − ġ/v, 0, 1) with d
-and L the direction and the distance of the goal from the rest point, ġ the speed at which L falls.
+The push is F = Σ λ c, the sum of the planes' rows times their multipliers. The blocking is
+b = clip(−F·d / (G · L), 0, 1) · clip(1 − v_L/v, 0, 1). d and L are the direction and the distance of the goal
+from the rest point, G is the gradient of the cost per metre of error, v_L the speed at which L falls, and v
+the setting ``deadlock.speed``.
 """
 
 from __future__ import annotations
@@ -28,11 +30,11 @@ _THERE = 0.1
 class DeadlockTurn:
     """Turn of one vehicle's goal.
 
-    ``pull``: gradient of the cost per metre of error. ``sense``: +1 turns right.
+    ``gradient_per_metre``: gradient of the cost per metre of error. ``sense``: +1 turns right.
     """
 
-    def __init__(self, config: DeadlockConfig, pull: float, sense: float = 1.0) -> None:
-        self._config, self._pull, self._sense = config, pull, sense
+    def __init__(self, config: DeadlockConfig, gradient_per_metre: float, sense: float = 1.0) -> None:
+        self._config, self._gradient_per_metre, self._sense = config, gradient_per_metre, sense
         self.angle = 0.0
         """Angle (rad) by which the goal is turned now, to the side of ``sense``."""
         self._left: float | None = None
@@ -71,7 +73,7 @@ class DeadlockTurn:
         if over > 0.0:
             # In a trap that does not move, a push back along the turned way counts, too.
             against = max(against, -float(push @ turned(direction, -self._sense * self.angle)))
-        pushed = min(max(against / (self._pull * max(left, _NEAREST)), 0.0), 1.0)
+        pushed = min(max(against / (self._gradient_per_metre * max(left, _NEAREST)), 0.0), 1.0)
         pushed *= min(max(1.0 - gaining / config.speed, 0.0), 1.0)
         if pushed > config.pushed:
             most = min(config.bend_more, config.bend + config.slow * over)

@@ -23,7 +23,7 @@ from mavlink_bridge.wire.roster import Roster
 from mavlink_bridge.wire.roster import pack as pack_roster
 from mavlink_bridge.wire.roster import unpack as unpack_roster
 
-_SENSES = {"left": -1.0}
+_TURNING_SENSES = {"left": -1.0}
 
 
 class CertifiedFlight:
@@ -35,8 +35,12 @@ class CertifiedFlight:
         program = SeparationQp(
             steps, config.limits.within(config.field.margin(1)), certified, planar=config.planar
         )
-        self._turn = DeadlockTurn(certified.deadlock, program.pull, _SENSES.get(config.turning_sense, 1.0))
-        self.commitment = Commitment(certified, program, self._turn, fleet.fingerprint, planar=config.planar)
+        self._deadlock_turn = DeadlockTurn(
+            certified.deadlock, program.gradient_per_metre, _TURNING_SENSES.get(config.turning_sense, 1.0)
+        )
+        self.commitment = Commitment(
+            certified, program, self._deadlock_turn, fleet.fingerprint, planar=config.planar
+        )
         self.peers = PeerPlans(
             own.system,
             frozenset(certified.fleet),
@@ -51,14 +55,14 @@ class CertifiedFlight:
         seconds = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
         self._before_end: Array = seconds - seconds[-1]
         self._steps = steps
-        self.off = self.excursion = 0.0
-        """Distance (m) of the vehicle from its plan: ``off`` now, ``excursion`` at most."""
+        self.deviation = self.largest_deviation = 0.0
+        """Distance (m) of the vehicle from its plan: ``deviation`` now, ``largest_deviation`` at most."""
         self.left_tube = 0
         """Number of times that the vehicle left the tube."""
-        self._outside = self._steers = self._announced = False
-        self._asked: int | None = None
+        self._outside = self._in_control = self._announced = False
+        self._polled_at: int | None = None
         self._next_announcement = 0
-        self.seconds = float(seconds[-1]) + 1e-6 * certified.epoch_us
+        self.lookahead_s = float(seconds[-1]) + 1e-6 * certified.epoch_us
         """Time (s) from now to the end of the plan that is made next, at most."""
 
     def receive(self, now: int, message: Tunnel | Timesync) -> None:
@@ -82,17 +86,17 @@ class CertifiedFlight:
         announced for this epoch or a later one, because others rely on it. Otherwise a plan at rest at
         ``position`` begins; ``anchored_anew`` counts this if a plan had been announced.
         """
-        self._asked = now
+        self._polled_at = now
         commitment, horizon = self.commitment, self.commitment.horizon()
         if horizon is not None:
-            off = horizon.at(now).position - position
-            inside = float(off @ off) <= self._config.certified.tube**2
+            difference = horizon.at(now).position - position
+            inside = float(difference @ difference) <= self._config.certified.tube**2
             if inside or commitment.announced_until >= commitment.epoch(now):
                 commitment.turn(now)
                 return
         commitment.begin(now, position)
         commitment.anchored_anew += self._announced
-        self._steers = self._announced = False
+        self._in_control = self._announced = False
 
     def due(self, now: int) -> bool:
         """Begin the next epoch if it is time; return True if ``plan`` is to be called for it now.
@@ -100,7 +104,7 @@ class CertifiedFlight:
         That is when the clocks agree and the plans of all peers have arrived. At the latest possible time
         without them, the committed plan is continued for an epoch, and the result is False.
         """
-        self._asked, self._steers = now, True
+        self._polled_at, self._in_control = now, True
         if not self.commitment.turn(now):
             return False
         wrong = not self.clocks.wrong.isdisjoint(self.peers.members)
@@ -118,17 +122,17 @@ class CertifiedFlight:
         horizon = self.commitment.horizon()
         if horizon is None:
             return
-        off = horizon.at(now).position - measured.position
-        self.off = float(np.sqrt(off @ off))
-        self.excursion = max(self.excursion, self.off)
-        outside = self.off > self._config.certified.tube
+        difference = horizon.at(now).position - measured.position
+        self.deviation = float(np.sqrt(difference @ difference))
+        self.largest_deviation = max(self.largest_deviation, self.deviation)
+        outside = self.deviation > self._config.certified.tube
         self.left_tube += outside and not self._outside
         self._outside = outside
 
     @property
     def lost(self) -> bool:
         """Whether the vehicle is further than ``guard.tube`` (m) from its plan, which then begins anew."""
-        return self.off > self._config.guard.tube
+        return self.deviation > self._config.guard.tube
 
     def plan(self, now: int, aim: Aim, world: World, view: View) -> bool:
         """Make the next epoch's plan towards ``aim``; return False if the committed plan continues.
@@ -139,7 +143,7 @@ class CertifiedFlight:
         start = commitment.start()
         own = commitment.own()
         others, field = self._sources.around(now, commitment.epoch(now), own, self.peers, world, view)
-        goal = self._turn.turned(start.position_m, aim.destination)
+        goal = self._deadlock_turn.turned(start.position_m, aim.destination)
         places = goal + self._before_end[:, None] * aim.velocity
         wish = Objective(places, np.broadcast_to(aim.velocity, places.shape), field)
         return commitment.replan(wish, aim.destination, others)
@@ -167,10 +171,10 @@ class CertifiedFlight:
         if farewell:
             self.commitment.turn(now)
             farewell = self.commitment.following is None
-        elif self._asked != now:
-            self._steers = False
+        elif self._polled_at != now:
+            self._in_control = False
         announced = self.commitment.announced()
-        if announced is None or not (self._steers or farewell):
+        if announced is None or not (self._in_control or farewell):
             return sync
         if announced.epoch == self.commitment.announced_until and now < self._next_announcement:
             return sync

@@ -65,11 +65,12 @@ class Objective(NamedTuple):
 class Answer(NamedTuple):
     """Accelerations (n, 3), m/s², of a solution.
 
-    ``pressure`` (M, n, 3) ≥ 0: the multipliers of the planes' rows. ``rounds``: the number of QPs solved.
+    ``plane_multipliers`` (M, n, 3) ≥ 0: the multipliers of the planes' rows. ``rounds``: the number of QPs
+    solved.
     """
 
     accelerations: Array
-    pressure: Array
+    plane_multipliers: Array
     rounds: int
 
 
@@ -104,7 +105,7 @@ class SeparationQp:
         # Inverse of the optimality conditions without rows and bounds: the best plan is then one product.
         conditions = np.block([[self._P, self._A.T], [self._A, np.zeros((3, 3))]])
         self._without_rows: Array = np.linalg.inv(conditions)[: 3 * n]
-        self.pull = 2.0 * float(self._weights.sum())
+        self.gradient_per_metre = 2.0 * float(self._weights.sum())
         """Cost gradient at a plan that is one metre from all its preferred places."""
         a_max = np.array(limits.u_max) - _ROUNDED
         if planar:
@@ -120,14 +121,14 @@ class SeparationQp:
         )
         self._limits_low: Array = np.concatenate([-v_max, -v_max, low, -high, low, -high])
 
-    def solve(self, state: State, wish: Objective, planes: Planes) -> Answer:
+    def solve(self, state: State, objective: Objective, planes: Planes) -> Answer:
         """Return the best plan from ``state`` that keeps all rows.
 
         Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs.
         """
-        free = self._free(state.position, state.velocity)
-        c = self._cost(free[:, 2], state.velocity, state.before, wish)
-        rows = _Rows(self, free, state, planes)
+        coasting = self._coasting(state.position, state.velocity)
+        c = self._cost(coasting[:, 2], state.velocity, state.before, objective)
+        rows = _Rows(self, coasting, state, planes)
         flown = state.committed.T.ravel()
         a_max = np.maximum(self._a_max, flown)
         a_min = np.minimum(-self._a_max, flown)
@@ -139,28 +140,28 @@ class SeparationQp:
             a: Array = found.x.reshape(3, self.n).T
             broken = rows.values(a) < -_TOLERANCE
             if not broken.any():
-                return Answer(a, rows.pressure(active, found.multipliers), count)
+                return Answer(a, rows.plane_multipliers(active, found.multipliers), count)
             if not (broken & ~active).any():
                 break
             active |= broken
         raise SolverError("rows are broken", count)
 
-    def _free(self, position: Array, velocity: Array) -> Array:
+    def _coasting(self, position: Array, velocity: Array) -> Array:
         return position + self._times[:, :, None] * velocity
 
-    def _cost(self, ends: Array, velocity: Array, before: Array, wish: Objective) -> Array:
+    def _cost(self, ends: Array, velocity: Array, before: Array, objective: Objective) -> Array:
         """Return c (3n,).
 
         ``ends`` (n, 3), m: the ends of the steps without input. ``before`` (3,), m/s²: the acceleration until
         the plan begins.
         """
         config = self._config
-        flown = np.zeros_like(wish.field)
+        flown = np.zeros_like(objective.field)
         flown[0] = before
-        off = self._weights[:, None] * (ends - wish.places) - config.omega_field * wish.field
+        deviation = self._weights[:, None] * (ends - objective.places) - config.omega_field * objective.field
         c: Array = 2.0 * (
-            self._S_x.T @ off
-            + config.omega_speed * self._S_v.T @ (velocity - wish.velocities)
+            self._S_x.T @ deviation
+            + config.omega_speed * self._S_v.T @ (velocity - objective.velocities)
             - config.omega_jerk * flown
         )
         return c.T.ravel()
@@ -172,17 +173,17 @@ class _Rows:
     Rows of planes are written out only where they take part.
     """
 
-    def __init__(self, program: SeparationQp, free: Array, state: State, planes: Planes) -> None:
+    def __init__(self, program: SeparationQp, coasting: Array, state: State, planes: Planes) -> None:
         self._program, self._normals = program, planes.normals
         n = program.n
         speeds = np.repeat(state.velocity, n)
-        places = [free[:, b].T.ravel() for b in (1, 2)]
-        none = np.concatenate([s * part for part in (speeds, *places) for s in (1.0, -1.0)])
-        self._split = len(none)
-        wanted = planes.wanted - np.einsum("mnk,nik->mni", planes.normals, free)
+        places = [coasting[:, b].T.ravel() for b in (1, 2)]
+        coasted = np.concatenate([s * part for part in (speeds, *places) for s in (1.0, -1.0)])
+        self._split = len(coasted)
+        wanted = planes.wanted - np.einsum("mnk,nik->mni", planes.normals, coasting)
         # The first control point is the vehicle's position, which no input changes.
         wanted[:, 0, 0] = -np.inf
-        self._low: Array = np.concatenate([program._limits_low - none, wanted.ravel()])
+        self._low: Array = np.concatenate([program._limits_low - coasted, wanted.ravel()])
         # The planes are made so that the committed plan keeps them.
         self._low[: self._split] -= np.maximum(-self.values(state.committed)[: self._split], 0.0)
 
@@ -202,7 +203,7 @@ class _Rows:
         G = np.vstack([program._limits_G[active[: self._split]], planes.reshape(-1, 3 * n)])
         return G, self._low[active]
 
-    def pressure(self, active: NDArray[np.bool_], multipliers: Array) -> Array:
+    def plane_multipliers(self, active: NDArray[np.bool_], multipliers: Array) -> Array:
         """Return the multipliers of the planes' rows, (M, n, 3)."""
         every = np.zeros(len(active))
         every[active] = multipliers

@@ -96,7 +96,7 @@ class Dqmpc:
         n = horizon.steps + 1
         dt = horizon.dt_us * 1e-6
         self.n, self.dt, self.cost, self.limits = n, dt, cost, limits
-        self.seconds = n * dt
+        self._horizon_s = n * dt
         self.S_v, self.S_x, self._time = prediction(n, dt)
         self.G: Array = np.vstack([self.S_v, self.S_x])
         self._G_T: Array = np.ascontiguousarray(self.G.T)
@@ -155,7 +155,7 @@ class Dqmpc:
         state = np.empty((3, 2))
         state[:, 0], state[:, 1] = v, x
         off = np.empty((3, 2))
-        off[:, 0], off[:, 1] = x + self.seconds * v - destination, v - velocity
+        off[:, 0], off[:, 1] = x + self._horizon_s * v - destination, v - velocity
         free = state @ self._drift
         if self._jerk is not None and flown is None:
             flown = Flown(np.zeros(3), self.dt)
@@ -178,7 +178,7 @@ class Dqmpc:
         least, most = np.minimum(least, x_l), np.maximum(most, x_u)
         # The state that the plan begins with, recovered from the drift in the rows.
         v = self._low[:, 0] - h_l[:, 0]
-        x = self._low[:, -1] - h_l[:, -1] - self.seconds * v
+        x = self._low[:, -1] - h_l[:, -1] - self._horizon_s * v
         down = np.any(h_l > x_u @ self._G_T + _TOLERANCE, axis=1, keepdims=True)
         if down.any():
             late = -self._late(-x_u, -most, x - self._low[:, -1], -v, flown, -1.0)

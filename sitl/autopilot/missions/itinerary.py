@@ -141,7 +141,7 @@ class Itinerary:
         self._jumps.clear()
         return True
 
-    def hasten(self, speed: float | None) -> None:
+    def set_speed(self, speed: float | None) -> None:
         """Continue at ``speed`` (m/s); None restores the default."""
         self._speed = speed
 

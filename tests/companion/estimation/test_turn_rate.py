@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from companion.config.estimation import TrackConfig
 from companion.estimation.tracks import Track
-from companion.estimation.turn_rate import Turn, TurnFilter, carried
+from companion.estimation.turn_rate import Turn, TurnFilter, turning_path
 
 PERIOD = 200_000
 START = 10_000_000
@@ -31,9 +31,9 @@ times = st.floats(0.0, 3.0)
 
 @given(vectors, vectors, rates, times, times)
 def test_an_arc_goes_on_where_it_was(x, v, rate, first, then):
-    once = carried(x, v, rate, np.array([first]))
-    twice = carried(once.positions[0], once.velocities[0], rate, np.array([then]))
-    whole = carried(x, v, rate, np.array([first + then]))
+    once = turning_path(x, v, rate, np.array([first]))
+    twice = turning_path(once.positions[0], once.velocities[0], rate, np.array([then]))
+    whole = turning_path(x, v, rate, np.array([first + then]))
     np.testing.assert_allclose(twice.positions, whole.positions, atol=1e-9)
     np.testing.assert_allclose(twice.velocities, whole.velocities, atol=1e-9)
 
@@ -41,7 +41,7 @@ def test_an_arc_goes_on_where_it_was(x, v, rate, first, then):
 @given(vectors, vectors, rates, times)
 def test_the_velocity_is_what_the_position_does_and_its_size_stays(x, v, rate, time):
     step = 1e-4
-    path = carried(x, v, rate, np.array([time - step, time, time + step]))
+    path = turning_path(x, v, rate, np.array([time - step, time, time + step]))
     seen = (path.positions[2] - path.positions[0]) / (2 * step)
     np.testing.assert_allclose(seen, path.velocities[1], atol=1e-5)
     speeds = np.hypot(path.velocities[:, 0], path.velocities[:, 1])
@@ -51,7 +51,7 @@ def test_the_velocity_is_what_the_position_does_and_its_size_stays(x, v, rate, t
 
 @given(vectors, vectors, times)
 def test_who_does_not_turn_goes_straight(x, v, time):
-    path = carried(x, v, 0.0, np.array([time]))
+    path = turning_path(x, v, 0.0, np.array([time]))
     np.testing.assert_allclose(path.positions[0], x + time * v, atol=1e-12)
     np.testing.assert_array_equal(path.velocities[0], v)
 
@@ -111,19 +111,19 @@ def test_noise_is_no_turn():
 @given(st.lists(st.tuples(vectors, st.floats(0.0, 5.0)), max_size=20))
 def test_what_is_known_is_finite_and_no_worse_than_nothing(steps):
     filter_ = TurnFilter(0.5, 3.0, 0.1)
-    turn, before = filter_.unknown, (0.0, 0.0)
+    turn, before = filter_.prior, (0.0, 0.0)
     for velocity, dt in steps:
         now = (float(velocity[0]), float(velocity[1]))
-        turn = filter_.after(turn, dt, before, now)
+        turn = filter_.updated(turn, dt, before, now)
         before = now
         assert abs(turn.rate) < inf
-        assert 0.0 <= turn.variance <= filter_.unknown.variance + 1e-12
+        assert 0.0 <= turn.variance <= filter_.prior.variance + 1e-12
 
 
 def test_what_is_not_seen_any_more_is_forgotten():
     filter_ = TurnFilter(0.5, 3.0, 0.1)
     # It stands still: no course, no news.
-    turn = filter_.after(Turn(0.4, 0.01), 30.0, (0.0, 0.0), (0.0, 0.0))
+    turn = filter_.updated(Turn(0.4, 0.01), 30.0, (0.0, 0.0), (0.0, 0.0))
     assert abs(turn.rate) < 1e-4
     assert turn.variance == pytest.approx(0.25, rel=1e-6)
 
@@ -131,8 +131,8 @@ def test_what_is_not_seen_any_more_is_forgotten():
 def test_a_course_that_wraps_has_turned_a_little():
     filter_ = TurnFilter(0.5, 3.0, 0.01)
     before, now = pi - 0.05, pi + 0.05
-    turn = filter_.after(
-        filter_.unknown, 0.2, (4 * cos(before), 4 * sin(before)), (4 * cos(now), 4 * sin(now))
+    turn = filter_.updated(
+        filter_.prior, 0.2, (4 * cos(before), 4 * sin(before)), (4 * cos(now), 4 * sin(now))
     )
     assert turn.rate == pytest.approx(0.5, rel=0.1)
 

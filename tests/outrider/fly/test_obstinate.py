@@ -21,7 +21,7 @@ from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.fly.child_process import FAREWELL, KILLED, ChildProcess
 from outrider.fly.event_log import EventLog
-from outrider.fly.log import BATCH, MOST, Log
+from outrider.fly.log import BATCH, MAX_BATCHES, Log
 from outrider.fly.terminal import Terminal
 from outrider.fly.worker import Worker
 from outrider.runs.steps_file import read_steps
@@ -32,7 +32,7 @@ BEAT = Datagram("autopilot", Codec().encode(Heartbeat(Source(1, 1), 2, 3, 0, 0, 
 def written(directory: Path, count: int = 5_000) -> list[str]:
     """What is said of a log of so many steps."""
     said: list[str] = []
-    with Log(directory, 1, said.append, patience=60.0) as log:
+    with Log(directory, 1, said.append, timeout_s=60.0) as log:
         recorded(log, count)
     return said
 
@@ -66,14 +66,14 @@ def test_a_disk_that_stands_still_is_not_waited_for(tmp_path: Path, patience: No
     """A pipe that nobody reads: not even opening it comes to an end."""
     os.mkfifo(tmp_path / "vehicle-1.tlog")
     said: list[str] = []
-    log = Log(tmp_path, 1, said.append, patience=0.0)
+    log = Log(tmp_path, 1, said.append, timeout_s=0.0)
     with log:
         recorded(log, 100)
         assert said == []
-        recorded(log, BATCH * MOST)
+        recorded(log, BATCH * MAX_BATCHES)
         assert said == ["no log from here on: the disk does not respond"]
         # Nothing more is kept for it.
-        assert log._waiting.qsize() <= MOST + 1
+        assert log._waiting.qsize() <= MAX_BATCHES + 1
     assert len(said) == 1
     assert read_late(tmp_path / "vehicle-1.tlog")
 
@@ -84,7 +84,7 @@ def test_a_disk_that_stood_still_for_a_while_has_all(tmp_path: Path, patience: N
     said: list[str] = []
     found: list[bytes] = []
     late = Thread(target=lambda: found.append(read_late(tmp_path / "vehicle-1.tlog")))
-    with Log(tmp_path, 1, said.append, patience=60.0) as log:
+    with Log(tmp_path, 1, said.append, timeout_s=60.0) as log:
         recorded(log, 5_000)
         late.start()
     late.join()
@@ -97,7 +97,7 @@ def test_a_disk_that_stood_still_for_a_while_has_all(tmp_path: Path, patience: N
 def test_what_the_end_does_not_wait_for_is_said(tmp_path: Path, patience: None) -> None:
     os.mkfifo(tmp_path / "vehicle-1.tlog")
     said: list[str] = []
-    with Log(tmp_path, 1, said.append, patience=0.0) as log:
+    with Log(tmp_path, 1, said.append, timeout_s=0.0) as log:
         recorded(log, 100)
     assert said == ["no log from here on: the disk does not respond"]
     assert read_late(tmp_path / "vehicle-1.tlog")

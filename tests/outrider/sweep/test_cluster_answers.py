@@ -50,7 +50,7 @@ class Client:
         if function is eval:
             self.lives += 1
             me = f"life {self.lives}"
-            return Future(key, lambda: {"me": me, "versions": dask_tasks.equipment()})
+            return Future(key, lambda: {"me": me, "versions": dask_tasks.required_versions()})
         task = Task(**json.loads(values[-1]))
         entry = Entry(*task.run, "done", None, {"flown_at": values[0]}, 0.0)
         return Future(key, lambda: self._flies(workers[0], entry))
@@ -133,4 +133,4 @@ def test_another_life_of_a_worker_is_asked_who_it_is(monkeypatch: pytest.MonkeyP
 
 def test_a_sweep_that_is_over_gets_no_new_process() -> None:
     dask_tasks.dismiss("over")
-    assert dask_tasks.fly(dask_tasks.ME, "over", "m:f", 1.0, "{}") == {"unable": "its sweep is over"}
+    assert dask_tasks.fly(dask_tasks.WORKER_ID, "over", "m:f", 1.0, "{}") == {"unable": "its sweep is over"}

@@ -421,7 +421,7 @@ def test_between_two_messages_ardupilot_carries_a_set_point_on_and_px4_holds_it(
     for k in range(20):
         guidance.advance(k * 10_000, 10_000)
         t = (k + 1) * 0.01 if carried else 0.0
-        position, velocity, acceleration = guidance.asked
+        position, velocity, acceleration = guidance.commanded
         np.testing.assert_allclose(position, (2.0 * t + 0.25 * t * t, -t, -5.0 + 0.5 * t), atol=1e-9)
         np.testing.assert_allclose(velocity, (2.0 + 0.5 * t, -1.0, 0.5), atol=1e-9)
         assert acceleration == (0.5, 0.0, 0.0)

@@ -23,9 +23,9 @@ BATCH: Final = 16
 
 The thread writes them within a fraction of a millisecond; it holds the interpreter lock (GIL) meanwhile.
 """
-MOST: Final = 4096
+MAX_BATCHES: Final = 4096
 """Maximum number of waiting batches: a minute or two of a flight, about 20 MB."""
-PATIENCE: Final = 5.0
+WRITE_TIMEOUT_S: Final = 5.0
 """Longest time (s) for which the end waits until all is written.
 
 It is shorter than the time that the process has for its end.
@@ -45,15 +45,15 @@ class _Entry(NamedTuple):
 class Log:
     """Log of vehicle ``system`` in ``directory``: an observer of the loop, and a context manager.
 
-    No call blocks. ``tell`` is called once, with the reason, if logging has to stop.
+    No call blocks. ``report`` is called once, with the reason, if logging has to stop.
     """
 
     def __init__(
-        self, directory: Path, system: int, tell: Callable[[str], None], patience: float = PATIENCE
+        self, directory: Path, system: int, report: Callable[[str], None], timeout_s: float = WRITE_TIMEOUT_S
     ) -> None:
-        """Prepare the log; ``patience``: time limit for writing the rest at the end (s)."""
+        """Prepare the log; ``timeout_s``: time limit for writing the rest at the end (s)."""
         self._directory, self._system = directory, system
-        self._tell, self._patience = tell, patience
+        self._report, self._timeout_s = report, timeout_s
         self._ended = False
         self._batch: list[_Entry] = []
         self._waiting: SimpleQueue[list[_Entry] | None] = SimpleQueue()
@@ -74,7 +74,7 @@ class Log:
             return
         self._waiting.put(self._batch)
         self._waiting.put(None)
-        self._thread.join(self._patience)
+        self._thread.join(self._timeout_s)
         if self._thread.is_alive():
             self._end(_STILL)
 
@@ -94,7 +94,7 @@ class Log:
             return
         self._waiting.put(self._batch)
         self._batch = []
-        if self._waiting.qsize() >= MOST:
+        if self._waiting.qsize() >= MAX_BATCHES:
             # The waiting batches are still written, should the disk recover.
             self._waiting.put(None)
             self._end(_STILL)
@@ -117,4 +117,4 @@ class Log:
     def _end(self, why: object) -> None:
         if not self._ended:
             self._ended = True
-            self._tell(f"no log from here on: {why}")
+            self._report(f"no log from here on: {why}")

@@ -58,7 +58,7 @@ class Replayed(NamedTuple):
         return not self.different and not self.stray
 
 
-def reenact(
+def replay_companion(
     companion: Node,
     own: tuple[int, int],
     steps: Iterable[int],
@@ -71,7 +71,7 @@ def reenact(
     their time; those of the companion are compared with its output, frame by frame. ``own`` is its system
     and component id; ``watch`` receives the time of each step.
     """
-    together = _Together(records)
+    together = _Grouped(records)
     count = frames = setpoints = different = 0
     first: Difference | None = None
     for now in steps:
@@ -97,7 +97,7 @@ def reenact(
     return Replayed(own[0], count, frames, setpoints, different, together.stray(), first)
 
 
-class _Together:
+class _Grouped:
     """Records grouped by time; each time is requested once, in increasing order."""
 
     def __init__(self, records: Iterable[Record]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from companion.values.components import COMPONENT
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import Fault, InputError
-from outrider.replay.companion_replay import Replayed, reenact
+from outrider.replay.companion_replay import Replayed, replay_companion
 from outrider.resources import config_root, find
 from outrider.runs import names
 from outrider.runs.configuration import resolved
@@ -44,7 +44,7 @@ def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[
         records = read_tlog(directory / names.log(system))
         # Planning time is irrelevant here.
         companion = fleet.companion(k, lambda: 0)
-        found.append(reenact(companion, (system, COMPONENT), steps, records, shares.step))
+        found.append(replay_companion(companion, (system, COMPONENT), steps, records, shares.step))
     return tuple(found)
 
 

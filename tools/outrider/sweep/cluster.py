@@ -73,7 +73,7 @@ class Cluster:
     def __init__(self, address: str, run: str, wall_limit_s: float, patience_s: float = PATIENCE_S) -> None:
         self._address, self._run, self._limit, self._patience = address, run, wall_limit_s, patience_s
         self._sweep = uuid4().hex
-        self._versions = dask_tasks.equipment()
+        self._versions = dask_tasks.required_versions()
         self._sites: dict[str, _Site] = {}
         self._flights: dict[Key, _Flight] = {}
         self._answers: SimpleQueue[Future[Any]] = SimpleQueue()

@@ -21,7 +21,7 @@ from outrider.sweep.tasks import Task
 IDLE_S = 60.0
 """Time (s) after which an idle process ends: its sweep may have been killed."""
 _TICK_S = 0.5
-ME = uuid4().hex
+WORKER_ID = uuid4().hex
 """Identity of this worker process; it changes with a restart, even at the same address."""
 
 
@@ -89,23 +89,24 @@ PROCESSES = WorkerProcesses()
 
 def identify() -> dict[str, Any]:
     """Return the identity of this worker, and the versions that results depend on."""
-    return {"me": ME, "versions": equipment()}
+    return {"me": WORKER_ID, "versions": required_versions()}
 
 
-def equipment() -> dict[str, str]:
+def required_versions() -> dict[str, str]:
     """Return the versions that must be the same on this worker and on the client."""
     return {**versions(), "distributed": version_of("distributed")}
 
 
-def fly(me: str, sweep: str, run: str, wall_limit_s: float, document: str) -> dict[str, Any]:
+def fly(worker_id: str, sweep: str, run: str, wall_limit_s: float, document: str) -> dict[str, Any]:
     """Fly one run in a process of this worker.
 
     ``document``: the ``Task`` as JSON; ``run``: the ``module:function`` that flies it; ``sweep``: id of the
-    sweep; ``me``: the expected ``ME``; ``wall_limit_s``: longest wall time of the run (s). The result has one
+    sweep; ``worker_id``: the expected ``WORKER_ID``; ``wall_limit_s``: longest wall time of the run (s).
+    The result has one
     key: ``entry``, the ``Entry`` as a dict; or ``restarted`` if this is another worker; or ``unable``, the
     reason why no process can be started here.
     """
-    if me != ME:
+    if worker_id != WORKER_ID:
         return {"restarted": True}
     for _ in range(MOST_STARTS):
         process = PROCESSES.take(sweep, run)

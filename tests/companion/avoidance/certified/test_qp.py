@@ -57,8 +57,8 @@ def test_every_problem_is_solved_and_its_solution_keeps_all_rows(
     answer = solved(s)
     assert (beyond(s, answer.accelerations) - widened(s)).max() <= CLOSE
     assert np.abs(flown(s, answer.accelerations)[1][-1]).max() <= CLOSE
-    assert answer.pressure.shape == s.planes.least.shape
-    assert answer.pressure.min(initial=0.0) >= 0.0
+    assert answer.plane_multipliers.shape == s.planes.least.shape
+    assert answer.plane_multipliers.min(initial=0.0) >= 0.0
 
 
 @pytest.mark.parametrize("seed", [3116, 6514, 9760, 21895])
@@ -121,7 +121,7 @@ def test_another_solver_with_all_rows_finds_the_same_plan(kind: Callable[[int], 
         np.testing.assert_allclose(answer.accelerations, reference, rtol=0.0, atol=2e-3)
         best = cost(s, s.wishes[0], reference)
         assert cost(s, s.wishes[0], answer.accelerations) == pytest.approx(best, rel=1e-4, abs=1e-4)
-        tight += bool(answer.pressure.max(initial=0.0) > 1e-3)
+        tight += bool(answer.plane_multipliers.max(initial=0.0) > 1e-3)
     assert tight >= 3
 
 
@@ -154,7 +154,7 @@ def _by_daqp(s: Scene) -> Array:
 def test_equal_problems_have_equal_solutions_to_the_last_bit(seed: int, kind: Callable[[int], Scene]) -> None:
     first, second = (solved(kind(seed)) for _ in range(2))
     assert first.accelerations.tobytes() == second.accelerations.tobytes()
-    assert first.pressure.tobytes() == second.pressure.tobytes()
+    assert first.plane_multipliers.tobytes() == second.plane_multipliers.tobytes()
     assert first.rounds == second.rounds
 
 
@@ -181,4 +181,4 @@ def test_the_scenes_are_hard_ones() -> None:
     scenes = [scene(seed, limits) for seed in range(40) for limits in (WIDE, NARROW)]
     assert sum(widened(s).max() > 0.1 for s in scenes) > 30
     assert sum(bool((s.planes.room == 0.0).any()) for s in scenes) > 10
-    assert sum(solved(s).pressure.max(initial=0.0) > 1e-3 for s in scenes) > 30
+    assert sum(solved(s).plane_multipliers.max(initial=0.0) > 1e-3 for s in scenes) > 30
