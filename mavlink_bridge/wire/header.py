@@ -1,7 +1,8 @@
-"""Sender and message id, read from the header of a frame alone."""
+"""Sender, message id and command of a frame, read without decoding the message."""
 
 from __future__ import annotations
 
+from struct import Struct
 from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -29,3 +30,20 @@ def header(frame: bytes) -> Header:
     if frame[0] == mavlink.PROTOCOL_MARKER_V2:
         return Header(frame[5], frame[6], int.from_bytes(frame[7:10], "little"))
     return Header(frame[3], frame[4], frame[5])
+
+
+_COMMAND: Final = Struct("<28xHBB")
+"""Command and addressee in COMMAND_LONG (76), after seven floats."""
+
+
+class Command(NamedTuple):
+    """MAV_CMD of a COMMAND_LONG and its addressee."""
+
+    command: int
+    system: int
+    component: int
+
+
+def command_of(payload: bytes) -> Command:
+    """Read the ``payload`` of a COMMAND_LONG; MAVLink 2 truncates trailing zeros."""
+    return Command(*_COMMAND.unpack_from(payload.ljust(_COMMAND.size, b"\0")))

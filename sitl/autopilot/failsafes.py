@@ -9,7 +9,7 @@ from typing import Final
 from mavlink_bridge.messages import FenceStatus, Source
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.fences import Breach, Fences
-from sitl.autopilot.firmware import BatteryCondition, Firmware, Mode
+from sitl.autopilot.firmware import ACTIONS, BatteryCondition, Firmware
 from sitl.estimation.sensors import Estimate
 from sitl.telemetry.status_text import StatusReporter
 from sitl.vehicle.battery import Battery, Charge
@@ -17,7 +17,6 @@ from sitl.vehicle.battery import Battery, Charge
 _PERIOD: Final = 100_000
 # µs between two reports of the objections to arming; ArduPilot repeats them.
 _AGAIN: Final = 30_000_000
-_ACTIONS: Final = {"hold": Mode.HOLD, "return": Mode.RETURN, "land": Mode.LAND}
 _WORDS: Final = {
     Breach.TOO_LOW: "too low",
     Breach.TOO_HIGH: "too high",
@@ -135,5 +134,5 @@ class Failsafes:
         self._status_text.warn(f"Fence breached: {_WORDS[breach]}")
         if action == "terminate":
             self._commander.cut("Flight terminated")
-        elif action in _ACTIONS:
-            self._commander.fail_safe(_ACTIONS[action], now)
+        elif (mode := ACTIONS[action]) is not None:
+            self._commander.fail_safe(mode, now)

@@ -33,12 +33,12 @@ from sitl.values.setpoints import Setpoint, mask_of
 from sitl.vehicle.battery import Charge
 from sitl.vehicle.multirotor import VehicleState
 
-# MAV_TYPE by the number of rotors, else generic
-_TYPES: Final = {
+TYPES: Final = {
     4: mavlink.MAV_TYPE_QUADROTOR,
     6: mavlink.MAV_TYPE_HEXAROTOR,
     8: mavlink.MAV_TYPE_OCTOROTOR,
 }
+"""MAV_TYPE by the number of rotors; others are generic."""
 
 # Healthy from the start; GPS and the pre-arm check wait for a position.
 _SENSORS: Final = (
@@ -125,7 +125,7 @@ def heartbeat(s: Snapshot) -> Message:
     idle = mavlink.MAV_STATE_STANDBY if s.ready else mavlink.MAV_STATE_CALIBRATING
     flying = mavlink.MAV_STATE_ACTIVE if s.located else mavlink.MAV_STATE_CRITICAL
     state = flying if s.armed else idle
-    kind = _TYPES.get(s.rotors, mavlink.MAV_TYPE_GENERIC)
+    kind = TYPES.get(s.rotors, mavlink.MAV_TYPE_GENERIC)
     return Heartbeat(s.source, kind, s.autopilot, s.base_mode, s.custom_mode, state)
 
 

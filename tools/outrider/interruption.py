@@ -12,6 +12,9 @@ from typing import NamedTuple
 
 from outrider.errors import OutriderError
 
+INTERRUPTED = 3
+"""Exit status of a command that Ctrl-C or SIGTERM ended before its result was complete."""
+
 
 @contextmanager
 def interruptible(left: str) -> Iterator[None]:

@@ -12,6 +12,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from sitl.autopilot.parameters.parameter import Bound, Kind, Parameter
+from sitl.telemetry.reports import TYPES
 
 _I, _F = Kind.INT32, Kind.REAL32
 _Row = (
@@ -19,12 +20,8 @@ _Row = (
     | tuple[str, Kind, float, float, float]
     | tuple[str, Kind, float, float, float, str]
 )
-# MAV_TYPE and SYS_AUTOSTART (the generic airframes) by the number of rotors.
-_VEHICLES: Final = {
-    4: (mavlink.MAV_TYPE_QUADROTOR, 4001),
-    6: (mavlink.MAV_TYPE_HEXAROTOR, 6001),
-    8: (mavlink.MAV_TYPE_OCTOROTOR, 8001),
-}
+_AIRFRAMES: Final = {4: 4001, 6: 6001, 8: 8001}
+"""SYS_AUTOSTART of the generic airframes by the number of rotors."""
 
 BOUND: Final = {
     "MAV_SYS_ID": Bound("system_id"),
@@ -246,7 +243,7 @@ _ROWS: Final[tuple[_Row, ...]] = (
 
 def table(rotors: int) -> tuple[Parameter, ...]:
     """Return the parameters of a vehicle with ``rotors`` rotors."""
-    kind, airframe = _VEHICLES.get(rotors, (0, 0))
+    kind, airframe = TYPES.get(rotors, mavlink.MAV_TYPE_GENERIC), _AIRFRAMES.get(rotors, 0)
     vehicle: tuple[_Row, ...] = (
         ("CA_ROTOR_COUNT", _I, rotors, 0, 12),
         ("MAV_TYPE", _I, kind, 0, 22),

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
+from outrider.palette import VEHICLES, rgb
 from outrider.scenarios.scenario import Scenario
 from outrider.scene.datagram_channel import DatagramChannel
-from outrider.scene.palette import VEHICLES, rgb
 from outrider.simulation.flight import Flight
 from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.values.horizon import roll_out
-from outrider.scene.palette import VEHICLES, linear, rgb
+from outrider.palette import VEHICLES, linear, rgb
 from outrider.scene.scene import Scene, staged
 from outrider.scene.snapshot import KNOTS, Snapshot, State, euler_attitude, nearest, padded
 from outrider.view import shapes

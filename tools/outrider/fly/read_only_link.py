@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from struct import Struct
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -10,8 +9,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.dry_run import REQUESTS
 from mavlink_bridge.links.link import Link, LinkCounters
 from mavlink_bridge.wire.framing import Frame, leading_frames
+from mavlink_bridge.wire.header import command_of
 
-_COMMAND: Final = Struct("<28xH")
 _TELL: Final = frozenset(
     (
         mavlink.MAVLINK_MSG_ID_HEARTBEAT,
@@ -62,6 +61,5 @@ class ReadOnlyLink:
 def harmless(frame: Frame) -> bool:
     """Return whether ``frame`` leaves a vehicle's behaviour unchanged."""
     if frame.message_id == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
-        (command,) = _COMMAND.unpack_from(frame.payload.ljust(_COMMAND.size, b"\0"))
-        return command in REQUESTS
+        return command_of(frame.payload).command in REQUESTS
     return frame.message_id in _TELL

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from struct import Struct
-from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -14,9 +12,8 @@ from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import leading_frames
+from mavlink_bridge.wire.header import command_of
 from outrider.fly.setpoint_check import gauge_for
-
-_COMMAND: Final = Struct("<28xH")
 
 
 class TransmitStatistics:
@@ -48,8 +45,7 @@ class TransmitStatistics:
         for frame in leading_frames(datagram.data)[0]:
             self.messages[datagram.link] += 1
             if frame.message_id == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
-                (command,) = _COMMAND.unpack_from(frame.payload.ljust(_COMMAND.size, b"\0"))
-                self.commands[command] += 1
+                self.commands[command_of(frame.payload).command] += 1
             elif frame.message_id == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED:
                 for message in self._codec.feed(frame.data, whole=True):
                     if isinstance(message, SetpointLocal):

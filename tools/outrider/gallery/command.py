@@ -10,6 +10,7 @@ from outrider.gallery import figures
 from outrider.gallery.flying import RUN
 from outrider.gallery.page import TITLE, page
 from outrider.gallery.showings import GalleryPanel, cells_of, chosen, scenarios, showings
+from outrider.interruption import INTERRUPTED
 from outrider.runs import whole_file
 from outrider.sweep import directory as places
 from outrider.sweep.cells import scenario_of, task
@@ -17,7 +18,6 @@ from outrider.sweep.comparison import Flown, flown
 from outrider.sweep.execution import header
 from outrider.sweep.runs import run_of
 
-INTERRUPTED = 3
 SEED = 1
 PAGE = "README.md"
 

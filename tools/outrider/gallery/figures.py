@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from outrider.runs.figures import LIMIT, TARGET, THING, colour
+from outrider.palette import LIMIT, OBSTACLE, TARGET, coloured, hex_of
 from outrider.sweep.runs import Ending, Run
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ Panel = tuple[str, Run, Mapping[str, Any] | None]
 """Method, result of the run, and the scene of the flight, or None without a flight."""
 
 
+@coloured
 def draw(scenario: str, panels: Sequence[Panel], path: Path) -> None:
     """Write the PNG of one scenario to ``path``."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -68,13 +69,13 @@ def _paths(axes: Axes, scene: Mapping[str, Any]) -> None:
     from matplotlib.patches import Circle
 
     for east, north, radius in scene["obstacles"]:
-        axes.add_patch(Circle((east, north), radius, color=THING, lw=0.0))
+        axes.add_patch(Circle((east, north), radius, color=OBSTACLE, lw=0.0))
     for way, radius in zip(scene["moving"], scene["moving_radius"], strict=True):
-        axes.plot(*np.array(way).T, color=THING, lw=0.8)
-        axes.add_patch(Circle(way[-1], radius, fc="0.8", ec=THING, lw=0.8))
+        axes.plot(*np.array(way).T, color=OBSTACLE, lw=0.8)
+        axes.add_patch(Circle(way[-1], radius, fc="0.8", ec=OBSTACLE, lw=0.8))
     positions = np.array(scene["position"])
     for k in range(positions.shape[1]):
-        of = colour(k) if k < scene["vehicles"] else THING
+        of = hex_of(k) if k < scene["vehicles"] else OBSTACLE
         axes.plot(*positions[:, k].T, lw=0.9, color=of)
         axes.plot(*positions[0, k], "o", ms=3, mfc="none", color=of)
         axes.plot(*positions[-1, k], "o", ms=4, color=of)

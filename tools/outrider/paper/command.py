@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from outrider.interruption import INTERRUPTED
 from outrider.paper import figures
 from outrider.paper.flying import RUN, TRACED
 from outrider.paper.results import Result, result_of
@@ -18,8 +19,6 @@ from outrider.sweep.cells import Cell
 from outrider.sweep.comparison import Flown, flown
 from outrider.sweep.execution import header
 from outrider.sweep.runs import run_of
-
-INTERRUPTED = 3
 
 
 def paper(

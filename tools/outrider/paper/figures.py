@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from outrider.palette import OBSTACLE, TARGET, coloured, hex_of
 from outrider.paper.results import Result
 from outrider.paper.rows import Row
-from outrider.runs.figures import TARGET, THING, colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _METHODS = ("baseline", "swivel", "approach_angle", "tangential")
 
 
+@coloured
 def draw(
     rows: Sequence[Row], results: Sequence[Result], traces: Mapping[Row, Mapping[str, Any]], folder: Path
 ) -> list[Path]:
@@ -51,7 +52,7 @@ def _paths(axes: Axes, row: Row, trace: Mapping[str, Any]) -> None:
     flying = len(trace["gradient"][0]) if trace["gradient"] else 0
     for k in range(positions.shape[1]):
         bystander = k >= flying
-        of = THING if bystander else colour(k)
+        of = OBSTACLE if bystander else hex_of(k)
         axes.plot(positions[:, k, 0], positions[:, k, 1], lw=1.0, color=of)
         axes.plot(*positions[0, k, :2], "o", ms=4, mfc="none", color=of)
         axes.plot(*positions[-1, k, :2], "s" if bystander else "o", ms=5, color=of)

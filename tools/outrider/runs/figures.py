@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from outrider.palette import LIMIT, OBSTACLE, TARGET, coloured, hex_of
 from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
 from outrider.runs.summary import Value, standoff_errors, yaw_errors
@@ -15,17 +16,11 @@ from outrider.scenarios.scenario import TARGET_SYSTEM
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-TARGET, THING, LIMIT = "0.25", "0.6", "#b00020"
-"""Colours in pictures of flights: the target, obstacles and bystanders, and limits."""
 _NAMED = 24
 """Number of vehicles; the names of more would cover the figure."""
 
 
-def colour(k: int) -> str:
-    """Return the colour of vehicle ``k`` in pictures of flights."""
-    return f"C{k % 10}"
-
-
+@coloured
 def draw(flight: Outcome, summary: dict[str, Value], path: Path) -> None:
     """Write the PNG of a finished flight to ``path``."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -70,16 +65,16 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
     few = len(flight.systems) <= _NAMED
     for k, system in enumerate(flight.systems):
         name = f"{system}" if few else "_nolegend_"
-        of = colour(k)
+        of = hex_of(k)
         axes.plot(samples.position[:, k, 0], samples.position[:, k, 1], lw=1.0, color=of, label=name)
         axes.plot(*samples.position[0, k, :2], "o", ms=4, mfc="none", color=of)
         axes.plot(*samples.position[-1, k, :2], "o", ms=5, color=of)
     for obstacle in flight.scenario.obstacles:
-        axes.add_patch(Circle(obstacle.at[:2], obstacle.radius, color=THING, lw=0.0))
+        axes.add_patch(Circle(obstacle.at[:2], obstacle.radius, color=OBSTACLE, lw=0.0))
     for j, moving in enumerate(flight.scenario.moving):
         way = samples.moving[:, j, :2]
-        axes.plot(way[:, 0], way[:, 1], color=THING, lw=1.0)
-        axes.add_patch(Circle(way[-1], moving.radius, fc="0.8", ec=THING, lw=1.0))
+        axes.plot(way[:, 0], way[:, 1], color=OBSTACLE, lw=1.0)
+        axes.add_patch(Circle(way[-1], moving.radius, fc="0.8", ec=OBSTACLE, lw=1.0))
     there = samples.target[np.isfinite(samples.target).all(axis=1)]
     if len(there):
         axes.plot(there[:, 0], there[:, 1], color=TARGET, lw=1.6, ls=":")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from outrider.palette import coloured
 from outrider.shadow.setpoints import TOGETHER, Course, course
 from outrider.shadow.shadow_run import ShadowRun
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 _WOULD, _SENT, _FLOWN = "C0", "C1", "0.55"
 
 
+@coloured
 def draw(name: str, found: ShadowRun, path: Path) -> None:
     """Write the PNG: paths from above, position and speed over time, in the vehicle's local NED."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from struct import Struct
-from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -14,9 +12,8 @@ from mavlink_bridge.messages import CommandAck, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Frame, leading_frames
+from mavlink_bridge.wire.header import command_of
 from mavlink_bridge.wire.signing import Signing
-
-_ORDER: Final = Struct("<28xHBB")
 
 
 class TakeoffInhibit:
@@ -46,5 +43,4 @@ class TakeoffInhibit:
     def _is_go(self, frame: Frame) -> bool:
         if frame.message_id != mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
             return False
-        whom = _ORDER.unpack_from(frame.payload.ljust(_ORDER.size, b"\0"))
-        return whom == (mavlink.MAV_CMD_NAV_TAKEOFF, *self._own)
+        return command_of(frame.payload) == (mavlink.MAV_CMD_NAV_TAKEOFF, *self._own)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from outrider.errors import InputError
+from outrider.interruption import INTERRUPTED
 from outrider.processes.cores import cores
 from outrider.resources import find
 from outrider.runs import whole_file
@@ -29,8 +30,6 @@ from outrider.sweep.runs import Run, run_of
 from outrider.sweep.table import show
 from outrider.sweep.tasks import Task
 from outrider.yaml_files.yaml_file import load
-
-INTERRUPTED = 3
 
 
 def sweep(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from outrider.runs.figures import LIMIT
+from outrider.palette import LIMIT, coloured
 from outrider.sweep.report import CellReport
 from outrider.sweep.runs import Ending, Run
 
@@ -24,6 +24,7 @@ MOST_CURVES = 10
 Reading = Callable[[Run], float | None]
 
 
+@coloured
 def draw(name: str, cells: Sequence[CellReport], runs: Mapping[str, Sequence[Run]], path: Path) -> None:
     """Write the PNG; ``runs`` holds the runs of each cell by its key."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -10,8 +10,8 @@ import numpy as np
 import viser
 from viser import uplot
 
+from outrider.palette import hex_of
 from outrider.scenarios.options import METHODS
-from outrider.scene.palette import hex_of
 from outrider.scene.scene import Scene
 from outrider.scene.snapshot import Snapshot, nearest
 from outrider.scene.view_commands import ViewCommands

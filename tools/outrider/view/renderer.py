@@ -8,7 +8,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from outrider.scene.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, linear, rgb
+from outrider.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, linear, rgb
 from outrider.scene.scene import Scene, Solid
 from outrider.scene.snapshot import Array, Single, Snapshot
 from outrider.view import shapes

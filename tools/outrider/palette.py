@@ -1,11 +1,17 @@
-"""Colours of the report, as RGB."""
+"""Colours of all pictures: report, view, exports and matplotlib figures."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 RGB = tuple[int, int, int]
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 
 def rgb(code: str) -> RGB:
@@ -26,8 +32,10 @@ VEHICLES = (
     "#717581",
     "#92dadd",
 )
+TARGET, OBSTACLE, LIMIT = "#404040", "#999999", "#b3261e"
+"""Colours of the target, of obstacles and bystanders, and of limits."""
 INK, SOFT, LINE, GRID, BAD, ACCENT, SOLID = map(
-    rgb, ("#17202a", "#5b6773", "#d5dbe1", "#e3e8ec", "#b3261e", "#1f5fae", "#aab4bd")
+    rgb, ("#17202a", "#5b6773", "#d5dbe1", "#e3e8ec", LIMIT, "#1f5fae", "#aab4bd")
 )
 
 
@@ -50,3 +58,17 @@ def linear(colour: RGB | NDArray[np.uint8]) -> NDArray[np.uint8]:
     share = np.asarray(colour) / 255.0
     found = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.rint(255.0 * found).astype(np.uint8)
+
+
+def coloured(draw: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Decorate a function that draws with matplotlib: its colours C0, C1 … are those of the vehicles."""
+
+    @wraps(draw)
+    def drawn(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        import matplotlib
+        from cycler import cycler
+
+        with matplotlib.rc_context({"axes.prop_cycle": cycler(color=VEHICLES)}):
+            return draw(*args, **kwargs)
+
+    return drawn
